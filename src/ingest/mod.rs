@@ -18,7 +18,12 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { max_bytes: 16 << 20, max_side: 8192, max_pixels: 40_000_000, max_memory: 256 << 20 }
+        Self {
+            max_bytes: 16 << 20,
+            max_side: 8192,
+            max_pixels: 40_000_000,
+            max_memory: 256 << 20,
+        }
     }
 }
 

@@ -52,9 +52,19 @@ impl GrayFrame {
     /// A side of 0, or a number of values that is not `width * height`.
     pub fn from_luma(width: u32, height: u32, luma: Vec<u8>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 || luma.len() != width as usize * height as usize {
-            return Err(FrameError::Size { width, height, pixels: luma.len() });
+            return Err(FrameError::Size {
+                width,
+                height,
+                pixels: luma.len(),
+            });
         }
-        Ok(Self { width, height, pixels: luma, source_width: width, source_height: height })
+        Ok(Self {
+            width,
+            height,
+            pixels: luma,
+            source_width: width,
+            source_height: height,
+        })
     }
 
     /// Width of the working image.

@@ -77,7 +77,11 @@ impl Tracker {
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
     /// The bag keeps what it knew and gains the new look.
-    pub fn retarget(&mut self, _frame: &GrayFrame, _target: Rect) -> Result<Estimate, TrackerError> {
+    pub fn retarget(
+        &mut self,
+        _frame: &GrayFrame,
+        _target: Rect,
+    ) -> Result<Estimate, TrackerError> {
         todo!()
     }
 

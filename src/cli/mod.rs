@@ -1,0 +1,54 @@
+//! The commands, one file each. A command returns what went wrong as a printable error; `run` prints it
+//! as one line and exits with 1 (clap exits with 2 on wrong usage).
+
+mod eval;
+mod health;
+mod sample;
+mod serve;
+mod track;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Follows one object through frames: a service, and the same tracker on folders of frames.
+#[derive(Debug, Parser)]
+#[command(name = "bagtrack", version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// Without a command, `serve` runs with these settings.
+    #[command(flatten)]
+    serve: serve::Args,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the HTTP service (the default).
+    Serve(serve::Args),
+    /// Track through a folder of frames.
+    Track(track::Args),
+    /// Measure accuracy and speed on annotated sequences.
+    Eval(eval::Args),
+    /// Draw a synthetic clip with exact ground truth.
+    Sample(sample::Args),
+    /// Ask a running service whether it is healthy.
+    Health(health::Args),
+}
+
+/// Runs the command.
+pub fn run(cli: Cli) -> ExitCode {
+    let result = match cli.command.unwrap_or(Command::Serve(cli.serve)) {
+        Command::Serve(args) => serve::run(args),
+        Command::Track(args) => track::run(args),
+        Command::Eval(args) => eval::run(args),
+        Command::Sample(args) => sample::run(args),
+        Command::Health(args) => health::run(args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bagtrack: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Annotated sequences, error measures, plots.

@@ -1,0 +1,1 @@
+//! A synthetic clip with exact ground truth.
