@@ -20,7 +20,9 @@ pub struct WorkPanicked(#[source] tokio::task::JoinError);
 
 /// A place in the queue, given back when the last clone is dropped.
 #[derive(Debug, Clone)]
-pub struct QueuePermit(#[expect(dead_code, reason = "held for its drop")] Arc<OwnedSemaphorePermit>);
+pub struct QueuePermit(
+    #[expect(dead_code, reason = "held for its drop")] Arc<OwnedSemaphorePermit>,
+);
 
 /// A queue semaphore before a worker semaphore. Clones share both.
 #[derive(Debug, Clone)]
@@ -44,7 +46,9 @@ impl Admission {
     /// All places are taken.
     pub fn enter(&self) -> Result<QueuePermit, QueueFull> {
         let permit = self.queue.clone().try_acquire_owned();
-        permit.map(|p| QueuePermit(Arc::new(p))).map_err(|_| QueueFull)
+        permit
+            .map(|p| QueuePermit(Arc::new(p)))
+            .map_err(|_| QueueFull)
     }
 
     /// Waits for a worker, in order of arrival, and runs `work` on a blocking thread. Dropping the future
@@ -64,7 +68,9 @@ impl Admission {
             let _permits = (queue, worker);
             span.in_scope(work)
         };
-        tokio::task::spawn_blocking(work).await.map_err(WorkPanicked)
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(WorkPanicked)
     }
 
     /// Places free in the queue.

@@ -74,7 +74,9 @@ pub fn judge(
     posted: &[Fingerprint],
     given: Option<Rect>,
 ) -> Result<Turn, ReplayError> {
-    let last = recent.last().expect("a session has answered its first frame");
+    let last = recent
+        .last()
+        .expect("a session has answered its first frame");
     let expected = last.estimate.frame + 1;
     let got = match number {
         None => return Ok(Turn::Process),
@@ -89,7 +91,9 @@ pub fn judge(
         stored.fingerprint == *posted && (given.is_none() || stored.given == given)
     });
     if same {
-        Ok(Turn::Replay(stored.iter().map(|answered| answered.estimate).collect()))
+        Ok(Turn::Replay(
+            stored.iter().map(|answered| answered.estimate).collect(),
+        ))
     } else {
         Err(ReplayError::Differs { got, expected })
     }
@@ -127,7 +131,10 @@ mod tests {
     fn the_next_frame_and_an_unnumbered_one_are_processed() {
         let recent = [answered(7, b"a")];
         for number in [None, Some(8)] {
-            assert_eq!(judge(&recent, number, &prints(&[b"a"]), None), Ok(Turn::Process));
+            assert_eq!(
+                judge(&recent, number, &prints(&[b"a"]), None),
+                Ok(Turn::Process)
+            );
         }
     }
 
@@ -148,7 +155,13 @@ mod tests {
     fn other_bytes_differ_and_other_numbers_are_out_of_order() {
         let recent = [answered(6, b"b"), answered(7, b"c")];
         let differs = judge(&recent, Some(7), &prints(&[b"x"]), None);
-        assert_eq!(differs, Err(ReplayError::Differs { got: 7, expected: 8 }));
+        assert_eq!(
+            differs,
+            Err(ReplayError::Differs {
+                got: 7,
+                expected: 8
+            })
+        );
         for (number, posted) in [
             (6, prints(&[b"b"])),
             (9, prints(&[b"c"])),
@@ -156,7 +169,13 @@ mod tests {
             (5, prints(&[b"a", b"b", b"c"])),
         ] {
             let judged = judge(&recent, Some(number), &posted, None);
-            assert_eq!(judged, Err(ReplayError::OutOfOrder { got: number, expected: 8 }));
+            assert_eq!(
+                judged,
+                Err(ReplayError::OutOfOrder {
+                    got: number,
+                    expected: 8
+                })
+            );
         }
     }
 
@@ -166,8 +185,17 @@ mod tests {
         corrected.given = Some(corrected.estimate.target);
         let same = judge(&[corrected], Some(7), &prints(&[b"c"]), corrected.given);
         assert!(matches!(same, Ok(Turn::Replay(_))));
-        let moved = Rect { x: 1.5, ..corrected.estimate.target };
+        let moved = Rect {
+            x: 1.5,
+            ..corrected.estimate.target
+        };
         let other = judge(&[corrected], Some(7), &prints(&[b"c"]), Some(moved));
-        assert_eq!(other, Err(ReplayError::Differs { got: 7, expected: 8 }));
+        assert_eq!(
+            other,
+            Err(ReplayError::Differs {
+                got: 7,
+                expected: 8
+            })
+        );
     }
 }

@@ -280,6 +280,9 @@ impl Drop for Locked {
             return;
         }
         let latest = self.state.tracker.estimate();
-        *session.latest.lock().unwrap_or_else(PoisonError::into_inner) = latest;
+        *session
+            .latest
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = latest;
     }
 }
