@@ -55,12 +55,13 @@ fn a_file_cut_anywhere_is_an_error() {
 
 #[test]
 fn a_jpeg_cut_in_its_data_and_closed_with_an_end_marker_is_an_error() {
-    // Some cameras and proxies close what they cut. The decoder notices once more than two rows of blocks lack.
+    // Some cameras and proxies close what they cut.
+    // zune-jpeg 0.5.15 by itself makes gray blocks of what lacks, in strict mode too.
     let picture = color(160, 480);
     for scans in [None, Some(5)] {
         let bytes = jpeg(&picture, JpegForm { scans, ..BASELINE }, None);
         decode(&bytes, &SMALL).expect("the whole file is valid");
-        for kept in (20..=85).step_by(5) {
+        for kept in (20..=95).step_by(5) {
             let cut = [&bytes[..bytes.len() * kept / 100], &[0xFF, 0xD9]].concat();
             assert!(
                 decode(&cut, &SMALL).is_err(),

@@ -27,13 +27,14 @@ pub(super) fn decode(
         return Err(damaged("it holds less data than its size needs".to_owned()));
     }
 
+    let guarded = markers.with_guarded_end(bytes);
     let options = DecoderOptions::new_fast()
         .set_strict_mode(true)
         .set_max_width(limits.max_side as usize)
         .set_max_height(limits.max_side as usize)
         .jpeg_set_max_scans(MAX_SCANS)
         .jpeg_set_out_colorspace(ColorSpace::Luma);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&guarded[..]), options);
     decoder
         .decode_headers()
         .map_err(|error| damaged(error.to_string()))?;
@@ -52,7 +53,8 @@ pub(super) fn decode(
         // RGB and CMYK have no Y channel to take.
         _ => ColorSpace::RGB,
     };
-    limits.check_memory(markers.memory(output.num_components() as u64 + 1))?;
+    limits
+        .check_memory(markers.memory(output.num_components() as u64 + 1) + guarded.len() as u64)?;
     decoder.set_options(options.jpeg_set_out_colorspace(output));
     let pixels = decode_pixels(&mut decoder)?;
     let luma = match output {

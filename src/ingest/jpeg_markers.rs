@@ -4,6 +4,9 @@
 /// One component of the frame header: its horizontal and vertical sampling factors.
 type Sampling = (u32, u32);
 
+/// More one-bits than the longest code (16) and the value behind it (16) can use up.
+const GUARD_BYTES: usize = 8;
+
 /// What the markers tell.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Markers {
@@ -13,6 +16,8 @@ pub(super) struct Markers {
     components: Vec<Sampling>,
     scans: usize,
     entropy_coded_bytes: u64,
+    /// Where the end-of-image marker is.
+    end: usize,
 }
 
 impl Markers {
@@ -63,6 +68,7 @@ impl Markers {
             components: header.components,
             scans,
             entropy_coded_bytes,
+            end: at - 2,
         })
     }
 
@@ -84,6 +90,24 @@ impl Markers {
     /// Whether the decoder is right when it leaves colour out: not where colour has half the rows but all columns.
     pub(super) fn can_skip_color(&self) -> bool {
         matches!(self.largest_sampling(), (_, 1) | (2, 2))
+    }
+
+    /// The image with one-bits before its end marker. The decoder reads zero-bits for ever once it has met the
+    /// end marker, and makes gray blocks of them; a run of one-bits is the one code that no Huffman table has
+    /// (T.81, annex C), so where blocks are missing it has to say so. A whole image is done before them; but not one whose
+    /// channels come one after the other with restarts, where the decoder reads past the end of the last.
+    pub(super) fn with_guarded_end(&self, bytes: &[u8]) -> Vec<u8> {
+        let guard_bytes = if self.progressive || self.scans == 1 {
+            GUARD_BYTES
+        } else {
+            0
+        };
+        let mut guarded = Vec::with_capacity(self.end + 2 * GUARD_BYTES + 2);
+        guarded.extend_from_slice(&bytes[..self.end]);
+        // A byte of ones in entropy-coded data is written with a zero byte after it.
+        guarded.extend([0xFF, 0x00].repeat(guard_bytes));
+        guarded.extend([0xFF, 0xD9]);
+        guarded
     }
 
     /// Bytes that decoding allocates at most: the output (`output_channels` bytes a pixel) and, where the image
