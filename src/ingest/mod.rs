@@ -1,31 +1,35 @@
 //! Uploaded bytes to a working image. What could go wrong: bytes are hostile. They may claim to be huge,
-//! be cut short, or cost far more to decode than to send; so everything is limited before decoding.
+//! be cut short, or cost far more to decode than to send; so the whole structure is read and everything is
+//! limited before a pixel is decoded.
+//!
+//! What a frame becomes:
+//! - *Type*: by the bytes alone (JPEG, PNG, WebP), never by a name or a header of the request.
+//! - *Whole*: a file that ends before its own end marker is an error, also where the decoder would guess the rest.
+//! - *Luma*: Rec. 601, `Y = 0.299 R + 0.587 G + 0.114 B`, rounded: for JPEG this is its own Y channel, decoded
+//!   without the detour over colour. Colour profiles and gamma are not applied. 16 bits are rounded to 8.
+//!   Transparency is blended over black, as a canvas does when it writes a JPEG.
+//! - *Upright*: the EXIF orientation of a JPEG, PNG or WebP is applied, so boxes are in the pixels that a browser shows.
+//! - *Animations*: the first image.
+//!
+//! ```
+//! use bagtrack::ingest::{decode, IngestError, Limits};
+//! let error = decode(b"GIF89a", &Limits::default()).unwrap_err();
+//! assert_eq!(error, IngestError::UnknownFormat);
+//! ```
+
+mod containers;
+mod jpeg;
+mod jpeg_markers;
+mod limits;
+mod luma;
+mod orientation;
+mod raster;
+mod sniff;
+
+pub use limits::Limits;
 
 use crate::tracker::GrayFrame;
-
-/// What an upload may cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
-    /// Most bytes of one encoded frame.
-    pub max_bytes: usize,
-    /// Longest side in pixels.
-    pub max_side: u32,
-    /// Most pixels (width x height).
-    pub max_pixels: u64,
-    /// Most memory, in bytes, that decoding may allocate.
-    pub max_memory: u64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            max_bytes: 16 << 20,
-            max_side: 8192,
-            max_pixels: 40_000_000,
-            max_memory: 256 << 20,
-        }
-    }
-}
+use sniff::Format;
 
 /// Why bytes are not a frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -49,8 +53,20 @@ pub enum IngestError {
 
 /// Decodes one uploaded frame: sniff, limit, decode strictly, luma, EXIF orientation, downscale.
 ///
+/// Costs at most [`Limits::max_memory`] bytes beside the upload itself and the working image.
+///
 /// # Errors
 /// See [`IngestError`].
-pub fn decode(_bytes: &[u8], _limits: &Limits) -> Result<GrayFrame, IngestError> {
-    todo!()
+pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GrayFrame, IngestError> {
+    limits.check_bytes(bytes.len())?;
+    let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
+    let (luma, orientation) = match format {
+        Format::Jpeg => jpeg::decode(bytes, limits)?,
+        Format::Png => raster::decode_png(bytes, limits)?,
+        Format::WebP => raster::decode_webp(bytes, limits)?,
+    };
+    let upright = orientation::apply(luma, orientation);
+    let (width, height) = upright.dimensions();
+    GrayFrame::from_luma(width, height, upright.into_raw())
+        .map_err(|error| format.damaged(error.to_string()))
 }

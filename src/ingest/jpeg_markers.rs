@@ -1,0 +1,213 @@
+//! The marker structure of a JPEG (ITU-T T.81, annex B), read before decoding: is the file whole, and what will
+//! decoding it cost? The decoder by itself does not say when only the end of the last scan is missing.
+
+/// One component of the frame header: its horizontal and vertical sampling factors.
+type Sampling = (u32, u32);
+
+/// More one-bits than the longest code (16) and the value behind it (16) can use up.
+const GUARD_BYTES: usize = 8;
+
+/// What the markers tell.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Markers {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    progressive: bool,
+    components: Vec<Sampling>,
+    scans: usize,
+    entropy_coded_bytes: u64,
+    /// Where the end-of-image marker is.
+    end: usize,
+}
+
+impl Markers {
+    /// Reads from the start to the end-of-image marker.
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, &'static str> {
+        let mut frame = None;
+        let mut scans = 0;
+        let mut entropy_coded_bytes = 0;
+        let mut at = 2;
+        loop {
+            let (marker, after) = next_marker(bytes, at).ok_or("it is cut short")?;
+            at = after;
+            match marker {
+                0xD9 => break,
+                0x01 | 0xD0..=0xD7 => continue,
+                0xD8 => return Err("a second image starts inside the first"),
+                _ => {}
+            }
+            let length = bytes.get(at..at + 2).ok_or("it is cut short")?;
+            let length = usize::from(u16::from_be_bytes([length[0], length[1]]));
+            if length < 2 {
+                return Err("a segment is shorter than its own length field");
+            }
+            let segment = bytes.get(at + 2..at + length).ok_or("it is cut short")?;
+            at += length;
+            match marker {
+                // Start of frame: all of C0 to CF but Huffman tables, extensions and arithmetic conditioning.
+                0xC0..=0xCF if ![0xC4, 0xC8, 0xCC].contains(&marker) => {
+                    if frame.is_some() {
+                        return Err("it has two frame headers");
+                    }
+                    frame = Some((marker, FrameHeader::read(segment)?));
+                }
+                0xDA => {
+                    scans += 1;
+                    let end = end_of_scan(bytes, at).ok_or("it is cut short")?;
+                    entropy_coded_bytes += (end - at) as u64;
+                    at = end;
+                }
+                _ => {}
+            }
+        }
+        let (marker, header) = frame.ok_or("it has no frame header")?;
+        Ok(Self {
+            width: header.width,
+            height: header.height,
+            progressive: marker == 0xC2,
+            components: header.components,
+            scans,
+            entropy_coded_bytes,
+            end: at - 2,
+        })
+    }
+
+    /// Why the decoder would give a wrong picture, without an error, for this valid but rare layout.
+    pub(super) fn unsupported(&self, is_cmyk: bool) -> Option<&'static str> {
+        let largest = self.largest_sampling();
+        if self.components[0] != largest || (is_cmyk && largest != (1, 1)) {
+            return Some("its first channel is subsampled, which is not supported");
+        }
+        if !self.progressive && self.scans > 1 && largest.1 > 1 {
+            return Some(
+                "its channels come one after the other with vertical subsampling, which is not supported; \
+                 progressive and interleaved files are",
+            );
+        }
+        None
+    }
+
+    /// Whether the decoder is right when it leaves colour out: not where colour has half the rows but all columns.
+    pub(super) fn can_skip_color(&self) -> bool {
+        matches!(self.largest_sampling(), (_, 1) | (2, 2))
+    }
+
+    /// The image with one-bits before its end marker. The decoder reads zero-bits for ever once it has met the
+    /// end marker, and makes gray blocks of them; a run of one-bits is the one code that no Huffman table has
+    /// (T.81, annex C), so where blocks are missing it has to say so. A whole image is done before them; but not one whose
+    /// channels come one after the other with restarts, where the decoder reads past the end of the last.
+    pub(super) fn with_guarded_end(&self, bytes: &[u8]) -> Vec<u8> {
+        let guard_bytes = if self.progressive || self.scans == 1 {
+            GUARD_BYTES
+        } else {
+            0
+        };
+        let mut guarded = Vec::with_capacity(self.end + 2 * GUARD_BYTES + 2);
+        guarded.extend_from_slice(&bytes[..self.end]);
+        // A byte of ones in entropy-coded data is written with a zero byte after it.
+        guarded.extend([0xFF, 0x00].repeat(guard_bytes));
+        guarded.extend([0xFF, 0xD9]);
+        guarded
+    }
+
+    /// Bytes that decoding allocates at most: the output (`output_channels` bytes a pixel) and, where the image
+    /// comes in several scans, 16-bit coefficients for every sample of every component.
+    pub(super) fn memory(&self, output_channels: u64) -> u64 {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        let (h_max, v_max) = self.largest_sampling();
+        let output = pixels * output_channels;
+        let row_buffers = 16 * u64::from(self.width + 64) * u64::from(v_max) * 8;
+        if !self.progressive && self.scans < 2 {
+            return output + row_buffers;
+        }
+        let unit_columns = u64::from(self.width.div_ceil(8 * h_max));
+        let unit_rows = u64::from(self.height.div_ceil(8 * v_max));
+        let blocks: u64 = self
+            .components
+            .iter()
+            .map(|&(h, v)| u64::from(h) * u64::from(v) * unit_columns * unit_rows)
+            .sum();
+        // Twice the rows: the decoder does so when it leaves out vertically subsampled colour.
+        output + row_buffers + blocks * 64 * 2 * 2
+    }
+
+    /// Whether there are fewer bits of picture than any encoder needs: at least one for each 8 x 8 block of the
+    /// component with the most blocks, its DC code. A few hundred bytes that claim forty million pixels end here.
+    pub(super) fn is_implausibly_small(&self) -> bool {
+        let (h_max, v_max) = self.largest_sampling();
+        let blocks = self
+            .components
+            .iter()
+            .map(|&(h, v)| {
+                u64::from((self.width * h).div_ceil(8 * h_max))
+                    * u64::from((self.height * v).div_ceil(8 * v_max))
+            })
+            .max()
+            .unwrap_or(0);
+        self.entropy_coded_bytes * 8 < blocks
+    }
+
+    fn largest_sampling(&self) -> Sampling {
+        self.components
+            .iter()
+            .fold((1, 1), |(h_max, v_max), &(h, v)| {
+                (h_max.max(h), v_max.max(v))
+            })
+    }
+}
+
+struct FrameHeader {
+    width: u32,
+    height: u32,
+    components: Vec<Sampling>,
+}
+
+impl FrameHeader {
+    fn read(segment: &[u8]) -> Result<Self, &'static str> {
+        let [_, h1, h0, w1, w0, count, components @ ..] = segment else {
+            return Err("its frame header is too short");
+        };
+        let (components, rest) = components.as_chunks::<3>();
+        if components.len() != usize::from(*count) || !rest.is_empty() || components.is_empty() {
+            return Err("its frame header has another length than its components need");
+        }
+        let components: Vec<Sampling> = components
+            .iter()
+            .map(|[_, sampling, _]| (u32::from(sampling >> 4), u32::from(sampling & 15)))
+            .collect();
+        if components
+            .iter()
+            .any(|&(h, v)| !(1..=4).contains(&h) || !(1..=4).contains(&v))
+        {
+            return Err("a sampling factor is not 1 to 4");
+        }
+        Ok(Self {
+            width: u32::from(u16::from_be_bytes([*w1, *w0])),
+            height: u32::from(u16::from_be_bytes([*h1, *h0])),
+            components,
+        })
+    }
+}
+
+/// The next marker's code, at or after `at`, and where its segment begins. Fill bytes are skipped.
+fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
+    loop {
+        at += bytes.get(at..)?.iter().position(|&byte| byte == 0xFF)?;
+        at += bytes[at..].iter().position(|&byte| byte != 0xFF)?;
+        if bytes[at] != 0 {
+            return Some((bytes[at], at + 1));
+        }
+    }
+}
+
+/// Where entropy-coded data that begins at `at` ends: at the first marker that is not a restart.
+fn end_of_scan(bytes: &[u8], mut at: usize) -> Option<usize> {
+    loop {
+        at += bytes.get(at..)?.iter().position(|&byte| byte == 0xFF)?;
+        match *bytes.get(at + 1)? {
+            0x00 | 0xD0..=0xD7 => at += 2,
+            0xFF => at += 1,
+            _ => return Some(at),
+        }
+    }
+}

@@ -1,1 +1,0 @@
-//! A synthetic clip with exact ground truth.
