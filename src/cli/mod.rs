@@ -3,6 +3,7 @@
 
 mod eval;
 mod health;
+mod params;
 mod progress;
 mod sample;
 mod serve;
