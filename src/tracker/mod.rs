@@ -1,12 +1,79 @@
-//! The tracker: section III of the paper, as a pure state machine. No async, no HTTP, no files, no clock.
+//! The tracker: section III of *Bags of Affine Subspaces for Robust Object Tracking* (Shirazi, Sanderson, McCool,
+//! Harandi), as a pure state machine. No async, no HTTP, no files, no clock.
+//!
+//! [`Tracker::new`] takes the first frame and a box; [`Tracker::step`] takes the next frame and answers where the box
+//! is now. In between stands what the paper calls its four components:
+//!
+//! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale. Each frame draws N from the last ones by
+//!   their weights and moves each by a Gaussian step.
+//! - **(B)** *Affine subspaces* (`patch`, `subspace`, `candidate`): a candidate area becomes a vector v of D gray values
+//!   (`patch` is the only file that knows how). With the patches tracked in the P previous frames it makes the matrix
+//!   V (equation 2); the mean of its columns and its n dominant left singular vectors are the candidate's affine
+//!   subspace (equation 1). V is not centred.
+//! - **(C)** *The bag* (`bag`): up to K affine subspaces that were tracked before, a new one every W frames.
+//! - **(D)** *Distance* (`distance`): α times the squared distance of origins plus 1 - α times the squared Grassmann
+//!   geodesic distance of bases, both brought to \[0, 1\] (equations 4 to 8). *Likelihood* (`likelihood`): exp(-dist / σ),
+//!   normalised over the candidates for each entry of the bag, summed over the bag; the greatest sum is the answer,
+//!   and the sums are the weights for the next frame (equations 9 to 12).
+//!
+//! How (B) and (D) are computed from inner products alone, without decomposing V for any candidate, is told in
+//! `products` and `candidate`. [`Evaluation`] is that computation by itself.
+//!
+//! What the paper leaves open:
+//! - Everything happens in the working image ([`GrayFrame`]), at most [`WORKING_SIDE`] pixels on its longer side; boxes
+//!   come in and go out in the pixels of the uploaded frame.
+//! - Until there are P previous patches V has those there are, and no basis has more columns than V has directions.
+//! - Of two bases with different numbers of columns, the smaller number counts.
+//! - The draws of a frame depend on the seed and the frame's number alone, so a session that is replayed gives the same
+//!   boxes bit for bit on the same machine.
+//!
+//! ```
+//! use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
+//!
+//! let still = |shift: usize| {
+//!     let luma = (0..64 * 48).map(|i| ((i % 64 + shift) * 7 % 250) as u8).collect();
+//!     GrayFrame::from_luma(64, 48, luma)
+//! };
+//! let mut tracker = Tracker::new(&still(0)?, Rect::new(10.0, 10.0, 20.0, 16.0), Preset::Paper.params())?;
+//! let answer = tracker.step(&still(1)?)?;
+//! println!("frame {}: {:?}, {:.2}", answer.frame, answer.target, answer.score);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod bag;
+mod candidate;
+mod distance;
+mod downscale;
+mod eigen;
+mod evaluation;
 mod frame;
+mod likelihood;
+mod motion;
 mod params;
+mod patch;
+mod products;
+mod rect;
+mod score;
+mod snapshot;
+mod state;
+mod subspace;
 
+pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
 pub use params::{Params, ParamsError, Preset};
+pub use patch::patch;
+pub use state::LEAST_BOX_SIDE;
+pub use subspace::{AffineSubspace, RANK_TOLERANCE};
+
+use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
+
+use bag::Bag;
+use motion::Particle;
+use patch::PatchCutter;
+use score::Usual;
+use state::State;
 
 /// Whether the tracker believes its own box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -61,52 +128,168 @@ pub enum TrackerError {
 }
 
 /// Follows one object.
+///
+/// An error of any method leaves the tracker as it was.
 #[derive(Debug, Clone)]
-pub struct Tracker {}
+pub struct Tracker {
+    state: State,
+    evaluation: Evaluation,
+    cutter: PatchCutter,
+    /// Room for the next particles, swapped with those of the state.
+    proposed: Vec<Particle>,
+}
 
 impl Tracker {
-    /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame.
-    pub fn new(_frame: &GrayFrame, _target: Rect, _params: Params) -> Result<Self, TrackerError> {
-        todo!()
+    /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
+    ///
+    /// # Errors
+    /// A parameter out of its range; a box that is not finite, has a side below [`LEAST_BOX_SIDE`] pixels (or below
+    /// one pixel of the working image) or above four times the frame's longer side, or lies outside the frame.
+    pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
+        params.validate()?;
+        let source = frame.source_size();
+        state::check_target(source, &target)?;
+        let (reach, particle) = State::aim(source, &target);
+        let first = patch(frame, &reach.area(&particle), &params);
+        let bag = Bag::new(AffineSubspace::of(&[&first], params.basis_dim as usize));
+        let mut state = State {
+            params,
+            source,
+            reach,
+            estimate: given(0, target),
+            particles: Vec::new(),
+            weights: Vec::new(),
+            history: VecDeque::from([first]),
+            bag,
+            usual: Usual::default(),
+        };
+        state.gather(particle);
+        Ok(Self::with_state(state))
+    }
+
+    /// A tracker in a valid state.
+    fn with_state(state: State) -> Self {
+        let mut evaluation = Evaluation::new(&state.params);
+        evaluation.set_bag(state.bag.entries().iter());
+        Self {
+            state,
+            evaluation,
+            cutter: PatchCutter::default(),
+            proposed: Vec::new(),
+        }
     }
 
     /// Finds the target in the next frame.
-    pub fn step(&mut self, _frame: &GrayFrame) -> Result<Estimate, TrackerError> {
-        todo!()
+    ///
+    /// # Errors
+    /// A frame whose uploaded size is not that of the session's first frame.
+    pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
+        let state = &mut self.state;
+        state::check_frame(state.source, frame)?;
+        let number = state.estimate.frame + 1;
+
+        // (A) Where it may be.
+        motion::propose(
+            &state.particles,
+            &state.weights,
+            &state.params,
+            &state.reach,
+            number,
+            &mut self.proposed,
+        );
+
+        // (B) What is seen there.
+        for (index, particle) in self.proposed.iter().enumerate() {
+            let area = state.reach.area(particle);
+            let values = self.evaluation.candidate_mut(index);
+            self.cutter.cut(frame, &area, &state.params, values);
+        }
+
+        // (D) How that compares with what is known.
+        let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();
+        self.evaluation.compute(&history);
+        let best = self.evaluation.best();
+        let nearest = self.evaluation.distances(best).iter().copied();
+        let (score, status) = state.usual.judge(nearest.fold(f64::INFINITY, f64::min));
+
+        // (C) What is to be remembered of it.
+        let tracked = self.evaluation.candidate(best);
+        if Bag::admits(number, &state.params) {
+            let latest = state.subspace_with(&tracked);
+            state.bag.admit(latest, &state.params);
+            self.evaluation.set_bag(state.bag.entries().iter());
+        }
+        state.remember(tracked);
+
+        state.estimate = Estimate {
+            frame: number,
+            target: state.target_of(&self.proposed[best]),
+            score,
+            status,
+        };
+        std::mem::swap(&mut state.particles, &mut self.proposed);
+        state.weights.clear();
+        state.weights.extend_from_slice(self.evaluation.weights());
+        Ok(state.estimate)
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
-    /// The bag keeps what it knew and gains the new look.
-    pub fn retarget(
-        &mut self,
-        _frame: &GrayFrame,
-        _target: Rect,
-    ) -> Result<Estimate, TrackerError> {
-        todo!()
+    /// The bag keeps what it knew and gains the new look; history and particles restart at the box.
+    ///
+    /// # Errors
+    /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
+    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
+        let state = &mut self.state;
+        state::check_frame(state.source, frame)?;
+        state::check_target(state.source, &target)?;
+        let (reach, particle) = State::aim(state.source, &target);
+        let look = patch(frame, &reach.area(&particle), &state.params);
+        state.reach = reach;
+        state.history.clear();
+        let latest = state.subspace_with(&look);
+        state.bag.admit(latest, &state.params);
+        state.remember(look);
+        state.gather(particle);
+        state.estimate = given(state.estimate.frame + 1, target);
+        self.evaluation.set_bag(state.bag.entries().iter());
+        Ok(state.estimate)
     }
 
     /// The last answer.
     pub fn estimate(&self) -> Estimate {
-        todo!()
+        self.state.estimate
     }
 
     /// The parameters of this tracker.
     pub fn params(&self) -> &Params {
-        todo!()
+        &self.state.params
     }
 
     /// Width and height of the session's frames, before downscaling.
     pub fn source_size(&self) -> (u32, u32) {
-        todo!()
+        self.state.source
     }
 
     /// The whole state as bytes, versioned.
     pub fn snapshot(&self) -> Vec<u8> {
-        todo!()
+        snapshot::write(&self.state)
     }
 
     /// A tracker that goes on from `snapshot`, bit for bit.
-    pub fn restore(_snapshot: &[u8]) -> Result<Self, TrackerError> {
-        todo!()
+    ///
+    /// # Errors
+    /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
+    pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
+        snapshot::read(snapshot).map(Self::with_state)
+    }
+}
+
+/// The answer to a frame whose box came from the user.
+fn given(frame: u64, target: Rect) -> Estimate {
+    Estimate {
+        frame,
+        target,
+        score: 1.0,
+        status: Status::Tracking,
     }
 }

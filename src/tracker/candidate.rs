@@ -1,0 +1,160 @@
+//! (B) The affine subspaces of all candidates, in the coordinates of the shared history.
+//!
+//! V = [v, H] (equation 2). With the orthonormal Q of [`products`](super::products), q = Qᵀv, and e the unit vector
+//! of the rest v - Qq, whose length is ρ, V Vᵀ is diag(Λ, 0) + z zᵀ in the basis [Q, e], where z = (q, ρ). So the
+//! left singular vectors of V are [Q, e] times the eigenvectors of a matrix of P + 1 rows, and Uᵀf for any f follows
+//! from Qᵀf and eᵀf = (vᵀf - qᵀQᵀf) / ρ.
+
+use super::Params;
+use super::eigen::{self, LANES, Lanes};
+use super::products::Products;
+use super::subspace;
+
+/// A rest shorter than this share of the candidate (squared) is rounding.
+const NO_REST: f64 = 1e-13;
+
+/// The bases of all candidates of a frame.
+#[derive(Debug, Clone)]
+pub(super) struct CandidateBases {
+    /// n.
+    limit: usize,
+    /// P + 1.
+    size: usize,
+    /// For each candidate n columns of P + 1 coordinates.
+    coordinates: Vec<f64>,
+    /// For each candidate the number of columns that count.
+    dims: Vec<usize>,
+    /// For each candidate ρ, or 0 if v is in the span of the history.
+    rests: Vec<f64>,
+    matrix: Vec<Lanes>,
+    vectors: Vec<Lanes>,
+}
+
+impl CandidateBases {
+    pub fn new(params: &Params) -> Self {
+        let (limit, size) = (params.basis_dim as usize, params.history as usize + 1);
+        let count = params.particles as usize;
+        Self {
+            limit,
+            size,
+            coordinates: vec![0.0; count * limit * size],
+            dims: vec![0; count],
+            rests: vec![0.0; count],
+            matrix: vec![[0.0; LANES]; size * size],
+            vectors: vec![[0.0; LANES]; size * size],
+        }
+    }
+
+    /// Finds the basis of every candidate.
+    pub fn compute(&mut self, products: &Products) {
+        let count = self.dims.len();
+        for first in (0..count).step_by(LANES) {
+            let lanes = LANES.min(count - first);
+            self.matrix.fill([0.0; LANES]);
+            for lane in 0..lanes {
+                self.fill(products, first + lane, lane);
+            }
+            eigen::diagonalize(&mut self.matrix, self.size, Some(&mut self.vectors));
+            for lane in 0..lanes {
+                self.take(first + lane, lane);
+            }
+        }
+    }
+
+    /// diag(Λ, 0) + z zᵀ of one candidate, upper triangle.
+    fn fill(&mut self, products: &Products, candidate: usize, lane: usize) {
+        let row = products.of_candidate(candidate);
+        let norm = products.norm(candidate);
+        let inside: f64 = row.with_directions.iter().map(|q| q * q).sum();
+        let rest = norm - inside;
+        let rest = if rest > norm * NO_REST {
+            rest.sqrt()
+        } else {
+            0.0
+        };
+        self.rests[candidate] = rest;
+        let last = self.size - 1;
+        for i in 0..last {
+            let q = row.with_directions[i];
+            for j in i..last {
+                self.matrix[i * self.size + j][lane] = q * row.with_directions[j];
+            }
+            self.matrix[i * self.size + i][lane] += products.history_eigenvalues()[i];
+            self.matrix[i * self.size + last][lane] = q * rest;
+        }
+        self.matrix[last * self.size + last][lane] = rest * rest;
+    }
+
+    /// The n dominant eigenvectors of one candidate.
+    fn take(&mut self, candidate: usize, lane: usize) {
+        let size = self.size;
+        let value = |j: usize| self.matrix[j * size + j][lane];
+        let mut order = [0_usize; 16];
+        let order = &mut order[..size];
+        for (position, slot) in order.iter_mut().enumerate() {
+            *slot = position;
+        }
+        order.sort_unstable_by(|&a, &b| value(b).total_cmp(&value(a)));
+        let dim = subspace::dominant(order.iter().map(|&j| value(j)), self.limit);
+        self.dims[candidate] = dim;
+        let block = &mut self.coordinates[candidate * self.limit * size..][..self.limit * size];
+        block.fill(0.0);
+        for (column, &j) in block.chunks_exact_mut(size).zip(&order[..dim]) {
+            for (r, coordinate) in column.iter_mut().enumerate() {
+                *coordinate = self.vectors[j * size + r][lane];
+            }
+        }
+    }
+
+    /// The number of basis vectors of a candidate.
+    pub fn dim(&self, candidate: usize) -> usize {
+        self.dims[candidate]
+    }
+
+    /// Uᵀ[bag] of a candidate, into `out`: for each of its n columns (zero beyond its dimension) a row as long as
+    /// the products with the bag. `rest` is a buffer for eᵀ[bag].
+    pub fn times_bag(
+        &self,
+        products: &Products,
+        candidate: usize,
+        rest: &mut Vec<f64>,
+        out: &mut Vec<f64>,
+    ) {
+        let row = products.of_candidate(candidate);
+        let width = row.with_bag.len();
+        let slots = self.size - 1;
+        rest.clear();
+        rest.resize(width, 0.0);
+        if self.rests[candidate] > 0.0 {
+            rest.copy_from_slice(row.with_bag);
+            for slot in 0..slots {
+                add(
+                    rest,
+                    products.of_direction(slot).with_bag,
+                    -row.with_directions[slot],
+                );
+            }
+            let scale = 1.0 / self.rests[candidate];
+            rest.iter_mut().for_each(|value| *value *= scale);
+        }
+        out.clear();
+        out.resize(self.limit * width, 0.0);
+        let block = &self.coordinates[candidate * self.limit * self.size..];
+        for (target, column) in out
+            .chunks_exact_mut(width)
+            .zip(block.chunks_exact(self.size))
+        {
+            for slot in 0..slots {
+                add(target, products.of_direction(slot).with_bag, column[slot]);
+            }
+            add(target, rest, column[slots]);
+        }
+    }
+}
+
+/// `sum += weight * values`.
+fn add(sum: &mut [f64], values: &[f64], weight: f64) {
+    for (sum, value) in sum.iter_mut().zip(values) {
+        *sum += weight * value;
+    }
+}

@@ -1,0 +1,110 @@
+//! (D) The candidates of a frame against the bag: distances, likelihoods, the best one.
+
+use super::candidate::CandidateBases;
+use super::distance::Distances;
+use super::products::Products;
+use super::subspace::{self, AffineSubspace};
+use super::{Params, likelihood};
+
+/// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](super::Tracker::step) does it.
+///
+/// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
+/// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.
+/// The buffers are kept, so one value serves all frames.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    sigma: f64,
+    candidates: usize,
+    /// ‖μₖ‖² and the number of basis vectors of each entry.
+    entries: Vec<(f64, usize)>,
+    products: Products,
+    bases: CandidateBases,
+    distances: Distances,
+    likelihoods: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Evaluation {
+    /// The evaluation for `params`, which must be valid.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            sigma: params.sigma,
+            candidates: params.particles as usize,
+            entries: Vec::new(),
+            products: Products::new(params),
+            bases: CandidateBases::new(params),
+            distances: Distances::new(params),
+            likelihoods: Vec::new(),
+            weights: Vec::new(),
+        }
+    }
+
+    /// Takes the entries of the bag: at least one, each with means of length D and at most n basis vectors.
+    pub fn set_bag<'a>(&mut self, bag: impl ExactSizeIterator<Item = &'a AffineSubspace> + Clone) {
+        self.entries.clear();
+        self.entries.extend(
+            bag.clone()
+                .map(|entry| (subspace::dot(&entry.mean, &entry.mean), entry.dim())),
+        );
+        self.products.set_bag(bag);
+    }
+
+    /// The feature vector v of candidate `index`, of length D, to be filled in.
+    ///
+    /// # Panics
+    /// If `index` is N or more.
+    pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
+        assert!(index < self.candidates, "a candidate below N");
+        self.products.candidate_mut(index)
+    }
+
+    /// The feature vector v of candidate `index` as it is stored in histories.
+    pub fn candidate(&self, index: usize) -> Vec<f32> {
+        let values = self.products.candidate(index).iter();
+        values.map(|&value| value as f32).collect()
+    }
+
+    /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every
+    /// entry of the bag.
+    pub fn compute(&mut self, history: &[&[f32]]) {
+        self.products.compute(history);
+        self.bases.compute(&self.products);
+        self.distances
+            .compute(&self.products, &self.bases, self.candidates, &self.entries);
+        let entries = self.entries.len();
+        likelihood::normalized(
+            self.distances.values(),
+            entries,
+            self.sigma,
+            &mut self.likelihoods,
+        );
+        likelihood::sum_rule(&self.likelihoods, entries, &mut self.weights);
+    }
+
+    /// dist(Aᵢ, B\[k\]) (equation 4), in [0, 1], of candidate `index` to each entry of the bag.
+    pub fn distances(&self, index: usize) -> &[f64] {
+        let entries = self.entries.len();
+        &self.distances.values()[index * entries..(index + 1) * entries]
+    }
+
+    /// p̂(Aᵢ | B\[k\]) (equation 10) of candidate `index` for each entry of the bag; over the candidates they sum to 1.
+    pub fn likelihoods(&self, index: usize) -> &[f64] {
+        let entries = self.entries.len();
+        &self.likelihoods[index * entries..(index + 1) * entries]
+    }
+
+    /// The weights of the N particles: equation 9, scaled to sum to 1.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// The number of basis vectors in the subspace of candidate `index`.
+    pub fn basis_dim(&self, index: usize) -> usize {
+        self.bases.dim(index)
+    }
+
+    /// The most likely candidate (equation 12).
+    pub fn best(&self) -> usize {
+        likelihood::arg_max(&self.weights)
+    }
+}

@@ -1,0 +1,118 @@
+//! (A) Particles: where the target may be in the next frame.
+//!
+//! Each frame draws N particles from the last ones with the probability of their weights, and moves each by a
+//! Gaussian step (section III-A). The draws of frame t come from a generator seeded with (seed, t): no generator is
+//! part of the state, and one frame given twice to the same state gives the same particles.
+//!
+//! A random walk knows no limits, so it is held: the box touches the frame by a pixel, its scale stays within
+//! [`Reach::scales`].
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::{Params, Rect};
+
+/// One hypothesis z = (x, y, s): the centre in working pixels, and the scale against the reference box.
+///
+/// The paper's state is the top-left corner; the centre keeps the place of a target that changes its size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Particle {
+    /// Centre along x, in working pixels.
+    pub x: f64,
+    /// Centre along y, in working pixels.
+    pub y: f64,
+    /// Scale; the reference box has 1.
+    pub scale: f64,
+}
+
+/// How far particles may go: the working image, and the reference box whose aspect every particle keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Reach {
+    /// Width of the working image.
+    pub frame_width: f64,
+    /// Height of the working image.
+    pub frame_height: f64,
+    /// Width of the box at scale 1, in working pixels.
+    pub box_width: f64,
+    /// Height of the box at scale 1, in working pixels.
+    pub box_height: f64,
+}
+
+impl Reach {
+    /// The least and the greatest scale: within 1/10 and 10, the shorter side of the box not below one working
+    /// pixel, the longer not above four times that of the frame. Always contains 1.
+    pub fn scales(&self) -> (f64, f64) {
+        let shorter = self.box_width.min(self.box_height);
+        let longer = self.box_width.max(self.box_height);
+        let frame = self.frame_width.max(self.frame_height);
+        let least = (1.0 / shorter).clamp(0.1, 1.0);
+        let greatest = (4.0 * frame / longer).clamp(1.0, 10.0);
+        (least, greatest)
+    }
+
+    /// The nearest particle that is allowed.
+    pub fn hold(&self, particle: Particle) -> Particle {
+        let (least, greatest) = self.scales();
+        let scale = particle.scale.clamp(least, greatest);
+        let overhang = |side: f64| (side * scale / 2.0 - 1.0).max(0.0);
+        let (left, up) = (overhang(self.box_width), overhang(self.box_height));
+        Particle {
+            x: particle.x.clamp(-left, self.frame_width + left),
+            y: particle.y.clamp(-up, self.frame_height + up),
+            scale,
+        }
+    }
+
+    /// The candidate area of `particle`, in working pixels.
+    pub fn area(&self, particle: &Particle) -> Rect {
+        Rect::centered(
+            particle.x,
+            particle.y,
+            self.box_width * particle.scale,
+            self.box_height * particle.scale,
+        )
+    }
+}
+
+/// Draws the particles of frame `frame` into `out`: multinomial resampling of `previous` by `weights` (which are
+/// at least 0 and sum to 1), then Brownian motion.
+pub(super) fn propose(
+    previous: &[Particle],
+    weights: &[f64],
+    params: &Params,
+    reach: &Reach,
+    frame: u64,
+    out: &mut Vec<Particle>,
+) {
+    let mut generator = ChaCha8Rng::seed_from_u64(params.seed);
+    generator.set_stream(frame);
+    let mut total = 0.0;
+    let cumulative: Vec<f64> = weights
+        .iter()
+        .map(|weight| {
+            total += weight;
+            total
+        })
+        .collect();
+    out.clear();
+    for _ in 0..params.particles {
+        let draw = generator.random::<f64>() * total;
+        // Rounding can put the draw at the very end.
+        let chosen = cumulative
+            .partition_point(|&sum| sum <= draw)
+            .min(previous.len() - 1);
+        let mut step = |std: f64| -> f64 {
+            let normal: f64 = StandardNormal.sample(&mut generator);
+            normal * std
+        };
+        let origin = previous[chosen];
+        let moved = Particle {
+            x: origin.x + step(params.motion_std_x),
+            y: origin.y + step(params.motion_std_y),
+            scale: origin.scale + step(params.motion_std_scale),
+        };
+        out.push(reach.hold(moved));
+    }
+}

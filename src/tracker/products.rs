@@ -1,0 +1,203 @@
+//! The one large computation of a frame: all inner products, as a single matrix product.
+//!
+//! Nothing of size D x (P + 1) is decomposed for a candidate. All candidates of a frame share the P previous
+//! patches H. With an orthonormal basis Q of their span, found once a frame from the small matrix HᵀH, the inner
+//! products of a candidate with Q, with the sum of H and with the vectors in the bag say everything about its
+//! affine subspace and its distances.
+//!
+//! The hazard is cancellation: candidate and history are nearly the same vector, and what matters is the
+//! difference. In single precision it would be gone. The product in double precision takes the same time here
+//! (both are bound by bringing the candidates in), so everything is in double precision.
+
+use nalgebra::{DMatrix, DMatrixView, Dyn};
+
+use super::subspace::{self, AffineSubspace};
+use super::{Params, eigen};
+
+/// nalgebra hands a product to the fast kernel from six rows and columns on; zeros fill up.
+const LEAST_SIDE: usize = 8;
+
+/// The inner products of (candidates, Q, the sum of H) with (Q, the sum of H, the bag).
+#[derive(Debug, Clone)]
+pub(super) struct Products {
+    len: usize,
+    candidates: usize,
+    slots: usize,
+    stride: usize,
+    /// The candidates, then Q (P slots, zero where there is no direction), then the sum of H: one vector a row.
+    left: Vec<f64>,
+    /// Q, the sum of H, and for each entry of the bag its mean and n basis vectors: one vector a column.
+    right: Vec<f64>,
+    /// One column for each vector of `left`, one row for each of `right`.
+    out: DMatrix<f64>,
+    norms: Vec<f64>,
+    history_eigenvalues: Vec<f64>,
+    history_len: usize,
+    sum_norm: f64,
+}
+
+impl Products {
+    pub fn new(params: &Params) -> Self {
+        let len = params.feature_len();
+        let candidates = params.particles as usize;
+        let slots = params.history as usize;
+        let rows = (candidates + slots + 1).max(LEAST_SIDE);
+        Self {
+            len,
+            candidates,
+            slots,
+            stride: params.basis_dim as usize + 1,
+            left: vec![0.0; rows * len],
+            right: Vec::new(),
+            out: DMatrix::zeros(0, 0),
+            norms: vec![0.0; candidates],
+            history_eigenvalues: vec![0.0; slots],
+            history_len: 0,
+            sum_norm: 0.0,
+        }
+    }
+
+    /// The feature vector of candidate `index`, to be filled in.
+    pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
+        &mut self.left[index * self.len..(index + 1) * self.len]
+    }
+
+    /// The feature vector of candidate `index`.
+    pub fn candidate(&self, index: usize) -> &[f64] {
+        &self.left[index * self.len..(index + 1) * self.len]
+    }
+
+    /// Takes the vectors of the bag's entries.
+    pub fn set_bag<'a>(&mut self, entries: impl ExactSizeIterator<Item = &'a AffineSubspace>) {
+        let first = self.slots + 1;
+        let columns = (first + entries.len() * self.stride).max(LEAST_SIDE);
+        self.right.clear();
+        self.right.resize(columns * self.len, 0.0);
+        for (entry, block) in
+            entries.zip(self.right[first * self.len..].chunks_exact_mut(self.stride * self.len))
+        {
+            let values = entry.mean.iter().chain(&entry.basis);
+            for (target, &value) in block.iter_mut().zip(values) {
+                *target = f64::from(value);
+            }
+        }
+        let rows = self.left.len() / self.len;
+        self.out = DMatrix::zeros(columns, rows);
+    }
+
+    /// Computes all products of the candidates with `history`, the previous patches, and the bag.
+    pub fn compute(&mut self, history: &[&[f32]]) {
+        self.factor(history);
+        let (len, columns, rows) = (self.len, self.out.nrows(), self.out.ncols());
+        let left = DMatrixView::from_slice_with_strides_generic(
+            &self.left,
+            Dyn(len),
+            Dyn(rows),
+            Dyn(1),
+            Dyn(len),
+        );
+        let right = DMatrixView::from_slice_with_strides_generic(
+            &self.right,
+            Dyn(columns),
+            Dyn(len),
+            Dyn(len),
+            Dyn(1),
+        );
+        self.out.gemm(1.0, &right, &left, 0.0);
+        for index in 0..self.candidates {
+            self.norms[index] = norm_squared(self.candidate(index));
+        }
+    }
+
+    /// Q = H R Λ^(-1/2), where HᵀH = R Λ Rᵀ, and the sum of H.
+    fn factor(&mut self, history: &[&[f32]]) {
+        let (len, count) = (self.len, history.len());
+        let shared = &mut self.left[self.candidates * len..][..(self.slots + 1) * len];
+        shared.fill(0.0);
+        let (directions, sum) = shared.split_at_mut(self.slots * len);
+        for vector in history {
+            subspace::accumulate(sum, vector, 1.0);
+        }
+        let pairs = eigen::eigenpairs(&subspace::gram(history), count);
+        let rank = subspace::dominant(pairs.iter().map(|pair| pair.0), count);
+        self.history_eigenvalues.fill(0.0);
+        for (slot, (value, weights)) in pairs[..rank].iter().enumerate() {
+            self.history_eigenvalues[slot] = *value;
+            let direction = &mut directions[slot * len..(slot + 1) * len];
+            for (vector, weight) in history.iter().zip(weights) {
+                subspace::accumulate(direction, vector, weight / value.sqrt());
+            }
+        }
+        self.history_len = count;
+        self.sum_norm = norm_squared(sum);
+        self.right[..(self.slots + 1) * len].copy_from_slice(shared);
+    }
+
+    /// The products of candidate `index`: with Q (P slots), with the sum of H, with the bag.
+    pub fn of_candidate(&self, index: usize) -> Row<'_> {
+        self.row(index)
+    }
+
+    /// The products of direction `slot` of Q.
+    pub fn of_direction(&self, slot: usize) -> Row<'_> {
+        self.row(self.candidates + slot)
+    }
+
+    /// The products of the sum of H.
+    pub fn of_sum(&self) -> Row<'_> {
+        self.row(self.candidates + self.slots)
+    }
+
+    fn row(&self, index: usize) -> Row<'_> {
+        let rows = self.out.nrows();
+        let all = &self.out.as_slice()[index * rows..(index + 1) * rows];
+        let (with_directions, rest) = all.split_at(self.slots);
+        Row {
+            with_directions,
+            with_sum: rest[0],
+            with_bag: &rest[1..],
+        }
+    }
+
+    /// ‖v‖² of candidate `index`.
+    pub fn norm(&self, index: usize) -> f64 {
+        self.norms[index]
+    }
+
+    /// The squared norm of the sum of H.
+    pub fn sum_norm(&self) -> f64 {
+        self.sum_norm
+    }
+
+    /// The eigenvalues Λ of HHᵀ that belong to the directions of Q, largest first, then zeros: P values.
+    pub fn history_eigenvalues(&self) -> &[f64] {
+        &self.history_eigenvalues
+    }
+
+    /// The number of previous patches.
+    pub fn history_len(&self) -> usize {
+        self.history_len
+    }
+}
+
+/// The inner products of one vector.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// With the directions of Q, P slots.
+    pub with_directions: &'a [f64],
+    /// With the sum of H.
+    pub with_sum: f64,
+    /// With the bag: for each entry its mean, then n basis vectors (0 for those it does not have).
+    pub with_bag: &'a [f64],
+}
+
+fn norm_squared(vector: &[f64]) -> f64 {
+    let mut parts = [0.0_f64; 8];
+    let (chunks, rest) = vector.as_chunks::<8>();
+    for chunk in chunks {
+        for lane in 0..8 {
+            parts[lane] += chunk[lane] * chunk[lane];
+        }
+    }
+    parts.iter().sum::<f64>() + rest.iter().map(|value| value * value).sum::<f64>()
+}

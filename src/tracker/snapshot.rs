@@ -1,0 +1,166 @@
+//! The state of a tracker as bytes.
+//!
+//! A snapshot comes back from a client, so it is hostile until proven otherwise. The checksum finds damage, not
+//! malice: whoever can change the bytes can change the checksum. So after decoding everything is checked that the
+//! tracker relies on, and a state that passes can be stepped without a panic, a NaN, or more memory than parameters
+//! allow.
+//!
+//! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
+//! postcard's encoding.
+
+use super::bag::Bag;
+use super::frame::working_size;
+use super::state::{self, State};
+use super::{Params, Rect, TrackerError};
+
+const MAGIC: &[u8; 8] = b"BAGTRACK";
+/// Grows with every change of [`State`] or of what its numbers mean.
+const VERSION: u32 = 1;
+const HEADER: usize = 16;
+
+/// No feature has a greater magnitude; gray values are in [0, 1].
+const GREATEST_FEATURE: f32 = 1e3;
+/// How far single precision may leave UᵀU from the identity.
+const ORTHONORMAL: f64 = 1e-3;
+/// Frame numbers are below: 2^53 can also be said exactly in JSON.
+const FRAMES: u64 = 1 << 53;
+
+/// The snapshot of `state`.
+pub(super) fn write(state: &State) -> Vec<u8> {
+    let body = postcard::to_stdvec(state).expect("the state has no type that postcard refuses");
+    let mut bytes = Vec::with_capacity(HEADER + body.len());
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&crc32fast::hash(&body).to_le_bytes());
+    bytes.extend_from_slice(&body);
+    bytes
+}
+
+/// The state in `bytes`, fully checked.
+pub(super) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
+    let damaged = TrackerError::Snapshot("is damaged");
+    let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
+        return Err(TrackerError::Snapshot("is too short"));
+    };
+    let word = |at: usize| {
+        u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+    };
+    if header[..8] != MAGIC[..] {
+        return Err(TrackerError::Snapshot("is not one of this program"));
+    }
+    if word(8) != VERSION {
+        return Err(TrackerError::Snapshot("is of another version"));
+    }
+    if word(12) != crc32fast::hash(body) {
+        return Err(damaged);
+    }
+    match postcard::take_from_bytes::<State>(body) {
+        Ok((state, [])) => check(&state).map(|()| state),
+        _ => Err(damaged),
+    }
+}
+
+fn check(state: &State) -> Result<(), TrackerError> {
+    state.params.validate()?;
+    let sound = check_numbers(state)
+        && check_particles(state)
+        && check_history(state)
+        && check_bag(&state.bag, &state.params);
+    if sound {
+        Ok(())
+    } else {
+        Err(TrackerError::Snapshot("holds a state that cannot be"))
+    }
+}
+
+/// Sizes, reach and the last answer.
+fn check_numbers(state: &State) -> bool {
+    let (width, height) = state.source;
+    if width == 0 || height == 0 {
+        return false;
+    }
+    let (working_width, working_height) = working_size(width, height);
+    let reach = &state.reach;
+    let (horizontal, vertical) = State::to_working(state.source);
+    // The reference box must be one that could have been given, if not here.
+    let reference = Rect::new(
+        0.0,
+        0.0,
+        reach.box_width / horizontal * (1.0 + 1e-9),
+        reach.box_height / vertical * (1.0 + 1e-9),
+    );
+    let target = &state.estimate.target;
+    let far = 1e2 * f64::from(width.max(height)) + 1e3;
+    reach.frame_width == f64::from(working_width)
+        && reach.frame_height == f64::from(working_height)
+        && reference.is_valid()
+        && state::check_target(state.source, &reference).is_ok()
+        && target.is_valid()
+        && [target.x, target.y, target.width, target.height]
+            .iter()
+            .all(|value| value.abs() <= far)
+        && (0.0..=1.0).contains(&state.estimate.score)
+        && state.estimate.frame < FRAMES
+        && state
+            .usual
+            .distance
+            .is_none_or(|distance| (0.0..=1e6).contains(&distance))
+}
+
+fn check_particles(state: &State) -> bool {
+    let count = state.params.particles as usize;
+    let total: f64 = state.weights.iter().sum();
+    state.particles.len() == count
+        && state.weights.len() == count
+        && state
+            .weights
+            .iter()
+            .all(|weight| (0.0..=1.0).contains(weight))
+        && (total - 1.0).abs() < 1e-6
+        && state.particles.iter().all(|particle| {
+            // Those of a new box may be where a moved one may not: by a pixel.
+            let held = state.reach.hold(*particle);
+            (held.x - particle.x).abs() <= 2.0
+                && (held.y - particle.y).abs() <= 2.0
+                && held.scale == particle.scale
+        })
+}
+
+fn check_history(state: &State) -> bool {
+    let len = state.params.feature_len();
+    (1..=state.params.history as usize).contains(&state.history.len())
+        && state
+            .history
+            .iter()
+            .all(|patch| patch.len() == len && are_features(patch))
+}
+
+fn check_bag(bag: &Bag, params: &Params) -> bool {
+    let len = params.feature_len();
+    (1..=params.bag_size as usize).contains(&bag.entries().len())
+        && bag.entries().iter().all(|entry| {
+            entry.mean.len() == len
+                && entry.basis.len().is_multiple_of(len)
+                && entry.dim() <= params.basis_dim as usize
+                && are_features(&entry.mean)
+                && are_features(&entry.basis)
+                && is_orthonormal(&entry.basis().collect::<Vec<_>>())
+        })
+}
+
+fn are_features(values: &[f32]) -> bool {
+    values.iter().all(|value| value.abs() <= GREATEST_FEATURE)
+}
+
+fn is_orthonormal(columns: &[&[f32]]) -> bool {
+    let count = columns.len();
+    let gram = super::subspace::gram(columns);
+    gram.iter().enumerate().all(|(index, &product)| {
+        let expected = if index / count == index % count {
+            1.0
+        } else {
+            0.0
+        };
+        (product - expected).abs() <= ORTHONORMAL
+    })
+}

@@ -1,0 +1,123 @@
+//! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
+
+use serde::{Deserialize, Serialize};
+
+use super::eigen;
+
+/// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
+/// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
+pub const RANK_TOLERANCE: f64 = 1e-5;
+
+/// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AffineSubspace {
+    pub(super) mean: Vec<f32>,
+    /// The columns of U, one after the other.
+    pub(super) basis: Vec<f32>,
+}
+
+impl AffineSubspace {
+    /// The subspace of feature vectors: μ their mean, U the (up to) `basis_dim` dominant left singular vectors of
+    /// the matrix V of which they are the columns (equation 2), uncentred. U has fewer columns where V has fewer
+    /// directions with a singular value above [`RANK_TOLERANCE`] of the largest; none for all-zero vectors.
+    ///
+    /// # Panics
+    /// If there are no vectors, or their lengths differ.
+    pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
+        let len = vectors[0].len();
+        assert!(
+            vectors.iter().all(|vector| vector.len() == len),
+            "feature vectors of one length"
+        );
+        let count = vectors.len();
+        let mut sum = vec![0.0_f64; len];
+        for vector in vectors {
+            accumulate(&mut sum, vector, 1.0);
+        }
+        let mean = sum
+            .iter()
+            .map(|value| (value / count as f64) as f32)
+            .collect();
+
+        // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
+        let gram = gram(vectors);
+        let pairs = eigen::eigenpairs(&gram, count);
+        let mut basis = Vec::with_capacity(len * basis_dim);
+        for (value, weights) in &pairs[..dominant(pairs.iter().map(|pair| pair.0), basis_dim)] {
+            let mut column = vec![0.0_f64; len];
+            for (vector, weight) in vectors.iter().zip(weights) {
+                accumulate(&mut column, vector, weight / value.sqrt());
+            }
+            basis.extend(column.iter().map(|&value| value as f32));
+        }
+        Self { mean, basis }
+    }
+
+    /// The origin μ, of length D.
+    pub fn mean(&self) -> &[f32] {
+        &self.mean
+    }
+
+    /// The columns of U, each of length D.
+    pub fn basis(&self) -> impl ExactSizeIterator<Item = &[f32]> {
+        self.basis.chunks_exact(self.mean.len())
+    }
+
+    /// The number of columns of U: n, or fewer.
+    pub fn dim(&self) -> usize {
+        self.basis.len() / self.mean.len()
+    }
+}
+
+/// How many of the eigenvalues of a Gram matrix, largest first, count as directions: at most `limit`.
+pub(super) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> usize {
+    let mut least = 0.0;
+    eigenvalues
+        .take(limit)
+        .enumerate()
+        .take_while(|&(index, value)| {
+            if index == 0 {
+                least = value * RANK_TOLERANCE * RANK_TOLERANCE;
+            }
+            value > 0.0 && value > least
+        })
+        .count()
+}
+
+/// VᵀV of vectors, in double precision and row order.
+pub(super) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
+    let count = vectors.len();
+    let mut gram = vec![0.0; count * count];
+    for i in 0..count {
+        for j in i..count {
+            let product = dot(vectors[i].as_ref(), vectors[j].as_ref());
+            gram[i * count + j] = product;
+            gram[j * count + i] = product;
+        }
+    }
+    gram
+}
+
+/// The inner product, summed in double precision in eight parts so that the loop vectorises.
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let mut parts = [0.0_f64; 8];
+    let (a_chunks, a_rest) = a.as_chunks::<8>();
+    let (b_chunks, b_rest) = b.as_chunks::<8>();
+    for (x, y) in a_chunks.iter().zip(b_chunks) {
+        for lane in 0..8 {
+            parts[lane] += f64::from(x[lane]) * f64::from(y[lane]);
+        }
+    }
+    let rest = a_rest.iter().zip(b_rest);
+    parts.iter().sum::<f64>()
+        + rest
+            .map(|(&x, &y)| f64::from(x) * f64::from(y))
+            .sum::<f64>()
+}
+
+/// `sum += weight * vector`.
+pub(super) fn accumulate(sum: &mut [f64], vector: &[f32], weight: f64) {
+    for (sum, &value) in sum.iter_mut().zip(vector) {
+        *sum += weight * f64::from(value);
+    }
+}
