@@ -37,6 +37,11 @@ enum Format {
 pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     let params = args.params.params()?;
     let dirs: Vec<&PathBuf> = args.dirs.iter().filter(|dir| !dir.is_file()).collect();
+    // A wrong path should be told now, not after the sequences before it.
+    for dir in &dirs {
+        eval::frames::list(dir)?;
+        Sequence::read_boxes(dir)?;
+    }
     let bar = progress::bar(dirs.len() as u64, "sequences");
     let mut sequences = Vec::new();
     for dir in dirs {

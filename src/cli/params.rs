@@ -15,7 +15,7 @@ pub struct ParamFlags {
 }
 
 impl ParamFlags {
-    /// The preset's parameters with the single ones set. Ranges are checked when a tracker is made.
+    /// The preset's parameters with the single ones set, all in their ranges.
     pub fn params(&self) -> Result<Params, String> {
         let defaults = self.preset.params();
         let mut fields = serde_json::to_value(&defaults).map_err(|error| error.to_string())?;
@@ -28,7 +28,9 @@ impl ParamFlags {
             serde_json::from_value::<Params>(fields.clone())
                 .map_err(|error| format!("--set {name}={value}: {error}"))?;
         }
-        serde_json::from_value(fields).map_err(|error| error.to_string())
+        let params: Params = serde_json::from_value(fields).map_err(|error| error.to_string())?;
+        params.validate().map_err(|error| error.to_string())?;
+        Ok(params)
     }
 }
 
