@@ -1,10 +1,84 @@
-//! `bagtrack health`.
+//! `bagtrack health`: asks a running service whether it is healthy. Made for container health checks, where
+//! there is no other client.
+
+use http::Uri;
+use std::error::Error;
+use std::io::{Read, Write};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+/// Longest answer that is read; `/healthz` has some hundred bytes.
+const MAX_ANSWER: u64 = 64 << 10;
 
 /// Flags of `health`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Where the service is, like `http://127.0.0.1:8080` [default: this host, at the port of BAGTRACK_LISTEN].
+    #[arg(long, env = "BAGTRACK_URL")]
+    url: Option<Uri>,
+    /// The address that the service listens on.
+    #[arg(long, env = "BAGTRACK_LISTEN", default_value = "127.0.0.1:8080")]
+    listen: SocketAddr,
+    /// How long to wait for it.
+    #[arg(long, default_value = "3s", value_parser = humantime::parse_duration)]
+    timeout: Duration,
+}
 
 /// Runs `health`.
-pub fn run(_args: Args) -> Result<(), Box<dyn std::error::Error>> {
-    todo!()
+pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
+    let (address, host) = match &args.url {
+        None => {
+            let address = reachable(args.listen);
+            (address, address.to_string())
+        }
+        Some(url) => resolve(url)?,
+    };
+    let status = ask(address, &host, args.timeout)
+        .map_err(|error| format!("no answer from {host}: {error}"))?;
+    match status.as_str() {
+        "200" => Ok(()),
+        other => Err(format!("{host} answered with status {other}").into()),
+    }
+}
+
+/// An address to connect to: a service that listens on all addresses is on the local one.
+fn reachable(mut listen: SocketAddr) -> SocketAddr {
+    if listen.ip().is_unspecified() {
+        listen.set_ip(match listen {
+            SocketAddr::V4(_) => IpAddr::V4(Ipv4Addr::LOCALHOST),
+            SocketAddr::V6(_) => IpAddr::V6(Ipv6Addr::LOCALHOST),
+        });
+    }
+    listen
+}
+
+fn resolve(url: &Uri) -> Result<(SocketAddr, String), Box<dyn Error>> {
+    if url.scheme_str() != Some("http") {
+        return Err("--url (BAGTRACK_URL) must begin with http://".into());
+    }
+    let host = url.host().ok_or("--url (BAGTRACK_URL) has no host")?;
+    let port = url.port_u16().unwrap_or(80);
+    let name = host.trim_start_matches('[').trim_end_matches(']');
+    let address = (name, port).to_socket_addrs()?.next();
+    let address = address.ok_or_else(|| format!("{host} has no address"))?;
+    Ok((address, format!("{host}:{port}")))
+}
+
+/// The status code of `GET /healthz`.
+fn ask(address: SocketAddr, host: &str, timeout: Duration) -> Result<String, Box<dyn Error>> {
+    let mut stream = TcpStream::connect_timeout(&address, timeout)?;
+    stream.set_read_timeout(Some(timeout))?;
+    stream.set_write_timeout(Some(timeout))?;
+    write!(
+        stream,
+        "GET /healthz HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
+    )?;
+    let mut answer = Vec::new();
+    stream.take(MAX_ANSWER).read_to_end(&mut answer)?;
+    let answer = String::from_utf8_lossy(&answer);
+    let mut words = answer.split_ascii_whitespace();
+    match (words.next(), words.next()) {
+        (Some("HTTP/1.1"), Some(status)) => Ok(status.to_owned()),
+        _ => Err("that is no HTTP answer".into()),
+    }
 }

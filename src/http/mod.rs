@@ -1,1 +1,45 @@
-//! The HTTP interface.
+//! The HTTP interface: one file a resource, and around them what every request passes through.
+//!
+//! What could go wrong: clients that send headers or bodies slowly, or too much of them; bytes that are no
+//! image; more work than there are cores; a connection that breaks after a frame was taken. [`Application`]
+//! bounds the first, [`Config`] names every bound, and every error is a problem document whose cause stays in
+//! the log.
+//!
+//! ```no_run
+//! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+//! use bagtrack::http::{Application, Config};
+//!
+//! let application = Application::bind(Config::default()).await?;
+//! println!("listening on http://{}", application.local_addr()?);
+//! application.serve(std::future::pending()).await;
+//! # Ok(())
+//! # }
+//! ```
+
+mod answer;
+mod body;
+mod config;
+mod context;
+mod create;
+mod docs;
+mod drain;
+mod frames;
+mod health;
+mod openapi;
+mod page;
+mod problem;
+mod problem_kind;
+mod router;
+mod server;
+mod session;
+mod snapshot;
+mod state;
+mod target;
+mod upload;
+mod work;
+
+pub use config::{Config, ConfigError};
+pub use openapi::document as openapi_document;
+pub use problem_kind::Kind as ProblemKind;
+pub use server::{Application, BindError};
+pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

@@ -1,0 +1,55 @@
+//! `/openapi.json`, and `/docs`: Swagger UI out of the binary, so that it works without any other host.
+
+use super::openapi;
+use super::problem::Problem;
+use axum::body::Bytes;
+use axum::extract::Path;
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::response::{IntoResponse, Redirect, Response};
+use std::sync::{Arc, LazyLock};
+use utoipa_swagger_ui::Config;
+
+static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| {
+    let document = openapi::document().to_pretty_json();
+    document.expect("the document is plain JSON").into()
+});
+
+// The default validator would be another host.
+static SWAGGER: LazyLock<Arc<Config<'static>>> =
+    LazyLock::new(|| Arc::new(Config::new(["/openapi.json"]).validator_url("none")));
+
+/// `/openapi.json`.
+pub async fn document() -> Response {
+    ([(CONTENT_TYPE, "application/json")], DOCUMENT.clone()).into_response()
+}
+
+/// `/docs`: the files of Swagger UI are relative to `/docs/`.
+pub async fn redirect() -> Redirect {
+    Redirect::to("/docs/")
+}
+
+/// `/docs/`.
+pub async fn index() -> Result<Response, Problem> {
+    file("")
+}
+
+/// `/docs/{file}`.
+pub async fn asset(Path(path): Path<String>) -> Result<Response, Problem> {
+    file(&path)
+}
+
+fn file(path: &str) -> Result<Response, Problem> {
+    match utoipa_swagger_ui::serve(path, SWAGGER.clone()) {
+        Ok(Some(file)) => {
+            let headers = [
+                (CONTENT_TYPE, file.content_type),
+                (CACHE_CONTROL, "max-age=3600".to_owned()),
+            ];
+            Ok((headers, Bytes::from(file.bytes.into_owned())).into_response())
+        }
+        Ok(None) => Err(Problem::route_not_found()),
+        Err(error) => Err(Problem::internal(Arc::new(std::io::Error::other(
+            error.to_string(),
+        )))),
+    }
+}

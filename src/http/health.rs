@@ -1,0 +1,60 @@
+//! `/healthz` and `/readyz`: whether the process runs, and whether it wants requests.
+
+use super::openapi;
+use super::problem::Problem;
+use super::problem_kind::Kind;
+use super::state::AppState;
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+
+/// The service is well.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct Health {
+    /// Always `ok`.
+    #[schema(example = "ok")]
+    status: &'static str,
+}
+
+const OK: Json<Health> = Json(Health { status: "ok" });
+
+struct LiveProblems;
+
+impl utoipa::IntoResponses for LiveProblems {
+    fn responses()
+    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
+        openapi::problems(&[openapi::ALWAYS])
+    }
+}
+
+struct ReadyProblems;
+
+impl utoipa::IntoResponses for ReadyProblems {
+    fn responses()
+    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
+        openapi::problems(&[openapi::ALWAYS, &[Kind::NotReady]])
+    }
+}
+
+/// Whether the process runs
+#[utoipa::path(
+    get, path = "/healthz", tag = "service", operation_id = "getHealth",
+    responses((status = 200, description = "It runs", body = Health), LiveProblems)
+)]
+pub async fn live() -> Json<Health> {
+    OK
+}
+
+/// Whether the service wants requests
+///
+/// A load balancer should send none from the moment that this answers 503: the service was asked to end.
+#[utoipa::path(
+    get, path = "/readyz", tag = "service", operation_id = "getReadiness",
+    responses((status = 200, description = "It does", body = Health), ReadyProblems)
+)]
+pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Problem> {
+    match state.is_draining() {
+        true => Err(Problem::not_ready()),
+        false => Ok(OK),
+    }
+}

@@ -1,0 +1,176 @@
+//! Accepting connections, and ending well.
+//!
+//! `axum::serve` has no time limit for request heads, so that a client that sends half a line holds its
+//! connection for ever; hyper's connection builder has one. Connections are counted, too, and on shutdown
+//! those that are busy get a bounded time to end.
+
+use super::config::{Config, ConfigError};
+use super::router::router;
+use super::state::AppState;
+use crate::sessions::Clock;
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use std::io;
+use std::net::SocketAddr;
+use std::pin::pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::sync::{Semaphore, watch};
+use tokio::time::{interval, sleep, timeout};
+
+/// Why the service could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum BindError {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// The service, bound to its address.
+#[derive(Debug)]
+pub struct Application {
+    listener: TcpListener,
+    state: AppState,
+    extra: Router,
+}
+
+impl Application {
+    /// Listens on the configured address.
+    ///
+    /// # Errors
+    /// See [`BindError`].
+    pub async fn bind(config: Config) -> Result<Self, BindError> {
+        Self::bind_with_clock(config, Clock::default()).await
+    }
+
+    /// Like [`Self::bind`], with the clock that sessions expire by.
+    ///
+    /// # Errors
+    /// See [`BindError`].
+    pub async fn bind_with_clock(config: Config, clock: Clock) -> Result<Self, BindError> {
+        config.validate()?;
+        let address = config.listen;
+        let listener = TcpListener::bind(address).await;
+        Ok(Self {
+            listener: listener.map_err(|source| BindError::Listen { address, source })?,
+            state: AppState::new(config, clock),
+            extra: Router::new(),
+        })
+    }
+
+    /// The address that the service listens on.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Serves these routes too, behind the same limits and with the same errors.
+    pub fn with_routes(mut self, routes: Router) -> Self {
+        self.extra = self.extra.merge(routes);
+        self
+    }
+
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once; after the configured delay no
+    /// connection is accepted any more, and open requests get the configured time to end. Gives whether they all
+    /// did; those that did not are cut off.
+    pub async fn serve(self, shutdown: impl Future<Output = ()>) -> bool {
+        let Self {
+            listener,
+            state,
+            extra,
+        } = self;
+        let config = &state.config;
+        let graceful = GracefulShutdown::new();
+        let (keep_alive, cut_off) = watch::channel(());
+        let sweeper = tokio::spawn(sweep(state.clone()));
+        {
+            let service = router(state.clone(), extra);
+            let accepting = accept(&listener, config, service, &graceful, cut_off);
+            let mut accepting = pin!(accepting);
+            tokio::select! {
+                () = &mut accepting => {}
+                () = shutdown => {
+                    tracing::info!("shutting down");
+                    state.drain();
+                    // New connections are still served, so that they can be told.
+                    let _ = timeout(config.shutdown_delay, accepting).await;
+                }
+            }
+        }
+        drop(listener);
+        sweeper.abort();
+        let ended = timeout(config.shutdown_timeout, graceful.shutdown()).await;
+        drop(keep_alive);
+        ended.is_ok()
+    }
+}
+
+/// Accepts connections for ever. They end when `cut_off` loses its sender.
+async fn accept(
+    listener: &TcpListener,
+    config: &Config,
+    service: Router,
+    graceful: &GracefulShutdown,
+    cut_off: watch::Receiver<()>,
+) {
+    let connections = Arc::new(Semaphore::new(config.max_connections));
+    let mut builder = http1::Builder::new();
+    builder
+        .timer(TokioTimer::new())
+        .header_read_timeout(config.header_timeout);
+    loop {
+        let acquired = connections.clone().acquire_owned().await;
+        let permit = acquired.expect("the semaphore is never closed");
+        let stream = match listener.accept().await {
+            Ok((stream, _)) => stream,
+            Err(error) => {
+                // Mostly too many open files: wait for connections to end.
+                tracing::warn!(%error, "cannot accept");
+                sleep(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        if let Err(error) = stream.set_nodelay(true) {
+            tracing::debug!(%error, "cannot set TCP_NODELAY");
+        }
+        let service = TowerToHyperService::new(service.clone());
+        let connection = builder.serve_connection(TokioIo::new(stream), service);
+        let connection = graceful.watch(connection);
+        let mut cut_off = cut_off.clone();
+        tokio::spawn(async move {
+            let _permit = permit;
+            tokio::select! {
+                result = connection => if let Err(error) = result {
+                    tracing::debug!(%error, "connection ended");
+                },
+                _ = cut_off.changed() => tracing::warn!("connection cut off"),
+            }
+        });
+    }
+}
+
+async fn sweep(state: AppState) {
+    let idle = state.config.session_idle;
+    let mut ticks = interval((idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30)));
+    loop {
+        ticks.tick().await;
+        let expired = state.registry.sweep();
+        if expired > 0 {
+            tracing::info!(expired, live = state.registry.len(), "sessions expired");
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! `GET` and `DELETE /sessions/{id}`.
+
+use super::answer::{Answer, ImageSize};
+use super::openapi;
+use super::problem::Problem;
+use super::problem_kind::Kind;
+use super::state::AppState;
+use super::upload;
+use crate::tracker::Params;
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::{StatusCode, Uri};
+use serde::Serialize;
+use uuid::Uuid;
+
+/// Where a session stands.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct SessionView {
+    /// The session's id.
+    id: Uuid,
+    /// Frames taken, the first one included.
+    #[schema(example = 2)]
+    frames: u64,
+    /// The last answer.
+    answer: Answer,
+    /// The size that all frames of the session have.
+    image: ImageSize,
+    /// The tracker's parameters.
+    #[schema(value_type = Object, example = json!({"seed": 7}))]
+    params: Params,
+    /// When the session ends if it is not used again (RFC 3339); this request counts as use.
+    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
+    expires_at: String,
+}
+
+struct Problems;
+
+impl utoipa::IntoResponses for Problems {
+    fn responses()
+    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
+        let own = &[Kind::MalformedRequest, Kind::SessionNotFound];
+        openapi::problems(&[openapi::ALWAYS, own])
+    }
+}
+
+/// See where a session stands
+///
+/// Answers at once, also while a frame is being tracked.
+#[utoipa::path(
+    get, path = "/sessions/{id}", tag = "sessions", operation_id = "getSession",
+    params(("id" = Uuid, Path, description = "The session's id")),
+    responses((status = 200, description = "The session", body = SessionView), Problems)
+)]
+pub async fn get(
+    State(state): State<AppState>,
+    Path(id): Path<String>,
+    uri: Uri,
+) -> Result<Json<SessionView>, Problem> {
+    upload::NOTHING.query(&uri)?;
+    let session = state.session(&id)?;
+    let latest = session.latest();
+    Ok(Json(SessionView {
+        id: session.id(),
+        frames: latest.frame + 1,
+        answer: latest.into(),
+        image: session.source_size().into(),
+        params: session.params().clone(),
+        expires_at: state.expires_at(&session),
+    }))
+}
+
+/// End a session
+///
+/// A frame that is being tracked still gets its answer; frames that wait do not.
+#[utoipa::path(
+    delete, path = "/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
+    params(("id" = Uuid, Path, description = "The session's id")),
+    responses((status = 204, description = "The session has ended"), Problems)
+)]
+pub async fn delete(
+    State(state): State<AppState>,
+    Path(id): Path<String>,
+    uri: Uri,
+) -> Result<StatusCode, Problem> {
+    upload::NOTHING.query(&uri)?;
+    let session = state.session(&id)?;
+    match state.registry.remove(session.id()) {
+        true => {
+            tracing::info!(session = %session.id(), "deleted");
+            Ok(StatusCode::NO_CONTENT)
+        }
+        false => Err(Problem::session_not_found()),
+    }
+}

@@ -1,0 +1,75 @@
+//! What all handlers share.
+
+use super::config::Config;
+use super::problem::Problem;
+use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use uuid::Uuid;
+
+/// What all handlers share; clones are the same state.
+#[derive(Debug, Clone)]
+pub struct AppState(Arc<Shared>);
+
+/// The fields of [`AppState`].
+#[derive(Debug)]
+pub struct Shared {
+    /// The settings, validated.
+    pub config: Config,
+    /// The live sessions.
+    pub registry: Registry,
+    /// Who may work.
+    pub admission: Admission,
+    /// Set from the moment that the service was asked to end.
+    draining: AtomicBool,
+}
+
+impl std::ops::Deref for AppState {
+    type Target = Shared;
+    fn deref(&self) -> &Shared {
+        &self.0
+    }
+}
+
+impl AppState {
+    pub fn new(config: Config, clock: Clock) -> Self {
+        Self(Arc::new(Shared {
+            registry: Registry::new(
+                config.max_sessions,
+                config.session_queue,
+                config.session_idle,
+                clock,
+            ),
+            admission: Admission::new(config.queue, config.worker_count()),
+            draining: AtomicBool::new(false),
+            config,
+        }))
+    }
+
+    /// From now on `/readyz` answers 503.
+    pub fn drain(&self) {
+        self.draining.store(true, Ordering::Release);
+    }
+
+    pub fn is_draining(&self) -> bool {
+        self.draining.load(Ordering::Acquire)
+    }
+
+    /// Takes a place in the queue.
+    pub fn enter(&self) -> Result<QueuePermit, Problem> {
+        self.admission.enter().map_err(|_| Problem::queue_full())
+    }
+
+    /// The live session that a path names. Text that is no id names no session.
+    pub fn session(&self, id: &str) -> Result<Arc<Session>, Problem> {
+        let id = Uuid::parse_str(id).ok();
+        id.and_then(|id| self.registry.get(id))
+            .ok_or_else(Problem::session_not_found)
+    }
+
+    /// When the session expires, in RFC 3339.
+    pub fn expires_at(&self, session: &Session) -> String {
+        let moment = self.registry.expires_at(session);
+        humantime::format_rfc3339_seconds(moment).to_string()
+    }
+}

@@ -1,0 +1,137 @@
+//! Who may work: a queue before the workers.
+//!
+//! A request first takes a place in the queue (refused at once when it is full), then waits for a
+//! worker. Both permits move into the blocking work itself: a request that times out or whose client
+//! goes away does not stop work that has begun, so its permits stay taken until that work has ended, and
+//! the number of threads at work is never more than the number of workers.
+
+use std::sync::Arc;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+/// The queue is full; try again later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the queue is full")]
+pub struct QueueFull;
+
+/// The work panicked. The panic itself has been printed by the panic hook.
+#[derive(Debug, thiserror::Error)]
+#[error("the work panicked: {0}")]
+pub struct WorkPanicked(#[source] tokio::task::JoinError);
+
+/// A place in the queue, given back when the last clone is dropped.
+#[derive(Debug, Clone)]
+pub struct QueuePermit(
+    #[expect(dead_code, reason = "held for its drop")] Arc<OwnedSemaphorePermit>,
+);
+
+/// A queue semaphore before a worker semaphore. Clones share both.
+#[derive(Debug, Clone)]
+pub struct Admission {
+    queue: Arc<Semaphore>,
+    workers: Arc<Semaphore>,
+}
+
+impl Admission {
+    /// At most `queue` requests are inside at a time, at most `workers` of them at work.
+    pub fn new(queue: usize, workers: usize) -> Self {
+        Self {
+            queue: Arc::new(Semaphore::new(queue)),
+            workers: Arc::new(Semaphore::new(workers)),
+        }
+    }
+
+    /// Takes a place in the queue.
+    ///
+    /// # Errors
+    /// All places are taken.
+    pub fn enter(&self) -> Result<QueuePermit, QueueFull> {
+        let permit = self.queue.clone().try_acquire_owned();
+        permit
+            .map(|p| QueuePermit(Arc::new(p)))
+            .map_err(|_| QueueFull)
+    }
+
+    /// Waits for a worker, in order of arrival, and runs `work` on a blocking thread. Dropping the future
+    /// before a worker is free cancels the work; afterwards it runs to its end, holding its permits.
+    ///
+    /// # Errors
+    /// The work panicked.
+    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkPanicked>
+    where
+        T: Send + 'static,
+        F: FnOnce() -> T + Send + 'static,
+    {
+        let acquired = self.workers.clone().acquire_owned().await;
+        let worker = acquired.expect("the semaphore is never closed");
+        let span = tracing::Span::current();
+        let work = move || {
+            let _permits = (queue, worker);
+            span.in_scope(work)
+        };
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(WorkPanicked)
+    }
+
+    /// Places free in the queue.
+    pub fn queue_places(&self) -> usize {
+        self.queue.available_permits()
+    }
+
+    /// Workers that are free.
+    pub fn free_workers(&self) -> usize {
+        self.workers.available_permits()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    #[tokio::test]
+    async fn the_queue_refuses_when_full_and_frees_on_drop() {
+        let admission = Admission::new(1, 1);
+        let permit = admission.enter().unwrap();
+        assert_eq!(admission.enter().unwrap_err(), QueueFull);
+        drop(permit);
+        assert!(admission.enter().is_ok());
+    }
+
+    #[tokio::test]
+    async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
+        let admission = Admission::new(1, 1);
+        let (started_tx, started) = mpsc::channel();
+        let (finish, finish_rx) = mpsc::channel::<()>();
+        let queue = admission.enter().unwrap();
+        let request = tokio::spawn({
+            let admission = admission.clone();
+            async move {
+                let work = move || {
+                    started_tx.send(()).unwrap();
+                    finish_rx.recv().unwrap();
+                };
+                admission.run(queue, work).await
+            }
+        });
+        tokio::task::spawn_blocking(move || started.recv().unwrap())
+            .await
+            .unwrap();
+        request.abort();
+        assert!(request.await.unwrap_err().is_cancelled());
+        assert_eq!((admission.queue_places(), admission.free_workers()), (0, 0));
+        finish.send(()).unwrap();
+        let free = admission.workers.acquire().await.unwrap();
+        drop(free);
+        assert_eq!(admission.free_workers(), 1);
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_an_error_and_frees_the_permits() {
+        let admission = Admission::new(1, 1);
+        let queue = admission.enter().unwrap();
+        let result = admission.run(queue, || panic!("a test panics")).await;
+        assert!(result.map(|()| ()).is_err());
+        assert_eq!((admission.queue_places(), admission.free_workers()), (1, 1));
+    }
+}

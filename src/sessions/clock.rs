@@ -1,0 +1,48 @@
+//! The time that sessions expire by. It runs with the monotonic clock and can be moved forward, so that
+//! expiry is tested without waiting.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// A monotonic clock that can be moved forward. Clones share the time.
+#[derive(Debug, Clone)]
+pub struct Clock {
+    start: Instant,
+    advanced_ms: Arc<AtomicU64>,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self {
+            start: Instant::now(),
+            advanced_ms: Arc::default(),
+        }
+    }
+}
+
+impl Clock {
+    /// Time since the clock was made.
+    pub fn now(&self) -> Duration {
+        let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));
+        self.start.elapsed() + advanced
+    }
+
+    /// Moves the clock forward.
+    pub fn advance(&self, by: Duration) {
+        let ms = u64::try_from(by.as_millis()).unwrap_or(u64::MAX);
+        self.advanced_ms.fetch_add(ms, Ordering::Relaxed);
+    }
+
+    /// The wall-clock time of a moment of this clock.
+    pub fn wall(&self, moment: Duration) -> SystemTime {
+        let now = self.now();
+        let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));
+        let wall_now = SystemTime::now() + advanced;
+        if moment >= now {
+            wall_now + (moment - now)
+        } else {
+            wall_now - (now - moment)
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The map of live sessions. Its lock is held for a look-up only, never during work: sessions are dropped
+//! after it is released.
+
+use super::clock::Clock;
+use super::session::{Session, State};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+use uuid::Uuid;
+
+/// The service holds as many sessions as it may; try again later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("there are {0} sessions, as many as may be")]
+pub struct Full(pub usize);
+
+/// The live sessions.
+#[derive(Debug)]
+pub struct Registry {
+    sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
+    max_sessions: usize,
+    max_places: usize,
+    idle: Duration,
+    clock: Clock,
+}
+
+impl Registry {
+    /// At most `max_sessions`, each with at most `max_places` requests at once, each of which expires when
+    /// it was not used for `idle`.
+    pub fn new(max_sessions: usize, max_places: usize, idle: Duration, clock: Clock) -> Self {
+        Self {
+            sessions: Mutex::default(),
+            max_sessions,
+            max_places,
+            idle,
+            clock,
+        }
+    }
+
+    /// Whether there is room for one more session, after the expired ones have gone.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn check_room(&self) -> Result<(), Full> {
+        if self.len() >= self.max_sessions {
+            self.sweep();
+        }
+        if self.len() >= self.max_sessions {
+            return Err(Full(self.max_sessions));
+        }
+        Ok(())
+    }
+
+    /// Adds a session under a new id.
+    ///
+    /// # Errors
+    /// There is no room.
+    pub fn insert(&self, state: State) -> Result<Arc<Session>, Full> {
+        self.check_room()?;
+        let session = Session::new(state, self.max_places, self.clock.clone());
+        let mut sessions = self.map();
+        if sessions.len() >= self.max_sessions {
+            return Err(Full(self.max_sessions));
+        }
+        sessions.insert(session.id(), session.clone());
+        Ok(session)
+    }
+
+    /// The live session of this id. This counts as use.
+    pub fn get(&self, id: Uuid) -> Option<Arc<Session>> {
+        let mut sessions = self.map();
+        let session = sessions.get(&id)?.clone();
+        if self.has_ended(&session) {
+            session.close();
+            sessions.remove(&id);
+            return None;
+        }
+        session.touch();
+        Some(session)
+    }
+
+    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not.
+    /// False when there is no such session.
+    pub fn remove(&self, id: Uuid) -> bool {
+        let removed = self.map().remove(&id);
+        let Some(session) = removed else { return false };
+        let live = !self.has_ended(&session);
+        session.close();
+        live
+    }
+
+    /// Removes the sessions that have expired and gives their number.
+    pub fn sweep(&self) -> usize {
+        let mut ended = Vec::new();
+        self.map().retain(|_, session| {
+            let keep = !self.has_ended(session);
+            if !keep {
+                session.close();
+                ended.push(session.clone());
+            }
+            keep
+        });
+        ended.len()
+    }
+
+    /// Number of sessions in the map, expired ones that nobody has asked for included.
+    pub fn len(&self) -> usize {
+        self.map().len()
+    }
+
+    /// Whether there are no sessions.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The wall-clock time at which the session expires when it is not used again.
+    pub fn expires_at(&self, session: &Session) -> SystemTime {
+        self.clock.wall(session.last_used() + self.idle)
+    }
+
+    fn has_ended(&self, session: &Session) -> bool {
+        let expired = self.clock.now() >= session.last_used() + self.idle;
+        session.is_closed() || (expired && !session.is_busy())
+    }
+
+    fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
+        // Nothing panics while it is held; were it so, the map itself would still be whole.
+        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

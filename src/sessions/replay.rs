@@ -1,0 +1,201 @@
+//! Frame numbers: which post is the next one, which is an old one sent again.
+//!
+//! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it
+//! can simply send again: the same bytes under the same number get the stored answer. The answers of the
+//! last post are kept, so that a post of several frames can be repeated too.
+
+use crate::tracker::{Estimate, Rect};
+use serde::{Deserialize, Serialize};
+
+/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It tells an honest client's frames
+/// apart; a client that forges one fools only its own session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprint(u128);
+
+impl Fingerprint {
+    /// The digest of `bytes`.
+    pub fn of(bytes: &[u8]) -> Self {
+        Self(xxhash_rust::xxh3::xxh3_128(bytes))
+    }
+}
+
+/// A frame that was answered.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Answered {
+    /// Digest of the frame's bytes.
+    pub fingerprint: Fingerprint,
+    /// The box that the client gave with it: set for the first frame and for corrections.
+    pub given: Option<Rect>,
+    /// The answer.
+    pub estimate: Estimate,
+}
+
+/// What to do with a post.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Turn {
+    /// It is the next one: process it.
+    Process,
+    /// It was answered before: these are the answers.
+    Replay(Vec<Estimate>),
+}
+
+/// The frame number does not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReplayError {
+    /// Neither the next frame nor the last one.
+    #[error("frame {got} is out of order; the next frame is {expected}")]
+    OutOfOrder {
+        /// The number sent.
+        got: u64,
+        /// The number of the next frame.
+        expected: u64,
+    },
+    /// The number of the last frame, with other bytes (or another box).
+    #[error("frame {got} was answered for other bytes; the next frame is {expected}")]
+    Differs {
+        /// The number sent.
+        got: u64,
+        /// The number of the next frame.
+        expected: u64,
+    },
+}
+
+/// Judges a post of the frames `posted` that the client numbers from `number` on, given the frames of the
+/// last post in `recent` (at least one). `given` is the box, where the post corrects it.
+///
+/// A post is a replay when its last frame is the session's last frame, all of its frames are in the last
+/// post, and their bytes are the same.
+///
+/// # Errors
+/// See [`ReplayError`].
+pub fn judge(
+    recent: &[Answered],
+    number: Option<u64>,
+    posted: &[Fingerprint],
+    given: Option<Rect>,
+) -> Result<Turn, ReplayError> {
+    let last = recent
+        .last()
+        .expect("a session has answered its first frame");
+    let expected = last.estimate.frame + 1;
+    let got = match number {
+        None => return Ok(Turn::Process),
+        Some(number) if number == expected => return Ok(Turn::Process),
+        Some(number) => number,
+    };
+    if got.checked_add(posted.len() as u64) != Some(expected) || posted.len() > recent.len() {
+        return Err(ReplayError::OutOfOrder { got, expected });
+    }
+    let stored = &recent[recent.len() - posted.len()..];
+    let same = stored.iter().zip(posted).all(|(stored, posted)| {
+        stored.fingerprint == *posted && (given.is_none() || stored.given == given)
+    });
+    if same {
+        Ok(Turn::Replay(
+            stored.iter().map(|answered| answered.estimate).collect(),
+        ))
+    } else {
+        Err(ReplayError::Differs { got, expected })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::Status;
+
+    fn answered(frame: u64, bytes: &[u8]) -> Answered {
+        let target = Rect {
+            x: frame as f64,
+            y: 0.0,
+            width: 5.0,
+            height: 5.0,
+        };
+        Answered {
+            fingerprint: Fingerprint::of(bytes),
+            given: None,
+            estimate: Estimate {
+                frame,
+                target,
+                score: 0.5,
+                status: Status::Tracking,
+            },
+        }
+    }
+
+    fn prints(frames: &[&[u8]]) -> Vec<Fingerprint> {
+        frames.iter().map(|bytes| Fingerprint::of(bytes)).collect()
+    }
+
+    #[test]
+    fn the_next_frame_and_an_unnumbered_one_are_processed() {
+        let recent = [answered(7, b"a")];
+        for number in [None, Some(8)] {
+            assert_eq!(
+                judge(&recent, number, &prints(&[b"a"]), None),
+                Ok(Turn::Process)
+            );
+        }
+    }
+
+    #[test]
+    fn a_batch_or_its_tail_is_replayed() {
+        let recent = [answered(5, b"a"), answered(6, b"b"), answered(7, b"c")];
+        let frames = |turn| match turn {
+            Ok(Turn::Replay(answers)) => answers.iter().map(|a: &Estimate| a.frame).collect(),
+            other => panic!("{other:?}"),
+        };
+        let all = judge(&recent, Some(5), &prints(&[b"a", b"b", b"c"]), None);
+        assert_eq!(frames(all), vec![5, 6, 7]);
+        let tail = judge(&recent, Some(7), &prints(&[b"c"]), None);
+        assert_eq!(frames(tail), vec![7]);
+    }
+
+    #[test]
+    fn other_bytes_differ_and_other_numbers_are_out_of_order() {
+        let recent = [answered(6, b"b"), answered(7, b"c")];
+        let differs = judge(&recent, Some(7), &prints(&[b"x"]), None);
+        assert_eq!(
+            differs,
+            Err(ReplayError::Differs {
+                got: 7,
+                expected: 8
+            })
+        );
+        for (number, posted) in [
+            (6, prints(&[b"b"])),
+            (9, prints(&[b"c"])),
+            (u64::MAX, prints(&[b"c"])),
+            (5, prints(&[b"a", b"b", b"c"])),
+        ] {
+            let judged = judge(&recent, Some(number), &posted, None);
+            assert_eq!(
+                judged,
+                Err(ReplayError::OutOfOrder {
+                    got: number,
+                    expected: 8
+                })
+            );
+        }
+    }
+
+    #[test]
+    fn a_correction_is_replayed_only_with_the_same_box() {
+        let mut corrected = answered(7, b"c");
+        corrected.given = Some(corrected.estimate.target);
+        let same = judge(&[corrected], Some(7), &prints(&[b"c"]), corrected.given);
+        assert!(matches!(same, Ok(Turn::Replay(_))));
+        let moved = Rect {
+            x: 1.5,
+            ..corrected.estimate.target
+        };
+        let other = judge(&[corrected], Some(7), &prints(&[b"c"]), Some(moved));
+        assert_eq!(
+            other,
+            Err(ReplayError::Differs {
+                got: 7,
+                expected: 8
+            })
+        );
+    }
+}
