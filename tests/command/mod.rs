@@ -39,12 +39,15 @@ pub fn fails(args: &[&str]) -> String {
     errors
 }
 
-/// A small sample clip under `parent`.
+/// A small sample clip under `parent`: 12 frames unless `extra` says otherwise.
 pub fn clip(parent: &Path, name: &str, extra: &[&str]) -> PathBuf {
     let dir = parent.join(name);
     let out = text(&dir).to_owned();
-    let mut args = vec!["sample", "--out", &out, "--frames", "12"];
+    let mut args = vec!["sample", "--out", &out];
     args.extend(extra);
+    if !extra.contains(&"--frames") {
+        args.extend(["--frames", "12"]);
+    }
     succeeds(&args);
     dir
 }
