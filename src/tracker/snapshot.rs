@@ -11,7 +11,7 @@
 use super::bag::Bag;
 use super::frame::working_size;
 use super::state::{self, State};
-use super::{Params, Rect, TrackerError};
+use super::{Params, TrackerError};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
@@ -82,19 +82,16 @@ fn check_numbers(state: &State) -> bool {
     let (working_width, working_height) = working_size(width, height);
     let reach = &state.reach;
     let (horizontal, vertical) = State::to_working(state.source);
-    // The reference box must be one that could have been given, if not here.
-    let reference = Rect::new(
-        0.0,
-        0.0,
-        reach.box_width / horizontal * (1.0 + 1e-9),
-        reach.box_height / vertical * (1.0 + 1e-9),
-    );
+    let box_sides = [(reach.box_width, horizontal), (reach.box_height, vertical)];
+    // Scaling back and forth may have rounded.
+    let could_be_given = |&(side, scale): &(f64, f64)| {
+        side >= 0.99 && side / scale <= 1.01 * state::greatest_box_side(state.source)
+    };
     let target = &state.estimate.target;
     let far = 1e2 * f64::from(width.max(height)) + 1e3;
     reach.frame_width == f64::from(working_width)
         && reach.frame_height == f64::from(working_height)
-        && reference.is_valid()
-        && state::check_target(state.source, &reference).is_ok()
+        && box_sides.iter().all(could_be_given)
         && target.is_valid()
         && [target.x, target.y, target.width, target.height]
             .iter()

@@ -103,7 +103,7 @@ pub(super) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), Trac
         ));
     }
     let (width, height) = (f64::from(source.0), f64::from(source.1));
-    let limit = 4.0 * width.max(height).max(LEAST_BOX_SIDE);
+    let limit = greatest_box_side(source);
     if target.width > limit || target.height > limit {
         return Err(TrackerError::Target(
             "is too large: no side may be over four times the frame's longer side",
@@ -119,6 +119,11 @@ pub(super) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), Trac
         ));
     }
     Ok(())
+}
+
+/// The longest side of a box, in pixels of uploaded frames of size `source`: four times the frame's longer side.
+pub(super) fn greatest_box_side(source: (u32, u32)) -> f64 {
+    4.0 * f64::from(source.0.max(source.1)).max(LEAST_BOX_SIDE)
 }
 
 /// Checks that `frame` has the size of the session's frames.

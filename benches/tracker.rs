@@ -1,0 +1,132 @@
+//! What a frame costs at preset `paper`, on one thread: `cargo bench --bench tracker`.
+//!
+//! - `step`: the whole of `Tracker::step` on 320 x 240 frames of a textured target that moves over a texture.
+//! - `evaluation`: its part from feature vectors to weights, with a full bag and a full history.
+//! - `textbook`: the same part as the equations are printed, a decomposition for each candidate.
+//! - `product`: one bare double-precision product of N x D by D x 48, what the evaluation cannot do without.
+//! - `downscale`: the working image of a 1920 x 1080 upload.
+
+use std::hint::black_box;
+
+use bagtrack::tracker::{AffineSubspace, GrayFrame, Params, Preset, Rect, Tracker, patch};
+use criterion::{Criterion, criterion_group, criterion_main};
+use nalgebra::DMatrix;
+
+#[path = "../tests/textbook/mod.rs"]
+mod textbook;
+
+const WIDTH: usize = 320;
+const HEIGHT: usize = 240;
+
+fn texture(x: usize, y: usize, seed: u32) -> u8 {
+    // Blocks of 4 x 4 pixels with hashed gray values, softened by a gradient.
+    let cell = (x / 4) as u32 * 73_856_093 ^ (y / 4) as u32 * 19_349_663 ^ seed;
+    let hash = cell.wrapping_mul(2_654_435_761) >> 24;
+    (hash / 2 + (x * 3 + y * 2) as u32 % 120) as u8
+}
+
+/// Where the target of 60 x 48 pixels is in frame `t`: on a circle.
+fn place(t: usize) -> (usize, usize) {
+    let angle = t as f64 / 64.0 * std::f64::consts::TAU;
+    let (sine, cosine) = angle.sin_cos();
+    (
+        (130.0 + 60.0 * cosine) as usize,
+        (96.0 + 50.0 * sine) as usize,
+    )
+}
+
+fn frame(t: usize) -> GrayFrame {
+    let (left, top) = place(t);
+    let mut luma: Vec<u8> = (0..WIDTH * HEIGHT)
+        .map(|i| texture(i % WIDTH, i / WIDTH, 1))
+        .collect();
+    for y in 0..48 {
+        for x in 0..60 {
+            luma[(top + y) * WIDTH + left + x] = texture(x, y, 2);
+        }
+    }
+    GrayFrame::from_luma(WIDTH as u32, HEIGHT as u32, luma).expect("a frame of this size")
+}
+
+fn target(t: usize) -> Rect {
+    let (left, top) = place(t);
+    Rect::new(left as f64, top as f64, 60.0, 48.0)
+}
+
+fn step(criterion: &mut Criterion) {
+    let frames: Vec<GrayFrame> = (0..64).map(frame).collect();
+    let params = Preset::Paper.params();
+    let mut tracker = Tracker::new(&frames[0], target(0), params).expect("a box inside the frame");
+    let mut t = 0;
+    let mut next = || {
+        t = (t + 1) % frames.len();
+        tracker.step(&frames[t]).expect("frames of one size")
+    };
+    for _ in 0..64 {
+        next();
+    }
+    criterion.bench_function("step", |bencher| bencher.iter(|| black_box(next())));
+}
+
+fn evaluation(criterion: &mut Criterion) {
+    let params: Params = Preset::Paper.params();
+    let look = |t: usize, shift: f64| {
+        let area = target(t);
+        let moved = Rect::new(
+            area.x + shift,
+            area.y - shift / 2.0,
+            area.width,
+            area.height,
+        );
+        patch(&frame(t), &moved, &params)
+    };
+    let looks: Vec<Vec<f32>> = (0..60).map(|t| look(t, (t % 7) as f64 * 0.3)).collect();
+    let candidates: Vec<Vec<f32>> = (0..params.particles)
+        .map(|i| look(61, f64::from(i) / 5.0 - 10.0))
+        .collect();
+    let slices: Vec<&[f32]> = looks.iter().map(Vec::as_slice).collect();
+    let bag: Vec<AffineSubspace> = slices[..50]
+        .chunks(5)
+        .map(|looks| AffineSubspace::of(looks, 3))
+        .collect();
+    let history = &slices[50..55];
+
+    let mut shipped = textbook::shipped(&candidates, history, &bag, &params);
+    criterion.bench_function("evaluation", |bencher| {
+        bencher.iter(|| {
+            shipped.compute(black_box(history));
+            shipped.best()
+        })
+    });
+    criterion.bench_function("textbook", |bencher| {
+        bencher.iter(|| textbook::evaluate(&candidates, black_box(history), &bag, &params))
+    });
+}
+
+fn product(criterion: &mut Criterion) {
+    let d = 1024;
+    let a = DMatrix::from_fn(48, d, |i, j| (i * 31 + j * 7) as f64 % 13.0);
+    let b = DMatrix::from_fn(d, 106, |i, j| (i * 17 + j * 5) as f64 % 11.0);
+    let mut c = DMatrix::zeros(48, 106);
+    criterion.bench_function("product", |bencher| {
+        bencher.iter(|| c.gemm(1.0, black_box(&a), black_box(&b), 0.0))
+    });
+}
+
+fn downscale(criterion: &mut Criterion) {
+    let luma: Vec<u8> = (0..1920 * 1080).map(|i| (i * 7 % 251) as u8).collect();
+    criterion.bench_function("downscale", |bencher| {
+        bencher.iter_batched(
+            || luma.clone(),
+            |luma| GrayFrame::from_luma(1920, 1080, luma),
+            criterion::BatchSize::LargeInput,
+        )
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(30).measurement_time(std::time::Duration::from_secs(3));
+    targets = step, evaluation, product, downscale
+}
+criterion_main!(benches);

@@ -1,0 +1,206 @@
+//! Input at the edge of what has an answer: a finite box or a typed error, never NaN, never a panic.
+
+mod tracker_scene;
+
+use bagtrack::tracker::{Estimate, GrayFrame, LEAST_BOX_SIDE, Params, Rect, Tracker, TrackerError};
+use proptest::prelude::*;
+use tracker_scene::{flat, frame, params};
+
+fn assert_sound(answer: &Estimate) {
+    assert!(answer.target.is_valid(), "{answer:?}");
+    assert!((0.0..=1.0).contains(&answer.score), "{answer:?}");
+}
+
+/// Starts on the first frame, steps through the rest, and carries a snapshot over every step.
+fn run(frames: &[GrayFrame], target: Rect, params: Params) -> Vec<Estimate> {
+    let mut tracker = Tracker::new(&frames[0], target, params).expect("an acceptable box");
+    frames[1..]
+        .iter()
+        .map(|frame| {
+            let answer = tracker.step(frame).expect("frames of one size");
+            assert_sound(&answer);
+            tracker = Tracker::restore(&tracker.snapshot()).expect("an own snapshot");
+            answer
+        })
+        .collect()
+}
+
+#[test]
+fn flat_frames_of_every_brightness_have_answers() {
+    for value in [0, 1, 128, 255] {
+        let frames = vec![flat(64, 48, value); 14];
+        run(&frames, Rect::new(10.0, 10.0, 16.0, 16.0), params(1));
+    }
+}
+
+#[test]
+fn a_target_that_goes_black_and_comes_back_has_answers() {
+    let mut frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    frames.extend(vec![flat(120, 90, 0); 12]);
+    frames.extend((8..20).map(frame));
+    run(&frames, tracker_scene::target(0), params(2));
+}
+
+#[test]
+fn a_black_start_has_answers_when_the_light_comes_on() {
+    let mut frames = vec![flat(120, 90, 0); 2];
+    frames.extend((0..12).map(frame));
+    run(&frames, tracker_scene::target(0), params(3));
+}
+
+#[test]
+fn equal_distances_give_equal_weights_and_the_first_particle() {
+    // Every patch of a flat frame is the same, so nothing distinguishes the candidates: the cloud only diffuses.
+    let answers = run(
+        &vec![flat(64, 48, 90); 3],
+        Rect::new(20.0, 10.0, 16.0, 16.0),
+        params(4),
+    );
+    for answer in answers {
+        assert!(
+            answer
+                .target
+                .center_distance(&Rect::new(20.0, 10.0, 16.0, 16.0))
+                < 40.0
+        );
+    }
+}
+
+#[test]
+fn more_basis_vectors_than_patches() {
+    let frames: Vec<GrayFrame> = (0..14).map(frame).collect();
+    for history in [1, 2] {
+        let params = Params {
+            basis_dim: 6,
+            history,
+            ..params(5)
+        };
+        run(&frames, tracker_scene::target(0), params);
+    }
+}
+
+#[test]
+fn the_smallest_parameters_and_no_motion() {
+    let frames: Vec<GrayFrame> = (0..14).map(frame).collect();
+    let params = Params {
+        particles: 1,
+        patch_width: 4,
+        patch_height: 4,
+        basis_dim: 1,
+        history: 1,
+        bag_size: 1,
+        update_every: 1,
+        motion_std_x: 0.0,
+        motion_std_y: 0.0,
+        motion_std_scale: 0.0,
+        ..params(6)
+    };
+    for answer in run(&frames, tracker_scene::target(0), params) {
+        assert!(answer.target.center_distance(&tracker_scene::target(0)) < 1e-9);
+    }
+}
+
+#[test]
+fn a_sigma_that_underflows_every_plain_likelihood() {
+    let frames: Vec<GrayFrame> = (0..10).map(frame).collect();
+    let params = Params {
+        sigma: 1e-4,
+        ..params(7)
+    };
+    run(&frames, tracker_scene::target(0), params);
+}
+
+#[test]
+fn walks_and_scales_without_bound_are_held() {
+    let frames: Vec<GrayFrame> = (0..30).map(frame).collect();
+    let params = Params {
+        motion_std_x: 320.0,
+        motion_std_y: 320.0,
+        motion_std_scale: 1.0,
+        ..params(8)
+    };
+    let edge = Rect::new(0.0, 0.0, 120.0, 90.0);
+    for answer in run(&frames, tracker_scene::target(0), params) {
+        assert!(answer.target.intersection(&edge) > 0.0, "{answer:?}");
+        assert!(answer.target.width < 500.0 && answer.target.height > 0.9);
+    }
+}
+
+#[test]
+fn frames_one_pixel_wide_or_high() {
+    for (width, height) in [(1, 60), (60, 1), (1, 1), (1, 4000), (4000, 1)] {
+        let pixels = (0..width * height).map(|i| (i * 37 % 251) as u8).collect();
+        let frame = GrayFrame::from_luma(width, height, pixels).expect("a frame of this size");
+        let long = 16.0_f64.max(f64::from(width.max(height)) / 10.0);
+        let target = Rect::new(0.0, 0.0, long, long);
+        run(&vec![frame; 8], target, params(9));
+    }
+}
+
+#[test]
+fn the_smallest_box_and_what_is_below_it() {
+    let frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    let least = LEAST_BOX_SIDE;
+    run(&frames, Rect::new(30.0, 30.0, least, least), params(10));
+    let refused = |target| match Tracker::new(&frames[0], target, params(10)) {
+        Err(TrackerError::Target(why)) => why,
+        other => panic!("{target:?}: {other:?}"),
+    };
+    assert!(refused(Rect::new(30.0, 30.0, least - 0.01, 9.0)).contains("too small"));
+    assert!(refused(Rect::new(30.0, 30.0, 9.0, 0.0)).contains("too small"));
+    assert!(refused(Rect::new(30.0, 30.0, 9.0, -5.0)).contains("too small"));
+    assert!(refused(Rect::new(0.0, 0.0, 481.0, 9.0)).contains("too large"));
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        assert!(refused(Rect::new(value, 0.0, 9.0, 9.0)).contains("not finite"));
+        assert!(refused(Rect::new(0.0, 0.0, 9.0, value)).contains("not finite"));
+    }
+}
+
+#[test]
+fn boxes_partly_and_wholly_outside() {
+    let frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    for (x, y) in [(-19.0, 20.0), (119.0, 89.0), (30.0, -19.0), (-19.0, 89.0)] {
+        run(&frames, Rect::new(x, y, 20.0, 20.0), params(11));
+    }
+    for (x, y) in [
+        (-20.0, 20.0),
+        (120.0, 20.0),
+        (30.0, 90.0),
+        (-1e300, 0.0),
+        (0.0, 1e300),
+    ] {
+        let target = Rect::new(x, y, 20.0, 20.0);
+        match Tracker::new(&frames[0], target, params(11)) {
+            Err(TrackerError::Target(why)) => assert!(why.contains("outside"), "{why}"),
+            other => panic!("{target:?}: {other:?}"),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_small_frames_and_any_box_give_an_answer_or_a_typed_error(
+        width in 1_u32..40,
+        height in 1_u32..40,
+        luma in proptest::collection::vec(any::<u8>(), 1..200),
+        x in -30.0_f64..50.0,
+        y in -30.0_f64..50.0,
+        box_width in 0.0_f64..60.0,
+        box_height in 0.0_f64..60.0,
+        seed: u64,
+    ) {
+        let frames: Vec<GrayFrame> = (0..7)
+            .map(|t| {
+                let pixel = |i| luma[(i as usize * (t + 1)) % luma.len()];
+                let pixels = (0..width * height).map(pixel).collect();
+                GrayFrame::from_luma(width, height, pixels).expect("a frame of this size")
+            })
+            .collect();
+        let target = Rect::new(x, y, box_width, box_height);
+        if Tracker::new(&frames[0], target, params(seed)).is_ok() {
+            run(&frames, target, params(seed));
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! The tracker through its public surface: what a session may rely on.
+
+mod tracker_scene;
+
+use bagtrack::tracker::{GrayFrame, Params, Preset, Rect, Status, Tracker, TrackerError};
+use tracker_scene::{flat, frame, params, target};
+
+fn start(seed: u64) -> Tracker {
+    Tracker::new(&frame(0), target(0), params(seed)).expect("a box inside the frame")
+}
+
+#[test]
+fn frames_are_counted_and_the_first_answer_is_the_box_given() {
+    let mut tracker = start(1);
+    let first = tracker.estimate();
+    assert_eq!((first.frame, first.target), (0, target(0)));
+    assert_eq!(first.status, Status::Tracking);
+    assert_eq!(tracker.source_size(), (120, 90));
+    for t in 1..5 {
+        let answer = tracker
+            .step(&frame(t))
+            .expect("a frame of the session's size");
+        assert_eq!(answer.frame, t as u64);
+        assert_eq!(answer, tracker.estimate());
+        assert!((0.0..=1.0).contains(&answer.score));
+    }
+}
+
+#[test]
+fn a_target_unlike_its_surroundings_is_followed() {
+    for seed in 0..5 {
+        let mut tracker = start(seed);
+        for t in 1..30 {
+            let answer = tracker
+                .step(&frame(t))
+                .expect("a frame of the session's size");
+            assert!(
+                answer.target.center_distance(&target(t)) < 12.0,
+                "seed {seed}, frame {t}: {answer:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_replay_gives_the_same_bits_and_another_seed_does_not() {
+    let run = |seed| {
+        let mut tracker = start(seed);
+        let answers: Vec<_> = (1..25)
+            .map(|t| {
+                tracker
+                    .step(&frame(t))
+                    .expect("a frame of the session's size")
+            })
+            .collect();
+        (answers, tracker.snapshot())
+    };
+    assert_eq!(run(7), run(7));
+    assert_ne!(run(7), run(8));
+}
+
+#[test]
+fn a_frame_given_to_two_copies_of_one_state_gives_one_answer() {
+    let mut tracker = start(3);
+    for t in 1..12 {
+        let mut copy = tracker.clone();
+        // What the copy saw before does not matter, only its state.
+        let answer = copy.step(&frame(t)).expect("a frame of the session's size");
+        assert_eq!(tracker.step(&frame(t)), Ok(answer));
+        assert_eq!(tracker.snapshot(), copy.snapshot());
+    }
+}
+
+#[test]
+fn a_frame_of_another_size_changes_nothing() {
+    let mut tracker = start(4);
+    tracker
+        .step(&frame(1))
+        .expect("a frame of the session's size");
+    let before = tracker.snapshot();
+    let error = TrackerError::FrameSize {
+        width: 120,
+        height: 90,
+        got_width: 90,
+        got_height: 120,
+    };
+    assert_eq!(tracker.step(&flat(90, 120, 3)), Err(error.clone()));
+    assert_eq!(tracker.retarget(&flat(90, 120, 3), target(2)), Err(error));
+    let outside = Rect::new(500.0, 0.0, 20.0, 20.0);
+    assert!(matches!(
+        tracker.retarget(&frame(2), outside),
+        Err(TrackerError::Target(_))
+    ));
+    assert_eq!(tracker.snapshot(), before);
+}
+
+#[test]
+fn a_corrected_box_counts_as_a_frame_and_is_followed_from_there() {
+    let mut tracker = start(5);
+    for t in 1..8 {
+        tracker
+            .step(&frame(t))
+            .expect("a frame of the session's size");
+    }
+    let wider = Rect::new(target(30).x - 2.0, target(30).y - 3.0, 28.0, 26.0);
+    let answer = tracker
+        .retarget(&frame(30), wider)
+        .expect("a box inside the frame");
+    assert_eq!((answer.frame, answer.target, answer.score), (8, wider, 1.0));
+    let next = tracker
+        .step(&frame(31))
+        .expect("a frame of the session's size");
+    assert_eq!(next.frame, 9);
+    assert!(next.target.center_distance(&target(31)) < 12.0, "{next:?}");
+    let aspect = next.target.width / next.target.height;
+    assert!(
+        (aspect - 28.0 / 26.0).abs() < 1e-9,
+        "the new aspect is kept"
+    );
+}
+
+#[test]
+fn boxes_are_in_the_pixels_of_the_upload() {
+    // The same scene, four times as large: the working image is the same, so are the answers, four times as large.
+    let large = |t: usize| {
+        let small = frame(t);
+        let wide = 480;
+        let luma = (0..wide * 360)
+            .map(|i| small.pixels()[i / wide / 4 * 120 + i % wide / 4])
+            .collect();
+        GrayFrame::from_luma(480, 360, luma).expect("a frame of this size")
+    };
+    assert_eq!((large(0).width(), large(0).height()), (320, 240));
+    let start = target(0).scaled(4.0, 4.0);
+    let mut tracker = Tracker::new(&large(0), start, params(6)).expect("a box inside the frame");
+    assert_eq!(tracker.estimate().target, start);
+    for t in 1..10 {
+        let answer = tracker
+            .step(&large(t))
+            .expect("a frame of the session's size");
+        let truth = target(t).scaled(4.0, 4.0);
+        assert!(
+            answer.target.center_distance(&truth) < 48.0,
+            "{t}: {answer:?}"
+        );
+        assert!((answer.target.width / truth.width - 1.0).abs() < 0.3);
+    }
+}
+
+#[test]
+fn every_parameter_out_of_range_is_named() {
+    type Change = fn(&mut Params);
+    let cases: [(&str, Change); 17] = [
+        ("particles", |p| p.particles = 0),
+        ("particles", |p| p.particles = 1001),
+        ("patch_width", |p| p.patch_width = 3),
+        ("patch_height", |p| p.patch_height = 65),
+        ("basis_dim", |p| p.basis_dim = 0),
+        ("history", |p| p.history = 0),
+        ("history", |p| p.history = 11),
+        ("bag_size", |p| p.bag_size = 0),
+        ("update_every", |p| p.update_every = 0),
+        ("alpha", |p| p.alpha = -0.1),
+        ("alpha", |p| p.alpha = f64::NAN),
+        ("sigma", |p| p.sigma = 0.0),
+        ("sigma", |p| p.sigma = f64::INFINITY),
+        ("motion_std_x", |p| p.motion_std_x = f64::NAN),
+        ("motion_std_y", |p| p.motion_std_y = -1.0),
+        ("motion_std_scale", |p| {
+            p.motion_std_scale = f64::NEG_INFINITY
+        }),
+        ("motion_std_scale", |p| p.motion_std_scale = 1.1),
+    ];
+    for (name, change) in cases {
+        let mut params = Preset::Paper.params();
+        change(&mut params);
+        match Tracker::new(&frame(0), target(0), params) {
+            Err(TrackerError::Params(error)) => {
+                assert_eq!(error.name, name);
+                assert!(error.to_string().contains(error.expected));
+            }
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+    for preset in [Preset::Paper, Preset::Robust] {
+        assert_eq!(preset.params().validate(), Ok(()));
+    }
+}
