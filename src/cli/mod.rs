@@ -1,8 +1,11 @@
 //! The commands, one file each. A command returns what went wrong as a printable error; `run` prints it
 //! as one line and exits with 1 (clap exits with 2 on wrong usage).
 
+mod draw;
 mod eval;
 mod health;
+mod output;
+mod params;
 mod progress;
 mod sample;
 mod serve;

@@ -1,6 +1,6 @@
 //! `bagtrack sample`.
 
-use super::progress;
+use super::{output, progress};
 use bagtrack::sample::{Clip, Format, Settings};
 use std::path::PathBuf;
 
@@ -45,6 +45,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         height: args.height,
         seed: args.seed,
     })?;
+    output::new_folder(&args.out)?;
     let bar = progress::bar(u64::from(args.frames), "drawing");
     clip.write(&args.out, format, || bar.inc(1))?;
     bar.finish_and_clear();

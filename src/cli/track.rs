@@ -1,10 +1,159 @@
 //! `bagtrack track`.
 
+use super::params::ParamFlags;
+use super::{draw, output, progress};
+use bagtrack::eval::{Sequence, frames};
+use bagtrack::ingest::{self, Limits};
+use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
+use std::fs;
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
 /// Flags of `track`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/.
+    dir: PathBuf,
+    /// The target in the first frame: x,y,width,height in pixels, 0-based from the top-left corner, as the service
+    /// takes it. Without it, the first box of groundtruth_rect.txt in DIR is taken (1-based there).
+    #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rect, allow_hyphen_values = true)]
+    target: Option<Rect>,
+    #[command(flatten)]
+    params: ParamFlags,
+    /// Seed of all random draws: the same seed gives the same boxes.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// `otb`: x,y,width,height a line (0-based pixels, unlike files of the benchmark). `json`: an object a line.
+    #[arg(long, value_enum, default_value_t = Format::Otb)]
+    format: Format,
+    /// Also writes every frame with its box into this new folder: green tracking, orange uncertain, red lost.
+    #[arg(long, value_name = "OUT")]
+    draw: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Format {
+    Otb,
+    Json,
+}
+
+/// A line of JSON output.
+#[derive(serde::Serialize)]
+struct Line<'a> {
+    frame: u64,
+    file: &'a str,
+    #[serde(rename = "box")]
+    target: Rect,
+    score: f32,
+    status: bagtrack::tracker::Status,
+}
 
 /// Runs `track`.
-pub fn run(_args: Args) -> Result<(), Box<dyn std::error::Error>> {
-    todo!()
+pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
+    let mut params = args.params.params()?;
+    if let Some(seed) = args.seed {
+        params.seed = seed;
+    }
+    let paths = frames::list(&args.dir)?;
+    let target = match args.target {
+        Some(target) => target,
+        None => first_annotated(&args.dir)?,
+    };
+    if let Some(folder) = &args.draw {
+        output::new_folder(folder)?;
+    }
+    let bar = progress::bar(paths.len() as u64, "frames");
+    let mut tracker = None;
+    for path in &paths {
+        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let bytes = fs::read(path).map_err(|error| named(&error))?;
+        let estimate =
+            advance(&mut tracker, &bytes, target, &params).map_err(|error| named(&error))?;
+        if let Some(folder) = &args.draw {
+            let drawn = draw::with_box(&bytes, &estimate).map_err(|error| named(&error))?;
+            let stem = Path::new(path.file_name().unwrap_or_default());
+            let file = folder.join(stem.with_extension("jpg"));
+            fs::write(&file, drawn).map_err(|error| format!("{}: {error}", file.display()))?;
+        }
+        let written = bar.suspend(|| write_line(args.format, path, &estimate));
+        match written {
+            // The reader has seen enough: `bagtrack track … | head`.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            other => other?,
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// Starts the tracker on the first frame, steps it on every other.
+fn advance(
+    tracker: &mut Option<Tracker>,
+    bytes: &[u8],
+    target: Rect,
+    params: &Params,
+) -> Result<Estimate, Box<dyn std::error::Error>> {
+    let frame = ingest::decode(bytes, &Limits::default())?;
+    match tracker {
+        Some(tracker) => Ok(tracker.step(&frame)?),
+        None => Ok(tracker
+            .insert(Tracker::new(&frame, target, params.clone())?)
+            .estimate()),
+    }
+}
+
+fn first_annotated(dir: &Path) -> Result<Rect, String> {
+    if !dir.join(Sequence::BOXES).is_file() {
+        return Err(format!(
+            "{}: --box x,y,width,height is needed (there is no {} to take the first box from)",
+            dir.display(),
+            Sequence::BOXES
+        ));
+    }
+    let boxes = Sequence::read_boxes(dir).map_err(|error| error.to_string())?;
+    let first = boxes.first().copied().flatten();
+    first.ok_or_else(|| {
+        format!(
+            "{}: --box x,y,width,height is needed (the first frame is not annotated in {})",
+            dir.display(),
+            Sequence::BOXES
+        )
+    })
+}
+
+fn write_line(format: Format, path: &Path, estimate: &Estimate) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    let Rect {
+        x,
+        y,
+        width,
+        height,
+    } = estimate.target;
+    match format {
+        Format::Otb => writeln!(out, "{x:.3},{y:.3},{width:.3},{height:.3}"),
+        Format::Json => {
+            let line = Line {
+                frame: estimate.frame,
+                file: &path.file_name().unwrap_or_default().to_string_lossy(),
+                target: estimate.target,
+                score: estimate.score,
+                status: estimate.status,
+            };
+            writeln!(out, "{}", serde_json::to_string(&line)?)
+        }
+    }
+}
+
+fn rect(text: &str) -> Result<Rect, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) => Ok(Rect {
+            x,
+            y,
+            width,
+            height,
+        }),
+        _ => Err("it must be four numbers: x,y,width,height".to_owned()),
+    }
 }

@@ -5,7 +5,6 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ImageResult, RgbImage};
 use std::fs;
-use std::io::ErrorKind;
 use std::path::Path;
 
 const JPEG_QUALITY: u8 = 92;
@@ -49,15 +48,6 @@ pub(super) fn write(
         path: path.to_owned(),
         reason,
     };
-    // Never write over what somebody keeps there.
-    let holds_something = match fs::read_dir(dir) {
-        Ok(mut entries) => entries.next().is_some(),
-        Err(error) if error.kind() == ErrorKind::NotFound => false,
-        Err(error) => return Err(failed(dir, error.to_string())),
-    };
-    if holds_something {
-        return Err(SampleError::NotEmpty(dir.to_owned()));
-    }
     let pictures = dir.join("img");
     fs::create_dir_all(&pictures).map_err(|error| failed(&pictures, error.to_string()))?;
     let mut truth = String::new();

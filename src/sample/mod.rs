@@ -71,9 +71,6 @@ pub enum SampleError {
         /// The range it must be in.
         expected: String,
     },
-    /// The folder holds something already; nothing was written.
-    #[error("{} is not empty: choose another folder, or remove it first", .0.display())]
-    NotEmpty(PathBuf),
     /// The folder or a file in it cannot be written.
     #[error("{}: {reason}", path.display())]
     Write {
@@ -142,10 +139,11 @@ impl Clip {
     }
 
     /// Writes the clip into `dir` in the OTB layout: `img/0001.jpg` (or `.png`) and so on, and
-    /// `groundtruth_rect.txt` with `x,y,width,height` a line, in 1-based pixels. Calls `progress` after each frame.
+    /// `groundtruth_rect.txt` with `x,y,width,height` a line, in 1-based pixels. Files of these names are
+    /// written over. Calls `progress` after each frame.
     ///
     /// # Errors
-    /// [`SampleError::NotEmpty`], [`SampleError::Write`].
+    /// [`SampleError::Write`].
     pub fn write(
         &self,
         dir: &Path,

@@ -1,0 +1,164 @@
+//! A sequence in the OTB layout: `img/` with the frames and `groundtruth_rect.txt` with a box a line.
+
+use super::frames;
+use crate::ingest::{self, Limits};
+use crate::tracker::{GrayFrame, Rect};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A sequence cannot be used; the text is one line and names the folder.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: {reason}", dir.display())]
+pub struct SequenceError {
+    dir: PathBuf,
+    reason: String,
+}
+
+impl SequenceError {
+    pub(super) fn new(dir: &Path, reason: impl Into<String>) -> Self {
+        Self {
+            dir: dir.to_owned(),
+            reason: reason.into(),
+        }
+    }
+}
+
+/// Frames with the boxes that people drew on them.
+#[derive(Debug, Clone)]
+pub struct Sequence {
+    /// Name of the folder.
+    pub name: String,
+    /// The frames, decoded as the service decodes them.
+    pub frames: Vec<GrayFrame>,
+    /// The box of each frame in 0-based pixels from the top-left corner; none where the frame is not annotated.
+    pub boxes: Vec<Option<Rect>>,
+}
+
+impl Sequence {
+    /// Name of the file with the boxes.
+    pub const BOXES: &'static str = "groundtruth_rect.txt";
+
+    /// Reads and decodes a sequence.
+    ///
+    /// # Errors
+    /// A missing or unreadable folder, file or frame; another number of boxes than frames; a first frame
+    /// without a box.
+    pub fn load(dir: &Path, limits: &Limits) -> Result<Self, SequenceError> {
+        let refuse = |reason: String| SequenceError::new(dir, reason);
+        let paths = frames::list(dir)?;
+        let boxes = Self::read_boxes(dir)?;
+        if boxes.len() != paths.len() {
+            return Err(refuse(format!(
+                "{} frames, but {} lines in {}",
+                paths.len(),
+                boxes.len(),
+                Self::BOXES
+            )));
+        }
+        if boxes[0].is_none() {
+            return Err(refuse("the first frame is not annotated".to_owned()));
+        }
+        let mut decoded = Vec::with_capacity(paths.len());
+        for path in &paths {
+            let file = path.file_name().unwrap_or_default().display();
+            let bytes = fs::read(path).map_err(|error| refuse(format!("{file}: {error}")))?;
+            let frame = ingest::decode(&bytes, limits)
+                .map_err(|error| refuse(format!("{file}: {error}")))?;
+            decoded.push(frame);
+        }
+        let name = dir.canonicalize().ok().unwrap_or_else(|| dir.to_owned());
+        Ok(Self {
+            name: name
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            frames: decoded,
+            boxes,
+        })
+    }
+
+    /// Reads the boxes of the sequence in `dir`.
+    ///
+    /// # Errors
+    /// The file is missing, or a line of it is not four numbers.
+    pub fn read_boxes(dir: &Path) -> Result<Vec<Option<Rect>>, SequenceError> {
+        let text = fs::read_to_string(dir.join(Self::BOXES))
+            .map_err(|error| SequenceError::new(dir, format!("{}: {error}", Self::BOXES)))?;
+        parse_boxes(&text)
+            .map_err(|reason| SequenceError::new(dir, format!("{}: {reason}", Self::BOXES)))
+    }
+}
+
+/// Reads OTB boxes, `x,y,width,height` a line, separated by commas, tabs or spaces: 1-based in the text, 0-based in
+/// the answer. A box without size (`0,0,0,0`) or with a NaN in it means that the frame is not annotated.
+///
+/// # Errors
+/// Says which line is not four numbers.
+pub fn parse_boxes(text: &str) -> Result<Vec<Option<Rect>>, String> {
+    text.trim_end()
+        .lines()
+        .enumerate()
+        .map(|(index, line)| {
+            let numbers: Option<Vec<f64>> = line
+                .split(|c: char| c == ',' || c.is_whitespace())
+                .filter(|field| !field.is_empty())
+                .map(|field| field.parse().ok())
+                .collect();
+            match numbers.as_deref() {
+                Some(&[x, y, width, height]) => {
+                    let annotated = [x, y, width, height].iter().all(|n| n.is_finite())
+                        && width > 0.0
+                        && height > 0.0;
+                    Ok(annotated.then_some(Rect {
+                        x: x - 1.0,
+                        y: y - 1.0,
+                        width,
+                        height,
+                    }))
+                }
+                _ => Err(format!(
+                    "line {} is not x,y,width,height: {line:?}",
+                    index + 1
+                )),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_may_be_separated_by_commas_tabs_or_spaces() {
+        let expected = Some(Rect {
+            x: 0.0,
+            y: 1.5,
+            width: 3.0,
+            height: 4.0,
+        });
+        for text in [
+            "1,2.5,3,4",
+            "1\t2.5\t3\t4",
+            "1 2.5 3 4\r\n",
+            " 1, 2.5, 3, 4 \n\n",
+        ] {
+            assert_eq!(parse_boxes(text), Ok(vec![expected]), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn boxes_without_size_are_not_annotations() {
+        assert_eq!(
+            parse_boxes("0,0,0,0\nNaN,NaN,NaN,NaN\n5,5,10,-1"),
+            Ok(vec![None; 3])
+        );
+    }
+
+    #[test]
+    fn a_broken_line_is_named() {
+        let error = parse_boxes("1,2,3,4\n1,2,3\n").expect_err("three numbers are no box");
+        assert!(error.contains("line 2"), "{error}");
+    }
+}
