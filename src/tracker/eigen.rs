@@ -14,8 +14,8 @@ pub(super) type Lanes = [f64; LANES];
 /// Cyclic Jacobi needs four to six sweeps at these sizes; the bound only guards against a NaN.
 const MAX_SWEEPS: usize = 16;
 
-/// An off-diagonal element below this share of the trace is zero.
-const NEGLIGIBLE: f64 = 1e-17;
+/// An off-diagonal element below this share of the trace is rounding.
+const NEGLIGIBLE: f64 = 1e-16;
 
 /// Diagonalises [`LANES`] symmetric positive semidefinite matrices of size `dim`, each `dim * dim` in row order.
 /// Their diagonals end as the eigenvalues, in no order. `vectors`, if given, ends with the eigenvector of the
