@@ -2,6 +2,7 @@
 
 use bagtrack::http::{Application, Config};
 use std::error::Error;
+use std::io::IsTerminal;
 use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
@@ -52,6 +53,7 @@ fn start_log(filter: &str, format: LogFormat) -> Result<(), Box<dyn Error>> {
         .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
+        .with_ansi(std::io::stderr().is_terminal())
         .with_writer(std::io::stderr);
     match format {
         LogFormat::Text => log.init(),

@@ -141,9 +141,11 @@ mod tests {
     #[test]
     fn a_batch_or_its_tail_is_replayed() {
         let recent = [answered(5, b"a"), answered(6, b"b"), answered(7, b"c")];
-        let frames = |turn| match turn {
-            Ok(Turn::Replay(answers)) => answers.iter().map(|a: &Estimate| a.frame).collect(),
-            other => panic!("{other:?}"),
+        let frames = |turn| -> Vec<u64> {
+            match turn {
+                Ok(Turn::Replay(answers)) => answers.iter().map(|a: &Estimate| a.frame).collect(),
+                other => panic!("{other:?}"),
+            }
         };
         let all = judge(&recent, Some(5), &prints(&[b"a", b"b", b"c"]), None);
         assert_eq!(frames(all), vec![5, 6, 7]);

@@ -1,0 +1,67 @@
+//! The program itself: `bagtrack serve`, `bagtrack health`, SIGTERM.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Output, Stdio};
+
+fn bagtrack() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_bagtrack"))
+}
+
+/// A running service and its address.
+fn serve() -> (Child, String) {
+    let mut command = bagtrack();
+    command.args(["serve", "--log-format", "json"]);
+    let mut child = command
+        .env("BAGTRACK_LISTEN", "127.0.0.1:0")
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
+    let url = loop {
+        let line = log.next().expect("it says where it listens").unwrap();
+        let line: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let message = line["fields"]["message"].as_str().unwrap_or("").to_owned();
+        if let Some(url) = message.strip_prefix("listening on ") {
+            break url.to_owned();
+        }
+    };
+    // Somebody must go on reading, or the service would wait for it.
+    std::thread::spawn(move || log.for_each(drop));
+    (child, url)
+}
+
+fn health(url: &str) -> Output {
+    let mut command = bagtrack();
+    command.args(["health", "--url", url]).output().unwrap()
+}
+
+#[test]
+fn serves_answers_health_and_ends_on_sigterm() {
+    let (mut child, url) = serve();
+    let healthy = health(&url);
+    let ended = Command::new("kill").arg(child.id().to_string()).status();
+    let status = child.wait().unwrap();
+    assert!(healthy.status.success(), "{healthy:?}");
+    assert!(ended.unwrap().success());
+    assert!(status.success(), "{status}");
+    let gone = health(&url);
+    assert_eq!(gone.status.code(), Some(1));
+    let line = String::from_utf8(gone.stderr).unwrap();
+    assert!(
+        line.starts_with("bagtrack: no answer from 127.0.0.1:"),
+        "{line}"
+    );
+    assert_eq!(line.lines().count(), 1);
+}
+
+#[test]
+fn a_setting_out_of_its_range_is_named_in_one_line() {
+    let output = bagtrack().env("BAGTRACK_QUEUE", "0").output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(
+        line,
+        "bagtrack: --queue (BAGTRACK_QUEUE) must be at least 1\n"
+    );
+}

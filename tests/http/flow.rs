@@ -1,0 +1,145 @@
+//! A session from its first frame to its end.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use reqwest::StatusCode;
+
+#[tokio::test]
+async fn a_session_from_its_first_frame_to_its_end() {
+    let app = TestApplication::start().await;
+    let response = app
+        .create(pictures::png(0), &[("box", BOX), ("seed", "7")])
+        .await;
+    let location = response.headers()["location"].to_str().unwrap().to_owned();
+    let created = expect(response, StatusCode::CREATED).await;
+    let id = created["id"].as_str().unwrap();
+    assert_eq!(location, format!("/sessions/{id}"));
+    assert_eq!(created["frame"], 0);
+    let first_box = serde_json::json!({"x": 20.0, "y": 15.0, "width": 16.0, "height": 12.0});
+    assert_eq!(created["box"], first_box);
+    let size = serde_json::json!({"width": pictures::WIDTH, "height": pictures::HEIGHT});
+    assert_eq!(created["image"], size);
+    assert_eq!(created["params"]["seed"], 7);
+    humantime::parse_rfc3339(created["expires_at"].as_str().unwrap()).unwrap();
+
+    let first = expect(app.post_frame(id, pictures::png(1)).await, StatusCode::OK).await;
+    assert_eq!(first["frame"], 1);
+    assert!((0.0..=1.0).contains(&first["score"].as_f64().unwrap()));
+    assert!(["tracking", "uncertain", "lost"].contains(&first["status"].as_str().unwrap()));
+    let x = first["box"]["x"].as_f64().unwrap();
+    assert!(
+        (x - 22.0).abs() < 16.0,
+        "the box is at {x}, the target at 22"
+    );
+
+    let view = expect(app.get_session(id).await, StatusCode::OK).await;
+    assert_eq!(view["id"], id);
+    assert_eq!(view["frames"], 2);
+    assert_eq!(view["answer"], first);
+    assert_eq!(view["params"], created["params"]);
+
+    let query = [("box", "24,17,16,12")];
+    let response = app.put_target(id, pictures::png(2), &query).await;
+    let corrected = expect(response, StatusCode::OK).await;
+    assert_eq!(corrected["frame"], 2);
+    let given = serde_json::json!({"x": 24.0, "y": 17.0, "width": 16.0, "height": 12.0});
+    assert_eq!(corrected["box"], given);
+
+    let deleted = app.delete_session(id).await;
+    assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
+    expect_problem(app.get_session(id).await, "session-not-found").await;
+    expect_problem(app.delete_session(id).await, "session-not-found").await;
+}
+
+#[tokio::test]
+async fn the_same_seed_gives_the_same_boxes_and_a_random_seed_is_told() {
+    let app = TestApplication::start().await;
+    let (one, other) = (app.open().await, app.open().await);
+    for t in 1..8 {
+        let a = app.post_frame(&one, pictures::png(t)).await.text().await;
+        let b = app.post_frame(&other, pictures::png(t)).await.text().await;
+        assert_eq!(a.unwrap(), b.unwrap());
+    }
+    let seed = async || {
+        let response = app.create(pictures::png(0), &[("box", BOX)]).await;
+        let created = expect(response, StatusCode::CREATED).await;
+        created["params"]["seed"].as_u64().unwrap()
+    };
+    assert_ne!(seed().await, seed().await);
+}
+
+#[tokio::test]
+async fn single_parameters_override_the_preset() {
+    let app = TestApplication::start().await;
+    let params = [("params", r#"{"alpha": 0.25, "particles": 50}"#)];
+    let query = [("box", BOX), ("preset", "paper"), params[0]];
+    let created = expect(
+        app.create(pictures::png(0), &query).await,
+        StatusCode::CREATED,
+    )
+    .await;
+    assert_eq!(created["params"]["alpha"], 0.25);
+    assert_eq!(created["params"]["particles"], 50);
+    assert_eq!(created["params"]["bag_size"], 10);
+
+    for (params, named) in [
+        (r#"{"colour": 1}"#, "`bag_size`"),
+        (r#"{"alpha": "high"}"#, "`alpha`"),
+        (r#"{"alpha": 7}"#, "alpha"),
+    ] {
+        let query = [("box", BOX), ("params", params)];
+        let response = app.create(pictures::png(0), &query).await;
+        let problem = expect_problem(response, "invalid-parameter").await;
+        assert!(
+            problem["detail"].as_str().unwrap().contains(named),
+            "{problem}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn the_page_the_docs_and_the_health_are_served() {
+    let app = TestApplication::start().await;
+    let page = app.get("/").await.text().await.unwrap();
+    assert!(page.contains("curl") && page.contains("/docs/") && page.contains("/openapi.json"));
+    // `/docs` redirects to `/docs/`, and the client follows.
+    let docs = app.get("/docs").await;
+    assert_eq!(docs.url().path(), "/docs/");
+    let docs = docs.text().await.unwrap();
+    for name in [
+        "swagger-ui.css",
+        "swagger-ui-bundle.js",
+        "swagger-initializer.js",
+    ] {
+        assert!(docs.contains(name));
+        let file = app.get(&format!("/docs/{name}")).await;
+        assert_eq!(file.status(), StatusCode::OK, "{name}");
+    }
+    let html = docs + &page;
+    assert!(
+        !html.contains("src=\"http") && !html.contains("href=\"http"),
+        "another host"
+    );
+    expect_problem(app.get("/docs/none.js").await, "route-not-found").await;
+    for path in ["/healthz", "/readyz"] {
+        let health = expect(app.get(path).await, StatusCode::OK).await;
+        assert_eq!(health["status"], "ok");
+    }
+}
+
+#[tokio::test]
+async fn a_sane_request_id_is_kept_and_another_replaced() {
+    let app = TestApplication::start().await;
+    let answered_id = async |sent: &str| {
+        let request = app.request(reqwest::Method::GET, "/healthz", &[]);
+        let response = request.header("x-request-id", sent).send().await.unwrap();
+        response.headers()["x-request-id"]
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    assert_eq!(answered_id("trace-12.3").await, "trace-12.3");
+    for sent in ["", "with space", "<script>", &"x".repeat(65)] {
+        assert_ne!(answered_id(sent).await, sent);
+    }
+}

@@ -1,0 +1,94 @@
+//! Real video over HTTP.
+
+use crate::application::{TestApplication, expect};
+use bagtrack::ingest::{self, Limits};
+use bagtrack::tracker::{Estimate, Preset, Rect, Tracker};
+use reqwest::StatusCode;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn coke() -> PathBuf {
+    let root = std::env::var_os("BAGTRACK_SEQUENCES");
+    PathBuf::from(root.expect("BAGTRACK_SEQUENCES names the folder of the eight videos"))
+        .join("Coke")
+}
+
+fn frames(folder: &Path) -> Vec<Vec<u8>> {
+    let entries = std::fs::read_dir(folder.join("img")).unwrap();
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths
+        .iter()
+        .map(|path| std::fs::read(path).unwrap())
+        .collect()
+}
+
+/// The first box, in pixels counted from 0.
+fn first_box(folder: &Path) -> [f64; 4] {
+    let text = std::fs::read_to_string(folder.join("groundtruth_rect.txt")).unwrap();
+    let line = text.lines().next().unwrap();
+    let numbers = line
+        .split([',', '\t', ' '])
+        .map(|number| number.parse().unwrap());
+    let [x, y, width, height] = numbers.collect::<Vec<f64>>()[..] else {
+        panic!("{line} is no box")
+    };
+    [x - 1.0, y - 1.0, width, height]
+}
+
+fn assert_same(answer: &Value, estimate: &Estimate) {
+    assert_eq!(answer["frame"], estimate.frame);
+    let target = estimate.target;
+    for (name, value) in [
+        ("x", target.x),
+        ("y", target.y),
+        ("width", target.width),
+        ("height", target.height),
+    ] {
+        let got = answer["box"][name].as_f64().unwrap();
+        assert_eq!(
+            got.to_bits(),
+            value.to_bits(),
+            "frame {}: {name} {got} {value}",
+            estimate.frame
+        );
+    }
+    assert_eq!(answer["score"].as_f64().unwrap() as f32, estimate.score);
+}
+
+#[tokio::test]
+#[ignore = "needs the eight videos: set BAGTRACK_SEQUENCES to their folder"]
+async fn coke_over_http_gives_the_librarys_boxes() {
+    let folder = coke();
+    let frames = frames(&folder);
+    assert!(frames.len() > 100);
+    let [x, y, width, height] = first_box(&folder);
+    let limits = Limits::default();
+    let mut params = Preset::Paper.params();
+    params.seed = 7;
+    let target = Rect {
+        x,
+        y,
+        width,
+        height,
+    };
+    let first = ingest::decode(&frames[0], &limits).unwrap();
+    let mut tracker = Tracker::new(&first, target, params).unwrap();
+
+    let app = TestApplication::start().await;
+    let text = format!("{x},{y},{width},{height}");
+    let query = [("box", text.as_str()), ("preset", "paper"), ("seed", "7")];
+    let created = expect(
+        app.create(frames[0].clone(), &query).await,
+        StatusCode::CREATED,
+    )
+    .await;
+    let id = created["id"].as_str().unwrap();
+    for frame in &frames[1..] {
+        let decoded = ingest::decode(frame, &limits).unwrap();
+        let estimate = tracker.step(&decoded).unwrap();
+        let answer = expect(app.post_frame(id, frame.clone()).await, StatusCode::OK).await;
+        assert_same(&answer, &estimate);
+    }
+    assert_eq!(app.frames_of(id).await, frames.len() as u64);
+}

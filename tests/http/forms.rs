@@ -1,0 +1,252 @@
+//! The three request forms: the same frames in each give the same answers.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use image::ImageFormat;
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, Response, StatusCode};
+use serde_json::{Value, json};
+
+async fn post_form(app: &TestApplication, method: Method, path: &str, form: Form) -> Response {
+    let request = app.request(method, path, &[]);
+    request.multipart(form).send().await.unwrap()
+}
+
+async fn post_json(app: &TestApplication, method: Method, path: &str, body: &Value) -> Response {
+    app.request(method, path, &[])
+        .json(body)
+        .send()
+        .await
+        .unwrap()
+}
+
+fn part(frame: Vec<u8>) -> Part {
+    Part::bytes(frame).file_name("frame.png")
+}
+
+fn base64(frame: Vec<u8>) -> String {
+    BASE64_STANDARD.encode(frame)
+}
+
+async fn id_of(response: Response) -> String {
+    let created = expect(response, StatusCode::CREATED).await;
+    assert_eq!(created["params"]["alpha"], 0.25);
+    assert_eq!(created["params"]["seed"], 7);
+    created["id"].as_str().unwrap().to_owned()
+}
+
+#[tokio::test]
+async fn the_three_forms_give_the_same_answers() {
+    let app = TestApplication::start().await;
+    let path = "/sessions";
+    let query = [
+        ("box", BOX),
+        ("preset", "paper"),
+        ("seed", "7"),
+        ("params", r#"{"alpha":0.25}"#),
+    ];
+    let raw = id_of(app.create(pictures::png(0), &query).await).await;
+    let form = Form::new().part("frame", part(pictures::png(0)));
+    let form = form
+        .text("box", BOX)
+        .text("preset", "paper")
+        .text("seed", "7");
+    let form = form.text("params", r#"{"alpha": 0.25}"#);
+    let multipart = id_of(post_form(&app, Method::POST, path, form).await).await;
+    let body = json!({
+        "frame": base64(pictures::png(0)), "box": {"x": 20, "y": 15, "width": 16, "height": 12},
+        "preset": "paper", "seed": 7, "params": {"alpha": 0.25},
+    });
+    let as_json = id_of(post_json(&app, Method::POST, path, &body).await).await;
+
+    let frames = |id: &str| format!("/sessions/{id}/frames");
+    let a = app.post_frame(&raw, pictures::png(1)).await;
+    let form = Form::new().part("frame", part(pictures::png(1)));
+    let b = post_form(&app, Method::POST, &frames(&multipart), form).await;
+    let body = json!({"frame": base64(pictures::png(1))});
+    let c = post_json(&app, Method::POST, &frames(&as_json), &body).await;
+    let a = expect(a, StatusCode::OK).await;
+    assert_eq!(a["frame"], 1);
+    assert_eq!(a, expect(b, StatusCode::OK).await);
+    assert_eq!(a, expect(c, StatusCode::OK).await);
+
+    let target = |id: &str| format!("/sessions/{id}/target");
+    let a = app
+        .put_target(&raw, pictures::png(2), &[("box", "24,17,16,12")])
+        .await;
+    let form = Form::new().part("frame", part(pictures::png(2)));
+    let form = form.text("box", r#"{"x": 24, "y": 17, "width": 16, "height": 12}"#);
+    let b = post_form(&app, Method::PUT, &target(&multipart), form).await;
+    let body = json!({"frame": base64(pictures::png(2)), "box": "24,17,16,12"});
+    let c = post_json(&app, Method::PUT, &target(&as_json), &body).await;
+    let a = expect(a, StatusCode::OK).await;
+    assert_eq!(a["frame"], 2);
+    assert_eq!(a, expect(b, StatusCode::OK).await);
+    assert_eq!(a, expect(c, StatusCode::OK).await);
+
+    let mut singly = Vec::new();
+    for t in 3..6 {
+        singly.push(expect(app.post_frame(&raw, pictures::png(t)).await, StatusCode::OK).await);
+    }
+    let form = (3..6).fold(Form::new(), |form, t| {
+        form.part("frame", part(pictures::png(t)))
+    });
+    let b = post_form(&app, Method::POST, &frames(&multipart), form).await;
+    let body = json!({"frames": (3..6).map(|t| base64(pictures::png(t))).collect::<Vec<_>>()});
+    let c = post_json(&app, Method::POST, &frames(&as_json), &body).await;
+    let answers = json!({ "answers": singly });
+    assert_eq!(answers, expect(b, StatusCode::OK).await);
+    assert_eq!(answers, expect(c, StatusCode::OK).await);
+}
+
+#[tokio::test]
+async fn a_raw_body_needs_no_right_content_type() {
+    let app = TestApplication::start().await;
+    for media_type in [
+        "application/x-www-form-urlencoded",
+        "image/jpeg",
+        "text/plain",
+        "nonsense",
+    ] {
+        let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+        let request = request
+            .header("content-type", media_type)
+            .body(pictures::png(0));
+        let response = request.send().await.unwrap();
+        assert_eq!(response.status(), StatusCode::CREATED, "{media_type}");
+    }
+    // What `curl -d '{...}'` sends.
+    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let request = request.header("content-type", "application/x-www-form-urlencoded");
+    let body = json!({"frame": base64(pictures::png(0))}).to_string();
+    let response = request.body(body).send().await.unwrap();
+    assert_eq!(response.status(), StatusCode::CREATED);
+}
+
+#[tokio::test]
+async fn jpeg_png_and_webp_are_told_by_their_bytes() {
+    let app = TestApplication::start().await;
+    for format in [ImageFormat::Jpeg, ImageFormat::Png, ImageFormat::WebP] {
+        let frame = pictures::encode(pictures::scene(0), format);
+        let response = app.create(frame, &[("box", BOX)]).await;
+        assert_eq!(response.status(), StatusCode::CREATED, "{format:?}");
+    }
+}
+
+#[tokio::test]
+async fn base64_may_be_a_data_url_broken_into_lines_or_unpadded() {
+    let app = TestApplication::start().await;
+    let plain = base64(pictures::png(0));
+    let lines: Vec<&str> = plain
+        .as_bytes()
+        .chunks(76)
+        .map(|line| str::from_utf8(line).unwrap())
+        .collect();
+    for frame in [
+        format!("data:image/png;base64,{plain}"),
+        lines.join("\n"),
+        plain.trim_end_matches('=').to_owned(),
+    ] {
+        let body = json!({"frame": frame, "box": BOX});
+        let response = post_json(&app, Method::POST, "/sessions", &body).await;
+        assert_eq!(response.status(), StatusCode::CREATED);
+    }
+}
+
+#[tokio::test]
+async fn unknown_and_doubled_names_are_refused_and_the_known_ones_named() {
+    let app = TestApplication::start().await;
+    let png = pictures::png(0);
+    let query = [("bxo", BOX)];
+    let by_query = app.create(png.clone(), &query).await;
+    let form = Form::new()
+        .part("frame", part(png.clone()))
+        .text("bxo", BOX);
+    let by_form = post_form(&app, Method::POST, "/sessions", form).await;
+    let body = json!({"frame": base64(png.clone()), "bxo": BOX});
+    let by_json = post_json(&app, Method::POST, "/sessions", &body).await;
+    for response in [by_query, by_form, by_json] {
+        let problem = expect_problem(response, "malformed-request").await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(
+            detail.contains("`bxo`") && detail.contains("`box`"),
+            "{detail}"
+        );
+    }
+    let form = Form::new()
+        .part("frame", part(png.clone()))
+        .text("box", BOX);
+    let doubled = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let doubled = doubled.multipart(form).send().await.unwrap();
+    let problem = expect_problem(doubled, "malformed-request").await;
+    assert!(problem["detail"].as_str().unwrap().contains("twice"));
+}
+
+#[tokio::test]
+async fn what_cannot_be_read_is_a_problem_in_every_form() {
+    let app = TestApplication::start().await;
+    let post = |media_type: &str, body: &str| {
+        let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+        let request = request
+            .header("content-type", media_type)
+            .body(body.to_owned());
+        async { request.send().await.unwrap() }
+    };
+    for body in [
+        "{",
+        "[]",
+        "",
+        r#"{"frame": 5}"#,
+        r#"{"frame": "%%"}"#,
+        r#"{"frame": "data:x"}"#,
+    ] {
+        expect_problem(post("application/json", body).await, "malformed-request").await;
+    }
+    for (media_type, body) in [
+        ("multipart/form-data", "x"),
+        ("multipart/form-data; boundary=b", "--b\r\ncut short"),
+    ] {
+        expect_problem(post(media_type, body).await, "malformed-request").await;
+    }
+    for query in [
+        [("box", "1,2,3")],
+        [("seed", "-1")],
+        [("preset", "best")],
+        [("params", "7")],
+    ] {
+        let response = app.create(pictures::png(0), &query).await;
+        expect_problem(response, "malformed-request").await;
+    }
+    for body in ["{}", r#"{"frame": null}"#, r#"{"frame": ""}"#] {
+        expect_problem(post("application/json", body).await, "missing-frame").await;
+    }
+}
+
+#[tokio::test]
+async fn a_bad_frame_in_a_batch_is_named_and_none_is_tracked() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let path = format!("/sessions/{id}/frames");
+    for (bad, slug) in [
+        (b"no image".to_vec(), "unsupported-image"),
+        (pictures::png(2)[..200].to_vec(), "frame-damaged"),
+        (pictures::png_of(50, 50), "frame-size-mismatch"),
+        (Vec::new(), "missing-frame"),
+    ] {
+        let form = Form::new()
+            .part("frame", part(pictures::png(1)))
+            .part("frame", part(bad));
+        let problem = expect_problem(post_form(&app, Method::POST, &path, form).await, slug).await;
+        assert_eq!(problem["index"], 1);
+        assert!(
+            problem["detail"]
+                .as_str()
+                .unwrap()
+                .starts_with("Frame 2 of 2"),
+            "{problem}"
+        );
+        assert_eq!(app.frames_of(&id).await, 1);
+    }
+}

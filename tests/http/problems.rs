@@ -1,0 +1,68 @@
+//! Every problem in the OpenAPI document, provoked.
+
+use crate::application::expect_problem;
+use crate::provoke::{Attempt, Blocked, Operation};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+/// Every operation with every problem type that the document says it may answer.
+fn documented() -> Vec<(Operation, String)> {
+    let document = serde_json::to_value(bagtrack::http::openapi_document()).unwrap();
+    let mut documented = Vec::new();
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for (method, operation) in methods.as_object().unwrap() {
+            for (status, response) in operation["responses"].as_object().unwrap() {
+                let examples = &response["content"]["application/problem+json"]["examples"];
+                for (slug, example) in examples.as_object().into_iter().flatten() {
+                    assert_eq!(example["value"]["status"].to_string(), *status, "{slug}");
+                    documented.push((Operation::new(method, path), slug.clone()));
+                }
+                let is_error = status.starts_with(['4', '5']);
+                assert_eq!(
+                    is_error,
+                    examples != &Value::Null,
+                    "{method} {path} {status}"
+                );
+            }
+        }
+    }
+    documented
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn every_documented_problem_can_be_provoked_and_changes_no_session() {
+    let documented = documented();
+    let kinds: BTreeSet<&str> = documented.iter().map(|(_, slug)| slug.as_str()).collect();
+    assert!(kinds.len() >= 20 && documented.len() >= 50, "{kinds:?}");
+    for (operation, slug) in &documented {
+        if slug == "work-timeout" {
+            continue;
+        }
+        println!("{} {}: {slug}", operation.method, operation.path);
+        let attempt = Attempt::provoke(operation, slug).await;
+        let response = attempt.send().await;
+        expect_problem(response, slug).await;
+        if let Some(frames) = attempt.frames_of_the_session().await {
+            assert_eq!(frames, 1, "{slug}");
+        }
+    }
+}
+
+#[test]
+fn work_that_waits_too_long_is_a_problem_wherever_it_is_documented() {
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    runtime.block_on(async {
+        let blocked = Blocked::start().await;
+        let documented = documented();
+        let operations = documented.iter().filter(|(_, slug)| slug == "work-timeout");
+        let attempts = operations.map(|(operation, _)| blocked.attempt(operation));
+        let responses = futures_util::future::join_all(attempts).await;
+        assert!(responses.len() >= 4);
+        for response in responses {
+            expect_problem(response, "work-timeout").await;
+        }
+        blocked.finish().await;
+    });
+    // The work goes on after its requests have been answered; nobody needs to wait for it here.
+    runtime.shutdown_background();
+}

@@ -1,0 +1,214 @@
+//! How each problem is provoked: a request that would succeed, with one thing wrong.
+
+use crate::application::{BOX, TestApplication};
+use crate::pictures;
+use crate::raw::RawConnection;
+use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE};
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, Response, StatusCode};
+use std::time::Duration;
+
+/// An operation of the OpenAPI document.
+#[derive(Clone)]
+pub struct Operation {
+    pub method: Method,
+    pub path: String,
+}
+
+impl Operation {
+    pub fn new(method: &str, path: &str) -> Self {
+        Self {
+            method: method.to_uppercase().parse().unwrap(),
+            path: path.to_owned(),
+        }
+    }
+
+    fn takes_frames(&self) -> bool {
+        matches!(self.method, Method::POST | Method::PUT)
+    }
+}
+
+/// A request that is about to fail.
+pub struct Attempt {
+    app: TestApplication,
+    /// A session that stands at its first frame.
+    id: Option<String>,
+    /// Requests that are kept inside.
+    _held: Option<RawConnection>,
+    method: Method,
+    path: String,
+    query: Vec<(&'static str, &'static str)>,
+    body: Vec<u8>,
+    frames: usize,
+    media_type: Option<&'static str>,
+    /// Sends the head alone.
+    without_body: bool,
+}
+
+fn settings(slug: &str, config: &mut Config) {
+    match slug {
+        "body-timeout" => config.body_timeout = Duration::from_millis(50),
+        "body-too-large" => config.max_body_bytes = pictures::png(0).len() + 10,
+        "frame-too-large" => config.max_frame_side = pictures::WIDTH,
+        "too-many-frames" => config.max_frames = 2,
+        "too-many-sessions" => config.max_sessions = 1,
+        "session-busy" => config.session_queue = 1,
+        "queue-full" => config.queue = 1,
+        "not-ready" => config.shutdown_delay = Duration::from_secs(600),
+        _ => {}
+    }
+}
+
+impl Attempt {
+    /// A service and a request to this operation that meets this problem.
+    pub async fn provoke(operation: &Operation, slug: &str) -> Self {
+        let app = TestApplication::start_with(|config| settings(slug, config)).await;
+        let id = app.open().await;
+        let mut attempt = Self {
+            app,
+            id: Some(id.clone()),
+            _held: None,
+            method: operation.method.clone(),
+            path: operation.path.replace("{id}", &id),
+            query: Vec::new(),
+            body: Vec::new(),
+            frames: 1,
+            media_type: None,
+            without_body: false,
+        };
+        if operation.takes_frames() {
+            attempt.body = pictures::png(0);
+            if !operation.path.ends_with("/frames") {
+                attempt.query.push(("box", BOX));
+            }
+        }
+        attempt.spoil(slug, &operation.path).await;
+        attempt
+    }
+
+    async fn spoil(&mut self, slug: &str, template: &str) {
+        match slug {
+            "malformed-request" => self.query.push(("colour", "red")),
+            "missing-frame" => self.body.clear(),
+            "missing-box" => self.query.clear(),
+            "session-not-found" => {
+                self.path = template.replace("{id}", "67e55044-10b1-426f-9247-bb680e5fe0c8");
+            }
+            "body-timeout" => self.without_body = true,
+            "frame-out-of-order" => self.query.push(("frame", "9")),
+            "frame-differs" => {
+                self.query.push(("frame", "0"));
+                self.body = pictures::png(5);
+            }
+            "body-too-large" => self.body.extend([0; 1000]),
+            "frame-too-large" => self.body = pictures::png_of(pictures::WIDTH + 1, 72),
+            "too-many-frames" => self.frames = 3,
+            "unsupported-image" => self.body = b"GIF89a is not taken".to_vec(),
+            "frame-damaged" => self.body.truncate(300),
+            "frame-size-mismatch" => self.body = pictures::png_of(64, 48),
+            "invalid-box" => self.query = vec![("box", "1000,1000,10,10")],
+            "invalid-parameter" => self.query.push(("params", r#"{"alpha": 7}"#)),
+            "invalid-snapshot" => {
+                self.query.clear();
+                self.media_type = Some(SNAPSHOT_MEDIA_TYPE);
+            }
+            "session-busy" | "queue-full" => {
+                let id = self.id.as_ref().unwrap();
+                let target = format!("/sessions/{id}/frames");
+                let held = RawConnection::hold(self.app.address, "POST", &target, 1000);
+                self._held = Some(held.await);
+            }
+            // Every operation answers a panic through the same layer; no input makes the real ones panic.
+            "internal" => (self.method, self.path) = (Method::GET, "/panic".to_owned()),
+            "not-ready" => {
+                self.app.shut_down();
+                while self.app.get("/readyz").await.status() == StatusCode::OK {}
+            }
+            "too-many-sessions" => {}
+            other => panic!("nothing provokes {other}: add it here"),
+        }
+    }
+
+    pub async fn send(&self) -> Response {
+        let mut request = self
+            .app
+            .request(self.method.clone(), &self.path, &self.query);
+        if self.without_body {
+            let never = futures_util::stream::pending::<Result<Vec<u8>, std::io::Error>>();
+            return request
+                .body(reqwest::Body::wrap_stream(never))
+                .send()
+                .await
+                .unwrap();
+        }
+        if let Some(media_type) = self.media_type {
+            request = request.header("content-type", media_type);
+        }
+        let request = if self.frames > 1 {
+            let part = || Part::bytes(self.body.clone()).file_name("frame.png");
+            let form = (0..self.frames).fold(Form::new(), |form, _| form.part("frame", part()));
+            request.multipart(form)
+        } else {
+            request.body(self.body.clone())
+        };
+        request.send().await.unwrap()
+    }
+
+    /// Frames that the session has taken: the problem must not have changed it.
+    pub async fn frames_of_the_session(&self) -> Option<u64> {
+        match &self.id {
+            Some(id) => Some(self.app.frames_of(id).await),
+            None => None,
+        }
+    }
+}
+
+/// A service whose only worker has much to do.
+pub struct Blocked {
+    app: TestApplication,
+    id: String,
+}
+
+impl Blocked {
+    pub async fn start() -> Self {
+        let app = TestApplication::start_with(|config| {
+            config.workers = Some(1);
+            config.max_frames = 200;
+            config.work_timeout = Duration::from_secs(1);
+        });
+        let app = app.await;
+        let id = app.open().await;
+        // The most expensive parameters there are.
+        let params = r#"{"particles": 1000, "patch_width": 64, "patch_height": 64, "bag_size": 32,
+            "update_every": 1, "history": 10, "basis_dim": 6}"#;
+        let query = [("box", BOX), ("params", params)];
+        let response = app.create(pictures::png(0), &query).await;
+        let heavy = response.headers()["location"].to_str().unwrap().to_owned();
+        let part = || Part::bytes(pictures::png(1)).file_name("frame.png");
+        let form = (0..200).fold(Form::new(), |form, _| form.part("frame", part()));
+        let request = app.request(Method::POST, &format!("{heavy}/frames"), &[]);
+        // It too is told that it took too long, and keeps the worker.
+        let response = request.multipart(form).send().await.unwrap();
+        assert_eq!(response.status(), StatusCode::SERVICE_UNAVAILABLE);
+        Self { app, id }
+    }
+
+    pub async fn attempt(&self, operation: &Operation) -> Response {
+        let path = operation.path.replace("{id}", &self.id);
+        let query: &[(&str, &str)] =
+            match operation.path.ends_with("/frames") || !operation.takes_frames() {
+                true => &[],
+                false => &[("box", BOX)],
+            };
+        let mut request = self.app.request(operation.method.clone(), &path, query);
+        if operation.takes_frames() {
+            request = request.body(pictures::png(0));
+        }
+        request.send().await.unwrap()
+    }
+
+    /// What timed out while it waited was not done.
+    pub async fn finish(self) {
+        assert_eq!(self.app.frames_of(&self.id).await, 1);
+    }
+}

@@ -1,0 +1,51 @@
+//! A client that speaks HTTP by hand, to send slowly or not at all.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+/// Longer than any test waits for something that does happen.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+pub struct RawConnection {
+    stream: TcpStream,
+}
+
+impl RawConnection {
+    pub async fn open(address: SocketAddr) -> Self {
+        let stream = TcpStream::connect(address).await.unwrap();
+        Self { stream }
+    }
+
+    pub async fn send(&mut self, bytes: impl AsRef<[u8]>) {
+        self.stream.write_all(bytes.as_ref()).await.unwrap();
+    }
+
+    /// Announces a body of `length` bytes and waits until the service asks for it: from then on the request is
+    /// inside, and it stays there until the body is sent.
+    pub async fn hold(address: SocketAddr, method: &str, target: &str, length: usize) -> Self {
+        let mut connection = Self::open(address).await;
+        let head = format!(
+            "{method} {target} HTTP/1.1\r\nHost: test\r\nContent-Length: {length}\r\n\
+             Expect: 100-continue\r\nConnection: close\r\n\r\n"
+        );
+        connection.send(head).await;
+        let expected = b"HTTP/1.1 100 Continue\r\n\r\n";
+        let mut got = [0; 25];
+        let read = connection.stream.read_exact(&mut got);
+        timeout(PATIENCE, read).await.unwrap().unwrap();
+        assert_eq!(&got, expected);
+        connection
+    }
+
+    /// Everything until the service closes the connection.
+    pub async fn read_to_end(&mut self) -> String {
+        let mut bytes = Vec::new();
+        let read = self.stream.read_to_end(&mut bytes);
+        // A connection that is cut off counts as closed.
+        let _ = timeout(PATIENCE, read).await.expect("the connection ends");
+        String::from_utf8(bytes).unwrap()
+    }
+}
