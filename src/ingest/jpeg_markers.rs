@@ -127,8 +127,7 @@ impl Markers {
             .iter()
             .map(|&(h, v)| u64::from(h) * u64::from(v) * unit_columns * unit_rows)
             .sum();
-        // Twice the rows: the decoder does so when it leaves out vertically subsampled colour.
-        output + row_buffers + blocks * 64 * 2 * 2
+        output + row_buffers + blocks * 64 * 2
     }
 
     /// Whether there are fewer bits of picture than any encoder needs: at least one for each 8 x 8 block of the

@@ -1,0 +1,104 @@
+//! The curl session of the README, run as it is typed.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+/// The service, ended with the test.
+struct Service {
+    process: Child,
+    url: String,
+}
+
+impl Service {
+    fn start() -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_bagtrack"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--log", "info"])
+            .env("NO_COLOR", "1")
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("cargo has built the binary");
+        let log = process.stderr.take().expect("it is piped");
+        let mut lines = BufReader::new(log).lines().map_while(Result::ok);
+        let url = lines
+            .find_map(|line| Some(line.split_once("listening on ")?.1.trim().to_owned()))
+            .expect("the service says where it listens");
+        // Keep reading, or the service would wait for room to log.
+        std::thread::spawn(move || lines.for_each(drop));
+        Self { process, url }
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        self.process.kill().expect("it is our own process");
+        self.process.wait().expect("it was killed");
+    }
+}
+
+/// The first shell block after the heading.
+fn block(readme: &str, heading: &str) -> String {
+    let (_, section) = readme
+        .split_once(heading)
+        .expect("the README has the section");
+    let (_, block) = section
+        .split_once("```sh\n")
+        .expect("the section has a shell block");
+    block
+        .split_once("```")
+        .expect("the block ends")
+        .0
+        .to_owned()
+}
+
+#[test]
+#[ignore = "needs curl (and bash): apt-get install curl"]
+fn the_readmes_curl_session_works_as_typed() {
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let readme = std::fs::read_to_string(readme).expect("the package has a README");
+    let session = block(&readme, "## A session with curl");
+    let service = Service::start();
+    let folder = tempfile::tempdir().expect("the system has a place for temporary folders");
+    // Only what differs from a user's machine: where the binary is, and the port; and errors end the script.
+    let script = session
+        .replace("cargo run --release --", env!("CARGO_BIN_EXE_bagtrack"))
+        .replace("http://127.0.0.1:8080", &service.url)
+        .replace(
+            "curl ",
+            "curl --silent --show-error --fail-with-body --write-out '\\n' ",
+        );
+    assert!(
+        script.contains(&service.url) && !script.contains("cargo run"),
+        "{script}"
+    );
+    let output = Command::new("bash")
+        .args(["-euo", "pipefail", "-c", &script])
+        .current_dir(folder.path())
+        .output()
+        .expect("bash runs");
+    let (answers, errors) = (
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr),
+    );
+    assert!(output.status.success(), "{answers}\n{errors}");
+    let documents: Vec<serde_json::Value> = answers
+        .lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .collect();
+    // One frame, two frames, one twice, a correction, the state, the restored session.
+    assert_eq!(documents.len(), 7, "{answers}");
+    assert_eq!(documents[0]["frame"], 1);
+    assert_eq!(documents[1]["answers"][1]["frame"], 3);
+    assert_eq!(
+        documents[2], documents[3],
+        "the same frame gets the same answer"
+    );
+    assert_eq!(documents[2]["frame"], 4);
+    assert_eq!(documents[4]["box"]["x"], 41.0);
+    assert_eq!(documents[5]["frames"], 6);
+    assert_eq!(
+        documents[6]["frame"], 5,
+        "the snapshot goes on where the session stood"
+    );
+    assert_eq!(documents[6]["box"]["x"], 41.0);
+}
