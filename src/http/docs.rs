@@ -4,6 +4,7 @@ use super::openapi;
 use super::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::Path;
+use axum::extract::rejection::PathRejection;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::response::{IntoResponse, Redirect, Response};
 use std::sync::{Arc, LazyLock};
@@ -34,7 +35,8 @@ pub async fn index() -> Result<Response, Problem> {
 }
 
 /// `/docs/{file}`.
-pub async fn asset(Path(path): Path<String>) -> Result<Response, Problem> {
+pub async fn asset(path: Result<Path<String>, PathRejection>) -> Result<Response, Problem> {
+    let Path(path) = path.map_err(|_| Problem::route_not_found())?;
     file(&path)
 }
 

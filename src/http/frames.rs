@@ -4,6 +4,7 @@ use super::answer::{Answer, Answers};
 use super::openapi;
 use super::problem::Problem;
 use super::problem_kind::Kind;
+use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload::Form;
 use super::work;
@@ -12,7 +13,7 @@ use crate::sessions::{Fingerprint, Locked, Turn};
 use crate::tracker::{Estimate, GrayFrame, TrackerError};
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 
 const FORM: Form = Form {
@@ -99,11 +100,11 @@ impl utoipa::IntoResponses for Problems {
 )]
 pub async fn post(
     State(state): State<AppState>,
-    Path(id): Path<String>,
+    path: SessionPath,
     request: Request,
 ) -> Result<Response, Problem> {
     let fields = FORM.query(request.uri())?;
-    let session = state.session(&id)?;
+    let session = path.find(&state)?;
     let queue = state.enter(request.headers())?;
     let place = session.enter().map_err(|_| Problem::session_busy())?;
     let upload = FORM.read(&state, &queue, fields, request).await?;

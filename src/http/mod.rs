@@ -32,6 +32,7 @@ mod problem_kind;
 mod router;
 mod server;
 mod session;
+mod session_path;
 mod snapshot;
 mod state;
 mod target;

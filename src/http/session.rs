@@ -4,11 +4,12 @@ use super::answer::{Answer, ImageSize};
 use super::openapi;
 use super::problem::Problem;
 use super::problem_kind::Kind;
+use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload;
 use crate::tracker::Params;
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{StatusCode, Uri};
 use serde::Serialize;
 use uuid::Uuid;
@@ -53,11 +54,11 @@ impl utoipa::IntoResponses for Problems {
 )]
 pub async fn get(
     State(state): State<AppState>,
-    Path(id): Path<String>,
+    path: SessionPath,
     uri: Uri,
 ) -> Result<Json<SessionView>, Problem> {
     upload::NOTHING.query(&uri)?;
-    let session = state.session(&id)?;
+    let session = path.find(&state)?;
     let latest = session.latest();
     Ok(Json(SessionView {
         id: session.id(),
@@ -79,11 +80,11 @@ pub async fn get(
 )]
 pub async fn delete(
     State(state): State<AppState>,
-    Path(id): Path<String>,
+    path: SessionPath,
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     upload::NOTHING.query(&uri)?;
-    let session = state.session(&id)?;
+    let session = path.find(&state)?;
     match state.registry.remove(session.id()) {
         true => {
             tracing::info!(session = %session.id(), "deleted");

@@ -3,10 +3,11 @@
 use super::openapi;
 use super::problem::Problem;
 use super::problem_kind::Kind;
+use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload;
 use super::work;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -46,11 +47,11 @@ impl utoipa::IntoResponses for Problems {
 )]
 pub async fn get(
     State(state): State<AppState>,
-    Path(id): Path<String>,
+    path: SessionPath,
     uri: Uri,
 ) -> Result<Response, Problem> {
     upload::NOTHING.query(&uri)?;
-    let session = state.session(&id)?;
+    let session = path.find(&state)?;
     let queue = state
         .admission
         .enter(0)

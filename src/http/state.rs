@@ -7,7 +7,6 @@ use axum::http::HeaderMap;
 use axum::http::header::CONTENT_LENGTH;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use uuid::Uuid;
 
 /// What all handlers share; clones are the same state.
 #[derive(Debug, Clone)]
@@ -68,13 +67,6 @@ impl AppState {
         self.admission
             .enter(room)
             .map_err(|_| Problem::queue_full())
-    }
-
-    /// The live session that a path names. Text that is no id names no session.
-    pub fn session(&self, id: &str) -> Result<Arc<Session>, Problem> {
-        let id = Uuid::parse_str(id).ok();
-        id.and_then(|id| self.registry.get(id))
-            .ok_or_else(Problem::session_not_found)
     }
 
     /// When the session expires, in RFC 3339.

@@ -127,3 +127,42 @@ impl Registry {
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sessions::{Admission, Fingerprint};
+    use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
+
+    fn state() -> State {
+        let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
+        let frame = GrayFrame::from_luma(64, 48, luma).unwrap();
+        let target = Rect {
+            x: 10.0,
+            y: 10.0,
+            width: 20.0,
+            height: 16.0,
+        };
+        let tracker = Tracker::new(&frame, target, Preset::Paper.params()).unwrap();
+        State::new(tracker, Fingerprint::of(b"first"), target)
+    }
+
+    #[tokio::test]
+    async fn a_session_whose_work_panicked_has_ended() {
+        let idle = Duration::from_secs(600);
+        let registry = Registry::new(9, 9, idle, Clock::default());
+        let session = registry.insert(state()).unwrap();
+        let mut locked = session.enter().unwrap().lock().await.unwrap();
+        let waiting = session.enter().unwrap();
+        let admission = Admission::new(9, 0, 1);
+        let work = move || {
+            let _state = locked.state();
+            panic!("a test panics in the work");
+        };
+        let panicked: Result<(), _> = admission.run(admission.enter(0).unwrap(), work).await;
+        assert!(panicked.is_err());
+        assert!(waiting.lock().await.is_err(), "those who wait are told");
+        assert!(registry.get(session.id()).is_none());
+        assert!(registry.is_empty());
+    }
+}

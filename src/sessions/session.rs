@@ -60,7 +60,9 @@ impl State {
         envelope::seal(&self.tracker, &self.recent)
     }
 
-    /// Whether a post is the next one or was answered before; see [`replay::judge`].
+    /// Whether a post, whose (first) frame the client calls `number`, is the next one or was answered before. `given` is
+    /// the box, where the post corrects it. Without a number every post is the next one; with one, a post that ends with
+    /// the last frame and holds nothing but frames of the last post, with the same bytes and box, is a replay.
     ///
     /// # Errors
     /// The frame number does not fit.

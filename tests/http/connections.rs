@@ -100,6 +100,8 @@ async fn a_path_or_method_that_is_not_there_is_a_problem() {
     let app = TestApplication::start().await;
     expect_problem(app.get("/session").await, "route-not-found").await;
     expect_problem(app.get("/sessions/a/b/c").await, "route-not-found").await;
+    expect_problem(app.get("/docs/%FF").await, "route-not-found").await;
+    expect_problem(app.get("/sessions/%FF").await, "session-not-found").await;
     for (method, path, allowed) in [
         (Method::GET, "/sessions", "POST"),
         (Method::PATCH, "/sessions/a", "GET,HEAD,DELETE"),
@@ -127,6 +129,7 @@ async fn an_open_request_ends_before_the_service_does() {
     let frame = pictures::png(1);
     let target = format!("/sessions/{id}/frames");
     let mut held = RawConnection::hold(app.address, "POST", &target, frame.len()).await;
+    let silent = RawConnection::open(app.address).await;
     app.shut_down();
     let refused = async { while tokio::net::TcpStream::connect(app.address).await.is_ok() {} };
     tokio::time::timeout(Duration::from_secs(60), refused)
@@ -135,7 +138,9 @@ async fn an_open_request_ends_before_the_service_does() {
     held.send(&frame).await;
     let answer = held.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    // Nor does a client that only holds a connection keep it up.
     assert!(app.ended().await);
+    drop(silent);
 }
 
 #[tokio::test]

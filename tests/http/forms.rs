@@ -225,6 +225,32 @@ async fn what_cannot_be_read_is_a_problem_in_every_form() {
 }
 
 #[tokio::test]
+async fn json_with_very_many_values_is_refused_before_it_is_parsed() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let fields: Vec<String> = (0..1000).map(|n| format!("\"f{n}\": 1")).collect();
+    for (body, slug) in [
+        (
+            format!("{{\"frames\": [{}\"\"]}}", "\"\",".repeat(1_000_000)),
+            "too-many-frames",
+        ),
+        (format!("{{{}}}", fields.join(",")), "malformed-request"),
+    ] {
+        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        let response = request.body(body).send().await.unwrap();
+        expect_problem(response, slug).await;
+    }
+    let body =
+        json!({"frame": base64(pictures::png(0)), "box": BOX, "params": " ".repeat(20_000) + "{}"});
+    let response = post_json(&app, Method::POST, "/sessions", &body).await;
+    assert_eq!(response.status(), StatusCode::CREATED, "spaces are trimmed");
+    let long = format!("{{\"alpha\": 0.5{}}}", "0".repeat(20_000));
+    let body = json!({"frame": base64(pictures::png(0)), "box": BOX, "params": long});
+    let response = post_json(&app, Method::POST, "/sessions", &body).await;
+    expect_problem(response, "malformed-request").await;
+}
+
+#[tokio::test]
 async fn a_bad_frame_in_a_batch_is_named_and_none_is_tracked() {
     let app = TestApplication::start().await;
     let id = app.open().await;

@@ -4,6 +4,9 @@ use crate::http::problem::Problem;
 use crate::tracker::{Params, Preset, Rect};
 use serde_json::{Map, Value};
 
+/// Most bytes of a setting. All parameters together need some hundred.
+const MAX_TEXT: usize = 16 << 10;
+
 /// The settings of a request.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Fields {
@@ -20,6 +23,11 @@ impl Fields {
     /// Takes in one setting. JSON values come as their text, strings without their quotes.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), Problem> {
         let text = text.trim();
+        if text.len() > MAX_TEXT {
+            return Err(Problem::malformed(format!(
+                "`{name}` is longer than {MAX_TEXT} bytes."
+            )));
+        }
         match name {
             "box" => once(&mut self.target, name, parse_box(text)?),
             "frame" => once(&mut self.number, name, parse_whole(name, text)?),

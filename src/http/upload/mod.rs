@@ -77,6 +77,11 @@ impl Form {
         request: Request,
     ) -> Result<Upload, Problem> {
         let limit = state.config.max_body_bytes;
+        let most = if self.several {
+            state.config.max_frames
+        } else {
+            1
+        };
         let media_type = media_type(&request);
         let mut upload = Upload {
             frames: Vec::new(),
@@ -84,14 +89,14 @@ impl Form {
             is_snapshot: media_type == snapshot::MEDIA_TYPE,
         };
         if media_type == "multipart/form-data" {
-            multipart::read(self, limit, request, &mut upload).await?;
+            multipart::read(self, limit, most, request, &mut upload).await?;
         } else {
             let bytes = body::read(request.into_body(), limit).await?;
             // No image and no snapshot starts like a JSON object, which curl's -d mislabels too.
             if media_type == "application/json" || bytes.starts_with(b"{") {
                 let form = *self;
                 let parse = move || {
-                    json::read(&form, &bytes, &mut upload)?;
+                    json::read(&form, most, &bytes, &mut upload)?;
                     Ok(upload)
                 };
                 upload = work::run(state, queue.clone(), parse).await?;
@@ -99,22 +104,8 @@ impl Form {
                 upload.frames.push(bytes);
             }
         }
-        self.check_frames(&upload.frames, state.config.max_frames)?;
+        check_frames(&upload.frames, most)?;
         Ok(upload)
-    }
-
-    fn check_frames(&self, frames: &[Bytes], max_frames: usize) -> Result<(), Problem> {
-        let most = if self.several { max_frames } else { 1 };
-        if frames.len() > most {
-            return Err(Problem::too_many_frames(most));
-        }
-        if frames.is_empty() {
-            return Err(Problem::missing_frame());
-        }
-        match frames.iter().position(Bytes::is_empty) {
-            Some(empty) => Err(Problem::missing_frame().of_frame(empty, frames.len())),
-            None => Ok(()),
-        }
     }
 
     /// The problem of a name that nothing here has; `frames` are the names of frames in this form.
@@ -138,6 +129,19 @@ impl Form {
                 known.join(", ")
             )
         })
+    }
+}
+
+fn check_frames(frames: &[Bytes], most: usize) -> Result<(), Problem> {
+    if frames.len() > most {
+        return Err(Problem::too_many_frames(most));
+    }
+    if frames.is_empty() {
+        return Err(Problem::missing_frame());
+    }
+    match frames.iter().position(Bytes::is_empty) {
+        Some(empty) => Err(Problem::missing_frame().of_frame(empty, frames.len())),
+        None => Ok(()),
     }
 }
 
