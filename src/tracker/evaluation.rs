@@ -66,6 +66,9 @@ impl Evaluation {
 
     /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every
     /// entry of the bag.
+    ///
+    /// # Panics
+    /// If no bag was set, there are more than P previous patches, or one of them is longer than D.
     pub fn compute(&mut self, history: &[&[f32]]) {
         self.products.compute(history);
         self.bases.compute(&self.products);

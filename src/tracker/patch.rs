@@ -103,3 +103,56 @@ pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
     PatchCutter::default().cut(image, area, params, &mut values);
     values.into_iter().map(|value| value as f32).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::Preset;
+
+    fn image(width: u32, height: u32) -> GrayFrame {
+        let luma = (0..width * height).map(|i| (i * 97 % 256) as u8).collect();
+        GrayFrame::from_luma(width, height, luma).expect("a frame of this size")
+    }
+
+    /// Bilinear interpolation at one point, pixel by pixel.
+    fn at(image: &GrayFrame, x: f64, y: f64) -> f64 {
+        let pixel = |x: f64, y: f64| {
+            let x = x.clamp(0.0, f64::from(image.width() - 1)) as usize;
+            let y = y.clamp(0.0, f64::from(image.height() - 1)) as usize;
+            f64::from(image.pixels()[y * image.width() as usize + x])
+        };
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (left, top) = (x.floor(), y.floor());
+        let (right_share, lower_share) = (x - left, y - top);
+        let row = |y| pixel(left, y) * (1.0 - right_share) + pixel(left + 1.0, y) * right_share;
+        (row(top) * (1.0 - lower_share) + row(top + 1.0) * lower_share) / 255.0
+    }
+
+    #[test]
+    fn every_cell_is_interpolated_at_its_centre() {
+        let params = Params {
+            patch_width: 7,
+            patch_height: 5,
+            ..Preset::Paper.params()
+        };
+        for (width, height) in [(40, 30), (1, 30), (40, 1), (1, 1)] {
+            let image = image(width, height);
+            for area in [
+                Rect::new(5.0, 6.0, 7.0, 5.0),
+                Rect::new(5.3, 6.8, 21.7, 3.9),
+                Rect::new(-8.0, -3.5, 20.0, 14.0),
+                Rect::new(36.0, 25.0, 30.0, 30.0),
+                Rect::new(-200.0, 300.0, 10.0, 10.0),
+            ] {
+                let patch = patch(&image, &area, &params);
+                for (i, &value) in patch.iter().enumerate() {
+                    let x = area.x + area.width * ((i % 7) as f64 + 0.5) / 7.0;
+                    let y = area.y + area.height * ((i / 7) as f64 + 0.5) / 5.0;
+                    let expected = at(&image, x, y);
+                    assert!((f64::from(value) - expected).abs() < 1e-5, "{area:?}, {i}");
+                    assert!((0.0..=1.0).contains(&value));
+                }
+            }
+        }
+    }
+}
