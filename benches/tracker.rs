@@ -20,7 +20,8 @@ const HEIGHT: usize = 240;
 
 fn texture(x: usize, y: usize, seed: u32) -> u8 {
     // Blocks of 4 x 4 pixels with hashed gray values, softened by a gradient.
-    let cell = (x / 4) as u32 * 73_856_093 ^ (y / 4) as u32 * 19_349_663 ^ seed;
+    let (column, row) = ((x / 4) as u32, (y / 4) as u32);
+    let cell = column.wrapping_mul(73_856_093) ^ row.wrapping_mul(19_349_663) ^ seed;
     let hash = cell.wrapping_mul(2_654_435_761) >> 24;
     (hash / 2 + (x * 3 + y * 2) as u32 % 120) as u8
 }

@@ -2,8 +2,11 @@
 //!
 //! V = [v, H] (equation 2). With the orthonormal Q of [`products`](super::products), q = Qᵀv, and e the unit vector
 //! of the rest v - Qq, whose length is ρ, V Vᵀ is diag(Λ, 0) + z zᵀ in the basis [Q, e], where z = (q, ρ). So the
-//! left singular vectors of V are [Q, e] times the eigenvectors of a matrix of P + 1 rows, and Uᵀf for any f follows
-//! from Qᵀf and eᵀf = (vᵀf - qᵀQᵀf) / ρ.
+//! left singular vectors of V are [Q, e] times the eigenvectors of a matrix of P + 1 rows. Since e = (v - Qq) / ρ they
+//! are as well combinations of Q and v, so Uᵀf for any f follows from Qᵀf and vᵀf.
+//!
+//! Dividing by ρ is harmless however small it is: the coordinate of a counting direction along e is ρ times a bounded
+//! number (the z of an eigenvector over its eigenvalue).
 
 use super::Params;
 use super::eigen::{self, LANES, Lanes};
@@ -20,8 +23,8 @@ pub(super) struct CandidateBases {
     limit: usize,
     /// P + 1.
     size: usize,
-    /// For each candidate n columns of P + 1 coordinates.
-    coordinates: Vec<f64>,
+    /// For each candidate n columns of P + 1 coefficients, of Q and of v.
+    coefficients: Vec<f64>,
     /// For each candidate the number of columns that count.
     dims: Vec<usize>,
     /// For each candidate ρ, or 0 if v is in the span of the history.
@@ -37,7 +40,7 @@ impl CandidateBases {
         Self {
             limit,
             size,
-            coordinates: vec![0.0; count * limit * size],
+            coefficients: vec![0.0; count * limit * size],
             dims: vec![0; count],
             rests: vec![0.0; count],
             matrix: vec![[0.0; LANES]; size * size],
@@ -56,7 +59,7 @@ impl CandidateBases {
             }
             eigen::diagonalize(&mut self.matrix, self.size, Some(&mut self.vectors));
             for lane in 0..lanes {
-                self.take(first + lane, lane);
+                self.take(products, first + lane, lane);
             }
         }
     }
@@ -86,7 +89,7 @@ impl CandidateBases {
     }
 
     /// The n dominant eigenvectors of one candidate.
-    fn take(&mut self, candidate: usize, lane: usize) {
+    fn take(&mut self, products: &Products, candidate: usize, lane: usize) {
         let size = self.size;
         let value = |j: usize| self.matrix[j * size + j][lane];
         let mut order = [0_usize; 16];
@@ -97,12 +100,20 @@ impl CandidateBases {
         order.sort_unstable_by(|&a, &b| value(b).total_cmp(&value(a)));
         let dim = subspace::dominant(order.iter().map(|&j| value(j)), self.limit);
         self.dims[candidate] = dim;
-        let block = &mut self.coordinates[candidate * self.limit * size..][..self.limit * size];
+        let block = &mut self.coefficients[candidate * self.limit * size..][..self.limit * size];
         block.fill(0.0);
+        let directions = products.of_candidate(candidate).with_directions;
         for (column, &j) in block.chunks_exact_mut(size).zip(&order[..dim]) {
-            for (r, coordinate) in column.iter_mut().enumerate() {
-                *coordinate = self.vectors[j * size + r][lane];
+            let coordinate = |r: usize| self.vectors[j * size + r][lane];
+            let of_candidate = if self.rests[candidate] > 0.0 {
+                coordinate(size - 1) / self.rests[candidate]
+            } else {
+                0.0
+            };
+            for (slot, &q) in directions.iter().enumerate() {
+                column[slot] = coordinate(slot) - of_candidate * q;
             }
+            column[size - 1] = of_candidate;
         }
     }
 
@@ -111,43 +122,23 @@ impl CandidateBases {
         self.dims[candidate]
     }
 
-    /// Uᵀ[bag] of a candidate, into `out`: for each of its n columns (zero beyond its dimension) a row as long as
-    /// the products with the bag. `rest` is a buffer for eᵀ[bag].
-    pub fn times_bag(
-        &self,
-        products: &Products,
-        candidate: usize,
-        rest: &mut Vec<f64>,
-        out: &mut Vec<f64>,
-    ) {
+    /// Uᵀ\[bag\] of a candidate, into `out`: for each of its n columns (zero beyond its dimension) a row as long as
+    /// the products with the bag.
+    pub fn times_bag(&self, products: &Products, candidate: usize, out: &mut Vec<f64>) {
         let row = products.of_candidate(candidate);
         let width = row.with_bag.len();
         let slots = self.size - 1;
-        rest.clear();
-        rest.resize(width, 0.0);
-        if self.rests[candidate] > 0.0 {
-            rest.copy_from_slice(row.with_bag);
-            for slot in 0..slots {
-                add(
-                    rest,
-                    products.of_direction(slot).with_bag,
-                    -row.with_directions[slot],
-                );
-            }
-            let scale = 1.0 / self.rests[candidate];
-            rest.iter_mut().for_each(|value| *value *= scale);
-        }
         out.clear();
         out.resize(self.limit * width, 0.0);
-        let block = &self.coordinates[candidate * self.limit * self.size..];
+        let block = &self.coefficients[candidate * self.limit * self.size..];
         for (target, column) in out
             .chunks_exact_mut(width)
             .zip(block.chunks_exact(self.size))
         {
-            for slot in 0..slots {
-                add(target, products.of_direction(slot).with_bag, column[slot]);
+            for (slot, &coefficient) in column[..slots].iter().enumerate() {
+                add(target, products.of_direction(slot).with_bag, coefficient);
             }
-            add(target, rest, column[slots]);
+            add(target, row.with_bag, column[slots]);
         }
     }
 }

@@ -21,7 +21,6 @@ pub(super) struct Distances {
     values: Vec<f64>,
     pending: Vec<(usize, usize)>,
     squares: Vec<Lanes>,
-    rest: Vec<f64>,
     product: Vec<f64>,
 }
 
@@ -35,7 +34,6 @@ impl Distances {
             values: Vec::new(),
             pending: Vec::with_capacity(LANES),
             squares: vec![[0.0; LANES]; limit * limit],
-            rest: Vec::new(),
             product: Vec::new(),
         }
     }
@@ -55,7 +53,7 @@ impl Distances {
             let at = candidate * entries.len();
             self.origins(products, candidate, entries, at);
             if self.alpha < 1.0 {
-                bases.times_bag(products, candidate, &mut self.rest, &mut self.product);
+                bases.times_bag(products, candidate, &mut self.product);
                 for (k, &(_, entry_dim)) in entries.iter().enumerate() {
                     self.angles(k, at + k, bases.dim(candidate).min(entry_dim));
                 }

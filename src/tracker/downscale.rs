@@ -68,3 +68,67 @@ pub(super) fn area_average(luma: &[u8], source: (u32, u32), target: (u32, u32)) 
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same by the definition: overlaps of intervals, in floating point.
+    fn by_definition(luma: &[u8], source: (u32, u32), target: (u32, u32)) -> Vec<f64> {
+        let overlap = |o: u32, s: u32, source: u32, target: u32| {
+            let ratio = f64::from(source) / f64::from(target);
+            let (begin, end) = (f64::from(o) * ratio, f64::from(o + 1) * ratio);
+            ((f64::from(s) + 1.0).min(end) - f64::from(s).max(begin)).max(0.0) / ratio
+        };
+        let mut out = Vec::new();
+        for row in 0..target.1 {
+            for column in 0..target.0 {
+                let mut sum = 0.0;
+                for y in 0..source.1 {
+                    let vertical = overlap(row, y, source.1, target.1);
+                    for x in 0..source.0 {
+                        let share = vertical * overlap(column, x, source.0, target.0);
+                        sum += share * f64::from(luma[(y * source.0 + x) as usize]);
+                    }
+                }
+                out.push(sum);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn averages_are_exact_up_to_rounding() {
+        for (source, target) in [
+            ((7, 5), (3, 2)),
+            ((8, 6), (4, 3)),
+            ((9, 4), (9, 1)),
+            ((13, 11), (12, 11)),
+            ((5, 1), (2, 1)),
+            ((1, 9), (1, 4)),
+            ((6, 6), (6, 6)),
+        ] {
+            let luma: Vec<u8> = (0..source.0 * source.1)
+                .map(|i| (i * 89 % 256) as u8)
+                .collect();
+            let averages = area_average(&luma, source, target);
+            let expected = by_definition(&luma, source, target);
+            assert_eq!(averages.len(), expected.len());
+            for (&average, &expected) in averages.iter().zip(&expected) {
+                let difference = (f64::from(average) - expected).abs();
+                assert!(difference <= 0.5 + 1e-9, "{source:?} to {target:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn white_stays_white_at_any_size() {
+        for source in [(1921, 1079), (321, 1), (1, 5000), (640, 480)] {
+            let luma = vec![255; source.0 as usize * source.1 as usize];
+            let target = crate::tracker::frame::working_size(source.0, source.1);
+            let averages = area_average(&luma, source, target);
+            assert_eq!(averages.len(), target.0 as usize * target.1 as usize);
+            assert!(averages.iter().all(|&value| value == 255));
+        }
+    }
+}

@@ -14,8 +14,8 @@ pub(super) type Lanes = [f64; LANES];
 /// Cyclic Jacobi needs four to six sweeps at these sizes; the bound only guards against a NaN.
 const MAX_SWEEPS: usize = 16;
 
-/// An off-diagonal element below this share of the trace is zero.
-const NEGLIGIBLE: f64 = 1e-17;
+/// An off-diagonal element below this share of the trace is rounding.
+const NEGLIGIBLE: f64 = 1e-16;
 
 /// Diagonalises [`LANES`] symmetric positive semidefinite matrices of size `dim`, each `dim * dim` in row order.
 /// Their diagonals end as the eigenvalues, in no order. `vectors`, if given, ends with the eigenvector of the
@@ -103,4 +103,64 @@ pub(super) fn eigenpairs(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
         .collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
     pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// A positive semidefinite matrix of some rank, with eigenvalues of very different sizes.
+    fn matrix(dim: usize, rank: usize, seed: usize) -> DMatrix<f64> {
+        let factor = DMatrix::from_fn(dim, rank, |i, j| {
+            let hash = (i * 37 + j * 101 + seed * 53) % 97;
+            (hash as f64 / 97.0 - 0.5) * 10_f64.powi(-(j as i32))
+        });
+        &factor * factor.transpose()
+    }
+
+    #[test]
+    fn eigenpairs_rebuild_the_matrix() {
+        for dim in 1..=11 {
+            for rank in 1..=dim {
+                let expected = matrix(dim, rank, dim);
+                let pairs = eigenpairs(expected.as_slice(), dim);
+                let mut rebuilt = DMatrix::zeros(dim, dim);
+                for (value, vector) in &pairs {
+                    let vector = DMatrix::from_column_slice(dim, 1, vector);
+                    assert!((vector.norm() - 1.0).abs() < 1e-12);
+                    rebuilt += &vector * vector.transpose() * *value;
+                }
+                assert!((rebuilt - &expected).norm() < 1e-13 * expected.norm().max(1e-300));
+                assert!(pairs.windows(2).all(|pair| pair[0].0 >= pair[1].0));
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_do_not_mix() {
+        let dim = 4;
+        let matrices: Vec<DMatrix<f64>> = (0..LANES).map(|lane| matrix(dim, 4, lane)).collect();
+        let mut lanes: Vec<Lanes> = (0..dim * dim)
+            .map(|i| std::array::from_fn(|lane| matrices[lane].as_slice()[i]))
+            .collect();
+        diagonalize(&mut lanes, dim, None);
+        for (lane, matrix) in matrices.iter().enumerate() {
+            let mut values: Vec<f64> = (0..dim).map(|j| lanes[j * dim + j][lane]).collect();
+            values.sort_by(|a, b| b.total_cmp(a));
+            for (value, (expected, _)) in values.iter().zip(eigenpairs(matrix.as_slice(), dim)) {
+                assert!((value - expected).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_becomes_nan() {
+        for value in [0.0, 1.0, 1e-300, 1e8] {
+            for (eigenvalue, vector) in eigenpairs(&[value; 9], 3) {
+                assert!(eigenvalue.is_finite() && vector.iter().all(|v| v.is_finite()));
+            }
+        }
+    }
 }

@@ -41,3 +41,36 @@ pub(super) fn arg_max(weights: &[f64]) -> usize {
     }
     best
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_distances_give_equal_weights() {
+        let (mut likelihoods, mut weights) = (Vec::new(), Vec::new());
+        normalized(&[0.3; 12], 3, 0.01, &mut likelihoods);
+        sum_rule(&likelihoods, 3, &mut weights);
+        assert!(weights.iter().all(|weight| (weight - 0.25).abs() < 1e-15));
+        assert_eq!(arg_max(&weights), 0);
+    }
+
+    #[test]
+    fn a_common_offset_changes_nothing_even_where_exp_underflows() {
+        let near = [0.01, 0.02, 0.015, 0.05];
+        let far = near.map(|distance| distance + 50.0);
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        normalized(&near, 1, 0.01, &mut a);
+        normalized(&far, 1, 0.01, &mut b);
+        let plain: Vec<f64> = near
+            .iter()
+            .map(|distance| (-distance / 0.01).exp())
+            .collect();
+        let sum: f64 = plain.iter().sum();
+        for i in 0..near.len() {
+            assert!((a[i] - plain[i] / sum).abs() < 1e-14);
+            assert!((a[i] - b[i]).abs() < 1e-11);
+        }
+        assert_eq!(arg_max(&a), 0);
+    }
+}

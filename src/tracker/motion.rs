@@ -116,3 +116,78 @@ pub(super) fn propose(
         out.push(reach.hold(moved));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::Preset;
+
+    const REACH: Reach = Reach {
+        frame_width: 320.0,
+        frame_height: 240.0,
+        box_width: 40.0,
+        box_height: 30.0,
+    };
+
+    fn particle(x: f64) -> Particle {
+        Particle {
+            x,
+            y: 100.0,
+            scale: 1.0,
+        }
+    }
+
+    fn proposals(frame: u64, params: &Params) -> Vec<Particle> {
+        let mut out = Vec::new();
+        let previous = [particle(60.0), particle(160.0), particle(260.0)];
+        propose(&previous, &[0.7, 0.0, 0.3], params, &REACH, frame, &mut out);
+        out
+    }
+
+    #[test]
+    fn particles_are_drawn_by_weight_and_moved_by_the_standard_deviations() {
+        let params = Params {
+            particles: 1000,
+            ..Preset::Paper.params()
+        };
+        let mut all = Vec::new();
+        for frame in 0..20 {
+            all.extend(proposals(frame, &params));
+        }
+        let count = all.len() as f64;
+        let first: Vec<&Particle> = all.iter().filter(|particle| particle.x < 110.0).collect();
+        assert!((first.len() as f64 / count - 0.7).abs() < 0.02);
+        assert!(
+            all.iter().all(|particle| (particle.x - 160.0).abs() > 50.0),
+            "weight 0"
+        );
+        let deviation = |of: &dyn Fn(&Particle) -> f64| {
+            let squares: f64 = first.iter().map(|particle| of(particle).powi(2)).sum();
+            (squares / first.len() as f64).sqrt()
+        };
+        assert!((deviation(&|p| p.x - 60.0) - 5.0).abs() < 0.2);
+        assert!((deviation(&|p| p.y - 100.0) - 5.0).abs() < 0.2);
+        assert!((deviation(&|p| p.scale - 1.0) - 0.01).abs() < 0.0005);
+    }
+
+    #[test]
+    fn draws_depend_on_seed_and_frame_alone() {
+        let params = Preset::Paper.params();
+        let other = Params {
+            seed: 1,
+            ..params.clone()
+        };
+        assert_eq!(proposals(5, &params), proposals(5, &params));
+        assert_ne!(proposals(5, &params), proposals(6, &params));
+        assert_ne!(proposals(5, &params), proposals(5, &other));
+    }
+
+    #[test]
+    fn the_stream_of_draws_is_the_one_snapshots_were_made_with() {
+        // A library that changed its streams would make restored sessions go on differently.
+        let first = proposals(1, &Preset::Paper.params())[0];
+        assert_eq!(first.x.to_bits(), FIRST_X.to_bits(), "{first:?}");
+    }
+
+    const FIRST_X: f64 = 264.0888480052092;
+}

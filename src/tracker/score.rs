@@ -49,3 +49,34 @@ impl Usual {
         (score as f32, status)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_score_falls_with_the_distance_and_the_usual_follows_only_tracked_frames() {
+        let mut usual = Usual::default();
+        assert_eq!(usual.judge(0.02), (0.9, Status::Tracking));
+        let mut last = 1.0;
+        for step in 0..40 {
+            let (score, _) = usual.clone().judge(f64::from(step) * 0.01);
+            assert!(score <= last && (0.0..=1.0).contains(&score));
+            last = score;
+        }
+        assert_eq!(usual.judge(0.08).1, Status::Uncertain);
+        assert_eq!(usual.judge(0.3).1, Status::Lost);
+        assert_eq!(usual.distance, Some(0.02));
+        assert_eq!(usual.judge(0.03).1, Status::Tracking);
+        assert!(usual.distance > Some(0.02));
+    }
+
+    #[test]
+    fn a_still_picture_does_not_make_a_flicker_a_loss() {
+        let mut usual = Usual::default();
+        for _ in 0..100 {
+            assert_eq!(usual.judge(0.0).1, Status::Tracking);
+        }
+        assert_eq!(usual.judge(0.001).1, Status::Tracking);
+    }
+}
