@@ -30,6 +30,9 @@ pub struct Config {
     /// Most bytes of a request body.
     #[arg(long, env = "BAGTRACK_MAX_BODY_BYTES", default_value_t = 32 << 20)]
     pub max_body_bytes: usize,
+    /// Most bytes of all request bodies together; one of unknown length counts as the largest.
+    #[arg(long, env = "BAGTRACK_MAX_UPLOAD_BYTES", default_value_t = 512 << 20)]
+    pub max_upload_bytes: usize,
     /// Most frames of one post.
     #[arg(long, env = "BAGTRACK_MAX_FRAMES", default_value_t = 64)]
     pub max_frames: usize,
@@ -48,6 +51,10 @@ pub struct Config {
     /// Most connections open at the same time.
     #[arg(long, env = "BAGTRACK_MAX_CONNECTIONS", default_value_t = 4096)]
     pub max_connections: usize,
+    /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
+    /// commas; `*` for all.
+    #[arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')]
+    pub cors_origins: Vec<String>,
     /// Time for a client to send its request head; a connection that is idle for longer is closed too.
     #[arg(long, env = "BAGTRACK_HEADER_TIMEOUT", default_value = "30s", value_parser = humantime::parse_duration)]
     pub header_timeout: Duration,
@@ -96,6 +103,14 @@ impl Config {
         // The queue, the connections and the sessions' places are semaphores, which have this limit.
         let semaphore = 1..=tokio::sync::Semaphore::MAX_PERMITS;
         let moment = Duration::from_millis(1)..=Duration::from_secs(365 * 24 * 3600);
+        let uploads = self.max_body_bytes..=(4 << 40);
+        let is_origin = |text: &String| {
+            let host = text.split_once("://").map_or("", |(_, host)| host);
+            let plain = host
+                .bytes()
+                .all(|byte| byte.is_ascii_graphic() && byte != b'/');
+            text == "*" || (!host.is_empty() && plain)
+        };
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let checks = [
@@ -117,6 +132,11 @@ impl Config {
                 duration,
             ),
             ("max-body-bytes", self.max_body_bytes >= 1, positive),
+            (
+                "max-upload-bytes",
+                uploads.contains(&self.max_upload_bytes),
+                "at least max-body-bytes, at most 4 TiB",
+            ),
             ("max-frames", self.max_frames >= 1, positive),
             ("max-frame-bytes", self.max_frame_bytes >= 1, positive),
             ("max-frame-side", self.max_frame_side >= 1, positive),
@@ -126,6 +146,11 @@ impl Config {
                 "max-connections",
                 semaphore.contains(&self.max_connections),
                 positive,
+            ),
+            (
+                "cors-origins",
+                self.cors_origins.iter().all(is_origin),
+                "origins like https://example.org, or *",
             ),
             (
                 "header-timeout",

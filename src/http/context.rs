@@ -15,7 +15,8 @@ use std::time::Instant;
 use tracing::Instrument;
 use uuid::Uuid;
 
-const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// The header of request ids.
+pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 const MAX_ID_LENGTH: usize = 64;
 
 /// The middleware, outermost.
@@ -28,10 +29,13 @@ pub async fn request_context(request: Request, next: Next) -> Response {
     let _entered = span.enter();
     if let Some(problem) = response.extensions_mut().remove::<Problem>() {
         log_problem(&problem);
-        // The headers stay: they may hold more than the problem knows, like `Allow`.
-        let rendered = problem.respond(Some(path), Some(id.clone()));
-        *response.body_mut() = rendered.into_body();
-        response.headers_mut().remove(CONTENT_LENGTH);
+        let mut written = problem.respond(path, id.clone());
+        // The first response's headers stay: they may hold more than the problem knows, like `Allow`.
+        for (name, value) in response.headers() {
+            written.headers_mut().entry(name).or_insert(value.clone());
+        }
+        written.headers_mut().remove(CONTENT_LENGTH);
+        response = written;
     }
     let headers = response.headers_mut();
     let value = HeaderValue::from_str(&id).expect("ids are visible ASCII");

@@ -57,6 +57,18 @@ impl CreatedSession {
     }
 }
 
+/// A named set of the tracker's parameters.
+#[derive(utoipa::ToSchema)]
+#[schema(as = Preset)]
+#[serde(rename_all = "snake_case")]
+#[expect(dead_code, reason = "a schema; the names are read by `upload`")]
+enum PresetName {
+    /// The equations and numbers of the paper.
+    Paper,
+    /// The default: mended where the printed equations lose the object.
+    Robust,
+}
+
 /// A form with one frame and the settings of a new session.
 #[derive(utoipa::ToSchema)]
 #[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
@@ -64,15 +76,19 @@ struct CreateForm {
     /// The first frame: a JPEG, PNG or WebP file. Or a session snapshot; then nothing else is given.
     #[schema(format = Binary, content_media_type = "application/octet-stream")]
     frame: String,
-    /// `x,y,width,height`, or a JSON object with these names.
+    /// `x,y,width,height`, or a JSON object with these names. May be in the query instead.
     #[schema(example = "10,20,30,40")]
-    r#box: String,
+    #[schema(nullable = false)]
+    r#box: Option<String>,
     /// `robust` (the default) or `paper`.
-    preset: Option<String>,
+    #[schema(nullable = false)]
+    preset: Option<PresetName>,
     /// Seed of all random draws; a random one when left out.
+    #[schema(nullable = false)]
     seed: Option<u64>,
     /// A JSON object of parameters that are set otherwise than in the preset.
     #[schema(example = "{\"seed\": 7}")]
+    #[schema(nullable = false)]
     params: Option<String>,
 }
 
@@ -83,11 +99,14 @@ struct CreateJson {
     /// The first frame as base64 (or a data URL): a JPEG, PNG or WebP file, or a session snapshot.
     #[schema(content_encoding = "base64")]
     frame: String,
-    /// The target's box; the text `x,y,width,height` is taken too.
-    r#box: TargetBox,
+    /// The target's box; the text `x,y,width,height` is taken too. May be in the query instead.
+    #[schema(nullable = false)]
+    r#box: Option<TargetBox>,
     /// `robust` (the default) or `paper`.
-    preset: Option<String>,
+    #[schema(nullable = false)]
+    preset: Option<PresetName>,
     /// Seed of all random draws; a random one when left out.
+    #[schema(nullable = false)]
     seed: Option<u64>,
     /// Parameters that are set otherwise than in the preset.
     #[schema(value_type = Option<Object>)]
@@ -120,17 +139,17 @@ impl utoipa::IntoResponses for Problems {
     post, path = "/sessions", tag = "sessions", operation_id = "createSession",
     params(
         ("box" = Option<String>, Query, description = "The target's box, `x,y,width,height`; may be in the body instead.", example = "10,20,30,40"),
-        ("preset" = Option<String>, Query, description = "`robust` (the default) or `paper`."),
+        ("preset" = Option<PresetName>, Query, description = "`robust` when left out."),
         ("seed" = Option<u64>, Query, description = "Seed of all random draws; a random one when left out."),
         ("params" = Option<String>, Query, description = "A JSON object of parameters that are set otherwise than in the preset.", example = "{\"seed\": 7}"),
     ),
     request_body(
         description = "The first frame in one of three forms, or a snapshot.",
         content(
-            ("image/jpeg"), ("image/png"), ("image/webp"),
+            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
             (CreateForm = "multipart/form-data"),
             (CreateJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…", "box": {"x": 10, "y": 20, "width": 30, "height": 40}, "seed": 7})),
-            ("application/vnd.bagtrack.snapshot"),
+            (Vec<u8> = "application/vnd.bagtrack.snapshot"),
         )
     ),
     responses(
@@ -142,7 +161,7 @@ pub async fn create(State(state): State<AppState>, request: Request) -> Result<R
     let fields = FORM.query(request.uri())?;
     let too_many = |_| Problem::too_many_sessions();
     state.registry.check_room().map_err(too_many)?;
-    let queue = state.enter()?;
+    let queue = state.enter(request.headers())?;
     let upload = FORM.read(&state, &queue, fields, request).await?;
     let started = match is_snapshot(&upload) {
         true => restore(&state, queue, upload).await?,

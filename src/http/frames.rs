@@ -36,8 +36,10 @@ struct FramesForm {
 struct FramesJson {
     /// One frame.
     #[schema(content_encoding = "base64")]
+    #[schema(nullable = false)]
     frame: Option<String>,
     /// Several frames, in order.
+    #[schema(nullable = false)]
     frames: Option<Vec<String>>,
 }
 
@@ -85,7 +87,7 @@ impl utoipa::IntoResponses for Problems {
     request_body(
         description = "The frame in one of three forms; the second and third take several.",
         content(
-            ("image/jpeg"), ("image/png"), ("image/webp"),
+            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
             (FramesForm = "multipart/form-data"),
             (FramesJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…"})),
         )
@@ -102,7 +104,7 @@ pub async fn post(
 ) -> Result<Response, Problem> {
     let fields = FORM.query(request.uri())?;
     let session = state.session(&id)?;
-    let queue = state.enter()?;
+    let queue = state.enter(request.headers())?;
     let place = session.enter().map_err(|_| Problem::session_busy())?;
     let upload = FORM.read(&state, &queue, fields, request).await?;
     let number = upload.fields.number;

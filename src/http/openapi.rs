@@ -66,10 +66,12 @@ pub fn problems(kinds: &[&[Kind]]) -> BTreeMap<String, RefOr<Response>> {
     responses.collect()
 }
 
+const EXAMPLE_ID: &str = "1da43888-6f49-40f8-a05c-7bb628ba4f6a";
+
 fn response(kinds: &[Kind]) -> Response {
     let titles: Vec<&str> = kinds.iter().map(|kind| kind.title()).collect();
     let examples = kinds.iter().map(|kind| {
-        let document = example(*kind).document(None, Some("0b9c7c52-example".to_owned()));
+        let document = example(*kind).document("/sessions".to_owned(), EXAMPLE_ID.to_owned());
         let value = serde_json::to_value(document).expect("a problem document is plain JSON");
         let example = ExampleBuilder::new()
             .summary(kind.title())

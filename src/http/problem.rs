@@ -6,8 +6,8 @@ use crate::ingest::IngestError;
 use crate::sessions::{EnvelopeError, ReplayError};
 use crate::tracker::TrackerError;
 use axum::Json;
+use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_TYPE, RETRY_AFTER};
-use axum::http::{HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use std::error::Error;
@@ -44,16 +44,18 @@ pub struct Document {
     /// What happened this time, and what to do.
     detail: String,
     /// The path of the request.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    instance: Option<String>,
+    #[schema(example = "/sessions")]
+    instance: String,
     /// The id of the request; also in the header `x-request-id`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    request_id: Option<String>,
+    #[schema(example = "1da43888-6f49-40f8-a05c-7bb628ba4f6a")]
+    request_id: String,
     /// With a wrong frame number: the number of the next frame.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     index: Option<usize>,
 }
 
@@ -212,7 +214,7 @@ impl Problem {
 
     /// The work took too long.
     pub fn work_timeout() -> Self {
-        let detail = "The frame may still be taken: send it again with its number (`?frame=N`) to get the answer.";
+        let detail = "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is never tracked twice.";
         Self::new(Kind::WorkTimeout, detail)
     }
 
@@ -267,7 +269,7 @@ impl Problem {
     }
 
     /// The document, for the request at this path with this id.
-    pub fn document(&self, instance: Option<String>, request_id: Option<String>) -> Document {
+    pub fn document(&self, instance: String, request_id: String) -> Document {
         Document {
             r#type: self.kind.urn(),
             title: self.kind.title(),
@@ -281,10 +283,9 @@ impl Problem {
     }
 
     /// The response, for the request at this path with this id.
-    pub fn respond(&self, instance: Option<String>, request_id: Option<String>) -> Response {
+    pub fn respond(&self, instance: String, request_id: String) -> Response {
         let document = Json(self.document(instance, request_id));
-        let status: StatusCode = self.kind.status();
-        let mut response = (status, document).into_response();
+        let mut response = (self.kind.status(), document).into_response();
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
         if let Some(seconds) = self.kind.retry_after() {
@@ -295,9 +296,9 @@ impl Problem {
 }
 
 impl IntoResponse for Problem {
-    /// The outermost middleware renders it again, with the request's path and id.
+    /// The status alone: the outermost middleware writes the document, since it knows the request.
     fn into_response(self) -> Response {
-        let mut response = self.respond(None, None);
+        let mut response = self.kind.status().into_response();
         response.extensions_mut().insert(self);
         response
     }

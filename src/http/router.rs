@@ -1,6 +1,6 @@
 //! All routes, and what every request passes through.
 
-use super::context::{panic_response, request_context};
+use super::context::{REQUEST_ID, panic_response, request_context};
 use super::drain::drain_refused;
 use super::openapi::Api;
 use super::problem::Problem;
@@ -8,9 +8,12 @@ use super::state::AppState;
 use super::{create, docs, frames, health, page, session, snapshot, target};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
+use axum::http::header::{CONTENT_TYPE, LOCATION, RETRY_AFTER};
+use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::cors::{AllowOrigin, CorsLayer};
 use tower_http::timeout::RequestBodyDeadlineLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
@@ -45,6 +48,23 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(DefaultBodyLimit::max(config.max_body_bytes))
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
         .layer(RequestBodyDeadlineLayer::new(config.body_timeout))
+        .layer(cors(&config.cors_origins))
         .layer(CatchPanicLayer::custom(panic_response))
         .layer(middleware::from_fn(request_context))
+}
+
+/// What pages of other origins may do: all, or nothing when none is allowed.
+fn cors(origins: &[String]) -> CorsLayer {
+    let allowed = if origins.iter().any(|origin| origin == "*") {
+        AllowOrigin::any()
+    } else {
+        let values = origins.iter().map(|origin| HeaderValue::from_str(origin));
+        AllowOrigin::list(values.filter_map(Result::ok))
+    };
+    let replayed = HeaderName::from_static("replayed");
+    CorsLayer::new()
+        .allow_origin(allowed)
+        .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+        .allow_headers([CONTENT_TYPE, REQUEST_ID])
+        .expose_headers([LOCATION, RETRY_AFTER, REQUEST_ID, replayed])
 }

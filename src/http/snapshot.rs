@@ -51,7 +51,10 @@ pub async fn get(
 ) -> Result<Response, Problem> {
     upload::NOTHING.query(&uri)?;
     let session = state.session(&id)?;
-    let queue = state.enter()?;
+    let queue = state
+        .admission
+        .enter(0)
+        .map_err(|_| Problem::queue_full())?;
     let place = session.enter().map_err(|_| Problem::session_busy())?;
     let take = |locked: &mut crate::sessions::Locked| Ok(locked.state().snapshot());
     let bytes = work::on_session(&state, place, queue, take).await?;

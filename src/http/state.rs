@@ -3,6 +3,8 @@
 use super::config::Config;
 use super::problem::Problem;
 use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
+use axum::http::HeaderMap;
+use axum::http::header::CONTENT_LENGTH;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use uuid::Uuid;
@@ -40,7 +42,7 @@ impl AppState {
                 config.session_idle,
                 clock,
             ),
-            admission: Admission::new(config.queue, config.worker_count()),
+            admission: Admission::new(config.queue, config.max_upload_bytes, config.worker_count()),
             draining: AtomicBool::new(false),
             config,
         }))
@@ -55,9 +57,17 @@ impl AppState {
         self.draining.load(Ordering::Acquire)
     }
 
-    /// Takes a place in the queue.
-    pub fn enter(&self) -> Result<QueuePermit, Problem> {
-        self.admission.enter().map_err(|_| Problem::queue_full())
+    /// Takes a place in the queue for a request, with room for its body.
+    pub fn enter(&self, headers: &HeaderMap) -> Result<QueuePermit, Problem> {
+        let most = self.config.max_body_bytes;
+        let length = headers
+            .get(CONTENT_LENGTH)
+            .and_then(|length| length.to_str().ok());
+        let length = length.and_then(|length| length.parse::<usize>().ok());
+        let room = length.map_or(most, |length| length.min(most));
+        self.admission
+            .enter(room)
+            .map_err(|_| Problem::queue_full())
     }
 
     /// The live session that a path names. Text that is no id names no session.

@@ -29,9 +29,10 @@ struct TargetForm {
     /// The next frame: a JPEG, PNG or WebP file.
     #[schema(format = Binary, content_media_type = "application/octet-stream")]
     frame: String,
-    /// `x,y,width,height`, or a JSON object with these names.
+    /// `x,y,width,height`, or a JSON object with these names. May be in the query instead.
     #[schema(example = "10,20,30,40")]
-    r#box: String,
+    #[schema(nullable = false)]
+    r#box: Option<String>,
 }
 
 /// A frame as base64 (or a data URL) and the corrected box.
@@ -41,8 +42,9 @@ struct TargetJson {
     /// The next frame.
     #[schema(content_encoding = "base64")]
     frame: String,
-    /// The corrected box; the text `x,y,width,height` is taken too.
-    r#box: TargetBox,
+    /// The corrected box; the text `x,y,width,height` is taken too. May be in the query instead.
+    #[schema(nullable = false)]
+    r#box: Option<TargetBox>,
 }
 
 struct Problems;
@@ -80,7 +82,7 @@ impl utoipa::IntoResponses for Problems {
     request_body(
         description = "The frame in one of three forms.",
         content(
-            ("image/jpeg"), ("image/png"), ("image/webp"),
+            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
             (TargetForm = "multipart/form-data"),
             (TargetJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…", "box": {"x": 12, "y": 22, "width": 30, "height": 40}})),
         )
@@ -97,7 +99,7 @@ pub async fn put(
 ) -> Result<Response, Problem> {
     let fields = FORM.query(request.uri())?;
     let session = state.session(&id)?;
-    let queue = state.enter()?;
+    let queue = state.enter(request.headers())?;
     let place = session.enter().map_err(|_| Problem::session_busy())?;
     let upload = FORM.read(&state, &queue, fields, request).await?;
     let target = upload.fields.target.ok_or_else(Problem::missing_box)?;

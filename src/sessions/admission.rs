@@ -1,14 +1,17 @@
 //! Who may work: a queue before the workers.
 //!
-//! A request first takes a place in the queue (refused at once when it is full), then waits for a
-//! worker. Both permits move into the blocking work itself: a request that times out or whose client
+//! A request first takes a place in the queue (refused at once when it is full) and the room for its body,
+//! since bodies are what requests in the queue cost; then it waits for a worker. Both permits move into the blocking work itself: a request that times out or whose client
 //! goes away does not stop work that has begun, so its permits stay taken until that work has ended, and
 //! the number of threads at work is never more than the number of workers.
 
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// The queue is full; try again later.
+/// Bytes that one permit of the room for bodies stands for.
+const UNIT: usize = 1024;
+
+/// The queue or the room for bodies is full; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the queue is full")]
 pub struct QueueFull;
@@ -20,35 +23,43 @@ pub struct WorkPanicked(#[source] tokio::task::JoinError);
 
 /// A place in the queue, given back when the last clone is dropped.
 #[derive(Debug, Clone)]
-pub struct QueuePermit(
-    #[expect(dead_code, reason = "held for its drop")] Arc<OwnedSemaphorePermit>,
-);
+pub struct QueuePermit {
+    _permits: Arc<[OwnedSemaphorePermit; 2]>,
+}
 
 /// A queue semaphore before a worker semaphore. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
     queue: Arc<Semaphore>,
+    bodies: Arc<Semaphore>,
     workers: Arc<Semaphore>,
 }
 
 impl Admission {
-    /// At most `queue` requests are inside at a time, at most `workers` of them at work.
-    pub fn new(queue: usize, workers: usize) -> Self {
+    /// At most `queue` requests are inside at a time with at most `body_bytes` bytes of bodies, at most `workers`
+    /// of them at work.
+    pub fn new(queue: usize, body_bytes: usize, workers: usize) -> Self {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
+            bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(UNIT))),
             workers: Arc::new(Semaphore::new(workers)),
         }
     }
 
-    /// Takes a place in the queue.
+    /// Takes a place in the queue, with room for a body of `body_bytes`.
     ///
     /// # Errors
-    /// All places are taken.
-    pub fn enter(&self) -> Result<QueuePermit, QueueFull> {
-        let permit = self.queue.clone().try_acquire_owned();
-        permit
-            .map(|p| QueuePermit(Arc::new(p)))
-            .map_err(|_| QueueFull)
+    /// All places or the room are taken.
+    pub fn enter(&self, body_bytes: usize) -> Result<QueuePermit, QueueFull> {
+        let units = u32::try_from(body_bytes.div_ceil(UNIT)).map_err(|_| QueueFull)?;
+        let place = self.queue.clone().try_acquire_owned();
+        let room = self.bodies.clone().try_acquire_many_owned(units);
+        match (place, room) {
+            (Ok(place), Ok(room)) => Ok(QueuePermit {
+                _permits: Arc::new([place, room]),
+            }),
+            _ => Err(QueueFull),
+        }
     }
 
     /// Waits for a worker, in order of arrival, and runs `work` on a blocking thread. Dropping the future
@@ -91,19 +102,29 @@ mod tests {
 
     #[tokio::test]
     async fn the_queue_refuses_when_full_and_frees_on_drop() {
-        let admission = Admission::new(1, 1);
-        let permit = admission.enter().unwrap();
-        assert_eq!(admission.enter().unwrap_err(), QueueFull);
+        let admission = Admission::new(1, 5000, 1);
+        let permit = admission.enter(5000).unwrap();
+        assert_eq!(admission.enter(5000).unwrap_err(), QueueFull);
         drop(permit);
-        assert!(admission.enter().is_ok());
+        assert!(admission.enter(5000).is_ok());
+    }
+
+    #[tokio::test]
+    async fn bodies_share_their_room() {
+        let admission = Admission::new(9, 5 * UNIT, 1);
+        let large = admission.enter(4 * UNIT).unwrap();
+        assert_eq!(admission.enter(UNIT + 1).unwrap_err(), QueueFull);
+        assert!(admission.enter(UNIT).is_ok());
+        drop(large);
+        assert!(admission.enter(5 * UNIT).is_ok());
     }
 
     #[tokio::test]
     async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
-        let admission = Admission::new(1, 1);
+        let admission = Admission::new(1, 5000, 1);
         let (started_tx, started) = mpsc::channel();
         let (finish, finish_rx) = mpsc::channel::<()>();
-        let queue = admission.enter().unwrap();
+        let queue = admission.enter(5000).unwrap();
         let request = tokio::spawn({
             let admission = admission.clone();
             async move {
@@ -128,10 +149,11 @@ mod tests {
 
     #[tokio::test]
     async fn a_panic_is_an_error_and_frees_the_permits() {
-        let admission = Admission::new(1, 1);
-        let queue = admission.enter().unwrap();
+        let admission = Admission::new(1, 5000, 1);
+        let queue = admission.enter(5000).unwrap();
         let result = admission.run(queue, || panic!("a test panics")).await;
-        assert!(result.map(|()| ()).is_err());
+        let panicked: Result<(), WorkPanicked> = result;
+        assert!(panicked.is_err());
         assert_eq!((admission.queue_places(), admission.free_workers()), (1, 1));
     }
 }

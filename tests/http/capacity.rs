@@ -82,6 +82,21 @@ async fn the_queue_is_bounded_and_a_lost_client_frees_its_place() {
 }
 
 #[tokio::test]
+async fn the_bodies_of_all_requests_together_are_bounded() {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 50_000;
+        config.max_upload_bytes = 100_000;
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let target = format!("/sessions/{id}/frames");
+    let held = RawConnection::hold(app.address, "POST", &target, 49_000).await;
+    let more = RawConnection::hold(app.address, "POST", &target, 49_000).await;
+    expect_problem(app.post_frame(&id, pictures::png(1)).await, "queue-full").await;
+    drop((held, more));
+}
+
+#[tokio::test]
 async fn a_request_that_waits_for_a_deleted_session_is_told_so() {
     let app = TestApplication::start().await;
     let id = app.open().await;

@@ -19,6 +19,19 @@ async fn a_head_that_never_ends_closes_the_connection() {
 }
 
 #[tokio::test]
+async fn an_idle_connection_is_closed() {
+    let app = TestApplication::start_with(|config| config.header_timeout = SHORT).await;
+    let mut connection = RawConnection::open(app.address).await;
+    assert_eq!(connection.read_to_end().await, "");
+    let mut connection = RawConnection::open(app.address).await;
+    connection
+        .send("GET /healthz HTTP/1.1\r\nHost: test\r\n\r\n")
+        .await;
+    let answer = connection.read_to_end().await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}
+
+#[tokio::test]
 async fn a_body_that_never_ends_is_408_in_every_form() {
     let app = TestApplication::start_with(|config| config.body_timeout = SHORT).await;
     let id = app.open().await;
