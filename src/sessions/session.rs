@@ -60,7 +60,7 @@ impl State {
         envelope::seal(&self.tracker, &self.recent)
     }
 
-    /// Whether a post is the next one or was answered before; see [`replay::judge`].
+    /// Whether a post is the next one or was answered before; see `replay::judge`.
     ///
     /// # Errors
     /// The frame number does not fit.
