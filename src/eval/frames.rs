@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where the frames of `dir` are: in `img/` where there is such a folder (OTB layout), in `dir` itself otherwise.
-pub fn folder(dir: &Path) -> PathBuf {
+fn folder(dir: &Path) -> PathBuf {
     let pictures = dir.join("img");
     if pictures.is_dir() {
         pictures
@@ -15,7 +15,8 @@ pub fn folder(dir: &Path) -> PathBuf {
     }
 }
 
-/// The JPEG, PNG and WebP files of a folder (see [`folder`]) by name, numbers in names compared as numbers.
+/// The JPEG, PNG and WebP files in `img/` under `dir` (OTB layout), or in `dir` itself where there is no such folder, by
+/// name; numbers in names are compared as numbers.
 ///
 /// # Errors
 /// The folder cannot be read, or holds no frames.

@@ -23,8 +23,8 @@ pub enum EvalError {
         /// What the tracker says.
         source: TrackerError,
     },
-    /// Only the first frame has a box, and that one is given: there is nothing to measure.
-    #[error("{0}: no frame after the first is annotated")]
+    /// There is nothing to measure: the box of the first frame is given, those of others are held against.
+    #[error("{0}: the first frame and at least one more must be annotated")]
     NothingToScore(String),
 }
 

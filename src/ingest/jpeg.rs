@@ -7,11 +7,11 @@ use super::sniff::Format;
 use super::{IngestError, Limits};
 use image::GrayImage;
 use image::metadata::Orientation;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
+use zune_jpeg::errors::DecodeErrors;
 
 /// More scans than any encoder writes: each one walks the whole picture again.
 const MAX_SCANS: usize = 64;
@@ -21,6 +21,8 @@ pub(super) fn decode(
     limits: &Limits,
 ) -> Result<(GrayImage, Orientation), IngestError> {
     let damaged = |reason: String| Format::Jpeg.damaged(reason);
+    // Most of the decoder's texts come in quotes.
+    let reason = |error: DecodeErrors| damaged(error.to_string().trim_matches('"').to_owned());
     let markers = Markers::read(bytes).map_err(|reason| damaged(reason.to_owned()))?;
     limits.check_size(markers.width, markers.height)?;
     if markers.is_implausibly_small() {
@@ -35,9 +37,7 @@ pub(super) fn decode(
         .jpeg_set_max_scans(MAX_SCANS)
         .jpeg_set_out_colorspace(ColorSpace::Luma);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&guarded[..]), options);
-    decoder
-        .decode_headers()
-        .map_err(|error| damaged(error.to_string()))?;
+    decoder.decode_headers().map_err(reason)?;
     let info = decoder.info().expect("the headers were decoded just now");
     let (width, height) = (u32::from(info.width), u32::from(info.height));
     if (width, height) != (markers.width, markers.height) {
@@ -56,7 +56,7 @@ pub(super) fn decode(
     limits
         .check_memory(markers.memory(output.num_components() as u64 + 1) + guarded.len() as u64)?;
     decoder.set_options(options.jpeg_set_out_colorspace(output));
-    let pixels = decode_pixels(&mut decoder)?;
+    let pixels = decoder.decode().map_err(reason)?;
     let luma = match output {
         ColorSpace::Luma => pixels,
         ColorSpace::YCbCr => pixels.into_iter().step_by(3).collect(),
@@ -65,14 +65,4 @@ pub(super) fn decode(
     let luma = GrayImage::from_raw(width, height, luma)
         .ok_or_else(|| damaged("the decoder gave too few pixels".to_owned()))?;
     Ok((luma, orientation::of_exif(info.exif_data.as_deref())))
-}
-
-/// Decodes, with a panic of the decoder turned into an error: it indexes by what a hostile file says.
-fn decode_pixels(decoder: &mut JpegDecoder<ZCursor<&[u8]>>) -> Result<Vec<u8>, IngestError> {
-    // The decoder is not used again after a panic, so what it leaves behind is never seen.
-    match catch_unwind(AssertUnwindSafe(|| decoder.decode())) {
-        Ok(Ok(pixels)) => Ok(pixels),
-        Ok(Err(error)) => Err(Format::Jpeg.damaged(error.to_string())),
-        Err(_) => Err(Format::Jpeg.damaged("its structure is not supported")),
-    }
 }

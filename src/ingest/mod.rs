@@ -18,6 +18,7 @@
 //! ```
 
 mod containers;
+mod guard;
 mod jpeg;
 mod jpeg_markers;
 mod limits;
@@ -60,11 +61,11 @@ pub enum IngestError {
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GrayFrame, IngestError> {
     limits.check_bytes(bytes.len())?;
     let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
-    let (luma, orientation) = match format {
-        Format::Jpeg => jpeg::decode(bytes, limits)?,
-        Format::Png => raster::decode_png(bytes, limits)?,
-        Format::WebP => raster::decode_webp(bytes, limits)?,
-    };
+    let (luma, orientation) = guard::unless_it_panics(format, || match format {
+        Format::Jpeg => jpeg::decode(bytes, limits),
+        Format::Png => raster::decode_png(bytes, limits),
+        Format::WebP => raster::decode_webp(bytes, limits),
+    })?;
     let upright = orientation::apply(luma, orientation);
     let (width, height) = upright.dimensions();
     GrayFrame::from_luma(width, height, upright.into_raw())
