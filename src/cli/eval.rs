@@ -2,8 +2,12 @@
 
 use super::params::ParamFlags;
 use super::progress;
-use bagtrack::eval::{self, Report, Sequence};
+use bagtrack::eval::plots::{self, Evaluated};
+use bagtrack::eval::{self, Comparison, Report, Sequence, SequenceRuns, Variant, ablation};
 use bagtrack::ingest::Limits;
+use bagtrack::tracker::Params;
+use std::error::Error;
+use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -22,39 +26,122 @@ pub struct Args {
     /// Threads that share the seeds of a sequence. Times (ms/frame) are honest with 1 only.
     #[arg(long, default_value = "1")]
     jobs: NonZeroUsize,
-    /// A table for people, or JSON.
+    /// A table for people, JSON, or a table as markdown.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
+    /// What the tracker is without each of its mends: the means over the sequences, a row each.
+    #[arg(long)]
+    ablate: bool,
+    /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the preset
+    /// as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
+    #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
+    sweep: Option<PathBuf>,
+    /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these names.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Format {
     Table,
     Json,
+    Markdown,
 }
 
 /// Runs `eval`.
-pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
-    let params = args.params.params()?;
+pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
+    let base = args.params.params()?;
+    let variants = variants(&args, &base)?;
+    let evaluated = evaluate(&args, &base, &variants)?;
+    if let Some(dir) = &args.plots {
+        plots::draw(dir, &evaluated)?;
+    }
+    let preset = args.params.preset;
+    let mut reports = Vec::new();
+    for (variant, evaluated) in variants.into_iter().zip(&evaluated) {
+        let report = Report::new(preset, &evaluated.runs).ok_or("none of the paths is a folder")?;
+        reports.push((variant, report));
+    }
+    if !args.ablate && args.sweep.is_none() {
+        let (_, report) = &reports[0];
+        return print(args.format, report, Report::markdown);
+    }
+    let names = evaluated[0].runs.iter().map(|runs| runs.name.clone());
+    let comparison = Comparison::new(preset, args.seeds.get(), names.collect(), &reports);
+    print(args.format, &comparison, Comparison::markdown)
+}
+
+/// The preset alone, or what is to be set side by side; at least one.
+fn variants(args: &Args, base: &Params) -> Result<Vec<Variant>, Box<dyn Error>> {
+    let label = args.params.label();
+    if let Some(path) = &args.sweep {
+        let shown = path.display();
+        let text = fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+        return Ok(eval::parse_sweep(&text, base).map_err(|error| format!("{shown}: {error}"))?);
+    }
+    let mut variants = ablation::variants(&label);
+    if !args.ablate {
+        variants.truncate(1);
+    }
+    Ok(variants)
+}
+
+/// Runs every variant on every sequence. Variants with the same parameters are run once.
+fn evaluate(
+    args: &Args,
+    base: &Params,
+    variants: &[Variant],
+) -> Result<Vec<Evaluated>, Box<dyn Error>> {
     let dirs: Vec<&PathBuf> = args.dirs.iter().filter(|dir| !dir.is_file()).collect();
     // A wrong path should be told now, not after the sequences before it.
     for dir in &dirs {
         eval::frames::list(dir)?;
         Sequence::read_boxes(dir)?;
     }
-    let bar = progress::bar(dirs.len() as u64, "sequences");
-    let mut sequences = Vec::new();
+    if let Some(dir) = &args.plots {
+        plots::prepare(dir)?;
+    }
+    let mut params = Vec::new();
+    for variant in variants {
+        let set = variant.params(base);
+        params.push(set.map_err(|error| format!("{}: {error}", variant.label))?);
+    }
+    let mut evaluated: Vec<Evaluated> = variants
+        .iter()
+        .map(|variant| Evaluated {
+            label: variant.label.clone(),
+            runs: Vec::new(),
+        })
+        .collect();
+    let bar = progress::bar((dirs.len() * variants.len()) as u64, "sequences");
     for dir in dirs {
         let sequence = Sequence::load(dir, &Limits::default())?;
-        sequences.push(eval::run(&sequence, &params, args.seeds, args.jobs)?);
-        bar.inc(1);
+        let mut done: Vec<SequenceRuns> = Vec::new();
+        for (index, set) in params.iter().enumerate() {
+            let same = params[..index].iter().position(|before| before == set);
+            done.push(match same {
+                Some(before) => done[before].clone(),
+                None => eval::run(&sequence, set, args.seeds, args.jobs)?,
+            });
+            bar.inc(1);
+        }
+        for (variant, runs) in evaluated.iter_mut().zip(done) {
+            variant.runs.push(runs);
+        }
     }
     bar.finish_and_clear();
-    let report = Report::new(args.params.preset, args.seeds.get(), sequences)
-        .ok_or("none of the paths is a folder")?;
-    match args.format {
+    Ok(evaluated)
+}
+
+fn print<R: serde::Serialize + std::fmt::Display>(
+    format: Format,
+    report: &R,
+    markdown: fn(&R) -> String,
+) -> Result<(), Box<dyn Error>> {
+    match format {
         Format::Table => print!("{report}"),
-        Format::Json => println!("{}", serde_json::to_string_pretty(&report)?),
+        Format::Json => println!("{}", serde_json::to_string_pretty(report)?),
+        Format::Markdown => print!("{}", markdown(report)),
     }
     Ok(())
 }

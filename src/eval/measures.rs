@@ -26,11 +26,16 @@ pub fn precision(center_errors: &[f64], radius: f64) -> f64 {
     share(center_errors, |error| error <= radius)
 }
 
+/// The share of overlaps that exceed `threshold`, 0 to 1.
+pub fn success(overlaps: &[f64], threshold: f64) -> f64 {
+    share(overlaps, |overlap| overlap > threshold)
+}
+
 /// The area under the success plot: the mean, over the 21 thresholds 0, 0.05 … 1, of the share of overlaps that
 /// exceed the threshold; 0 to 1 (exactly 1 cannot be reached: no overlap exceeds 1).
 pub fn success_auc(overlaps: &[f64]) -> f64 {
     let shares: Vec<f64> = (0..=20)
-        .map(|step| share(overlaps, |overlap| overlap > f64::from(step) / 20.0))
+        .map(|step| success(overlaps, f64::from(step) / 20.0))
         .collect();
     mean(&shares)
 }

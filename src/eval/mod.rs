@@ -1,16 +1,32 @@
-//! Annotated sequences, error measures, and runs over several seeds.
+//! Annotated sequences, error measures, runs over several seeds, and what they show.
 //!
 //! A [`Sequence`] is a folder in the OTB layout; [`run`] tracks through it once for each seed;
-//! [`Report`] holds the figures as a table or as JSON. What could go wrong: frames and annotations that do not
-//! belong together would give figures that mean nothing; so a sequence with a missing frame, a missing line or an
-//! unreadable frame is refused as a whole, by a message that names the folder.
+//! [`Report`] holds the figures as a table or as JSON, and says how good the [score](calibration) is.
+//! [`Comparison`] sets [variants](Variant) side by side, of which the [`ablation`] is a fixed list, and [`plots`] draws
+//! them. What could go wrong: frames and annotations that do not belong together would give figures that mean nothing;
+//! so a sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, by a message that
+//! names the folder.
 
+pub mod ablation;
+pub mod calibration;
+mod comparison;
+mod figures;
 pub mod frames;
+mod isotonic;
 pub mod measures;
+pub mod plots;
 mod report;
 mod run;
 mod sequence;
+mod table;
+mod variant;
 
-pub use report::{Figures, Named, Report};
-pub use run::{EvalError, SeedRun, run};
+pub use comparison::Comparison;
+pub use figures::{Figures, Named, ScoreFigures, SeedMean};
+pub use isotonic::Isotonic;
+pub use report::Report;
+pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};
 pub use sequence::{Sequence, SequenceError, parse_boxes};
+pub use variant::{
+    AssignError, Assignment, SweepError, Variant, assign, parse_assignment, parse_sweep,
+};

@@ -1,132 +1,126 @@
-//! The figures, as a table for people and as JSON for programs.
+//! All figures of an evaluation, as a table for people and as JSON for programs.
 
-use super::measures::{mean, standard_error};
+use super::figures::{Figures, Named, ScoreFigures, SeedMean};
+use super::run::SequenceRuns;
+use super::table::{Table, figure};
 use crate::tracker::Preset;
 use serde::Serialize;
-use std::fmt;
+use std::fmt::{self, Write};
 
-/// The figures of a sequence (means over the seeds), or of all sequences (their mean).
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figures {
-    /// Number of frames; in the mean over sequences, of all together.
-    pub frames: usize,
-    /// Number of annotated frames, the first, which is given and not scored, among them; in the mean, of all together.
-    pub annotated: usize,
-    /// Mean distance of the centres in pixels of the uploaded frames.
-    pub center_error: f64,
-    /// Standard error of `center_error`: over the seeds' means for a sequence, over the sequences' means in the mean
-    /// over sequences (the bars of the paper's plots). None (JSON null) for fewer than two.
-    pub center_error_sem: Option<f64>,
-    /// Share of scored frames whose centre is at most 20 pixels off, 0 to 1.
-    pub precision_20: f64,
-    /// Mean intersection over union, 0 to 1.
-    pub overlap: f64,
-    /// Area under the success plot, 0 to 1.
-    pub success_auc: f64,
-    /// Mean wall time of one `Tracker::step` alone (no decoding) on its one thread, in milliseconds.
-    pub step_ms: f64,
-}
+const HEADER: [&str; 9] = [
+    "sequence",
+    "frames",
+    "annotated",
+    "centre error",
+    "sem",
+    "precision@20",
+    "overlap",
+    "auc",
+    "ms/frame",
+];
 
-impl Figures {
-    /// The means over the runs of one sequence.
-    pub(super) fn over_seeds(runs: &[Figures]) -> Figures {
-        Figures {
-            frames: runs[0].frames,
-            annotated: runs[0].annotated,
-            ..Self::means(runs)
-        }
-    }
-
-    /// The means over sequences, each with the same weight however long it is.
-    fn over_sequences(sequences: &[Figures]) -> Figures {
-        Figures {
-            frames: sequences.iter().map(|s| s.frames).sum(),
-            annotated: sequences.iter().map(|s| s.annotated).sum(),
-            ..Self::means(sequences)
-        }
-    }
-
-    fn means(of: &[Figures]) -> Figures {
-        let all = |field: fn(&Figures) -> f64| of.iter().map(field).collect::<Vec<f64>>();
-        let center_errors = all(|f| f.center_error);
-        Figures {
-            frames: 0,
-            annotated: 0,
-            center_error: mean(&center_errors),
-            center_error_sem: standard_error(&center_errors),
-            precision_20: mean(&all(|f| f.precision_20)),
-            overlap: mean(&all(|f| f.overlap)),
-            success_auc: mean(&all(|f| f.success_auc)),
-            step_ms: mean(&all(|f| f.step_ms)),
-        }
-    }
-}
-
-/// A sequence's figures under its name.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Named {
-    /// Name of the sequence.
-    pub name: String,
-    /// Its figures.
-    #[serde(flatten)]
-    pub figures: Figures,
-}
-
-/// All figures of an evaluation. As text (`Display`) a table, as JSON (`Serialize`) the same in full precision.
+/// All figures of an evaluation. As text (`Display`) a table and some lines, as JSON (`Serialize`) the same in full
+/// precision.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     preset: Preset,
     seeds: usize,
     sequences: Vec<Named>,
     mean: Figures,
+    seed_means: Vec<SeedMean>,
+    worst_seed: SeedMean,
+    score: ScoreFigures,
 }
 
 impl Report {
-    /// Puts the figures of one or more sequences together; none where there are none.
-    pub fn new(preset: Preset, seeds: usize, sequences: Vec<Named>) -> Option<Self> {
-        if sequences.is_empty() {
-            return None;
-        }
-        let figures: Vec<Figures> = sequences.iter().map(|s| s.figures.clone()).collect();
+    /// Puts the runs of one or more sequences together; None where there are none.
+    pub fn new(preset: Preset, runs: &[SequenceRuns]) -> Option<Self> {
+        let sequences: Vec<Named> = runs.iter().map(Named::of).collect();
+        let seed_means = SeedMean::all(runs);
         Some(Self {
             preset,
-            seeds,
-            mean: Figures::over_sequences(&figures),
+            seeds: seed_means.len(),
+            mean: Figures::over_sequences(&sequences),
             sequences,
+            worst_seed: SeedMean::worst(&seed_means)?,
+            seed_means,
+            score: ScoreFigures::of(runs),
         })
+    }
+
+    /// The means over the sequences.
+    pub fn mean(&self) -> &Figures {
+        &self.mean
+    }
+
+    /// The seed with the largest mean centre error over the sequences.
+    pub fn worst_seed(&self) -> &SeedMean {
+        &self.worst_seed
+    }
+
+    /// The table and the lines below it as markdown.
+    pub fn markdown(&self) -> String {
+        let lines = self.lines().replace('\n', "\n\n");
+        format!("{}\n{}\n", self.table().markdown(), lines.trim_end())
+    }
+
+    fn table(&self) -> Table {
+        let mut table = Table::new(&HEADER);
+        let rows = self.sequences.iter().map(|s| (s.name.as_str(), &s.figures));
+        for (name, figures) in rows.chain([("mean", &self.mean)]) {
+            table.push(vec![
+                name.to_owned(),
+                figures.frames.to_string(),
+                figures.annotated.to_string(),
+                figure(Some(figures.center_error), 1),
+                figure(figures.center_error_sem, 1),
+                figure(Some(figures.precision_20), 3),
+                figure(Some(figures.overlap), 3),
+                figure(Some(figures.success_auc), 3),
+                figure(Some(figures.step_ms), 3),
+            ]);
+        }
+        table
+    }
+
+    fn lines(&self) -> String {
+        let mut text = String::new();
+        if let Some(error) = self.mean.center_error_sem {
+            let count = self.sequences.len();
+            let _ = writeln!(
+                text,
+                "standard error over the {count} sequences: {error:.1} px"
+            );
+        }
+        let seeds: Vec<String> = self
+            .seed_means
+            .iter()
+            .map(|mean| format!("{:.1}", mean.center_error))
+            .collect();
+        let worst = &self.worst_seed;
+        let _ = writeln!(
+            text,
+            "mean centre error of the seeds 0, 1 ...: {} px; worst {:.1} px (seed {}: overlap {:.3}, precision@20 {:.3})",
+            seeds.join(", "),
+            worst.center_error,
+            worst.seed,
+            worst.overlap,
+            worst.precision_20,
+        );
+        let _ = writeln!(
+            text,
+            "score against overlap >= 0.5, {} frames: area under the ROC curve {}, calibration error {}, leaving one sequence out {}",
+            self.score.frames,
+            figure(self.score.roc_auc, 3),
+            figure(self.score.ece, 3),
+            figure(self.score.ece_leave_one_out, 3),
+        );
+        text
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = self.sequences.iter().map(|s| (s.name.as_str(), &s.figures));
-        let width = rows
-            .clone()
-            .map(|(name, _)| name.chars().count())
-            .max()
-            .unwrap_or(0)
-            .max(8);
-        writeln!(
-            f,
-            "{:width$}  frames  annotated  centre error    sem  precision@20  overlap    auc  ms/frame",
-            "sequence"
-        )?;
-        for (name, figures) in rows.chain([("mean", &self.mean)]) {
-            let sem = figures
-                .center_error_sem
-                .map_or("-".to_owned(), |sem| format!("{sem:.1}"));
-            writeln!(
-                f,
-                "{name:width$}  {:>6}  {:>9}  {:>12.1}  {sem:>5}  {:>12.3}  {:>7.3}  {:>5.3}  {:>8.3}",
-                figures.frames,
-                figures.annotated,
-                figures.center_error,
-                figures.precision_20,
-                figures.overlap,
-                figures.success_auc,
-                figures.step_ms,
-            )?;
-        }
-        Ok(())
+        write!(f, "{}\n{}", self.table().text(), self.lines())
     }
 }

@@ -1,9 +1,9 @@
 //! Runs: one sequence, several seeds.
 
-use super::measures::{self, PRECISION_RADIUS};
-use super::report::{Figures, Named};
+use super::calibration::{HIT_OVERLAP, Judged};
+use super::measures;
 use super::sequence::Sequence;
-use crate::tracker::{Params, Rect, Tracker, TrackerError};
+use crate::tracker::{Params, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -28,13 +28,52 @@ pub enum EvalError {
     NothingToScore(String),
 }
 
+/// An annotated frame of a run, held against its annotation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoredFrame {
+    /// Index of the frame in the sequence, from 0; at least 1, for the first is given.
+    pub index: usize,
+    /// Distance of the centres in pixels of the uploaded frames.
+    pub center_error: f64,
+    /// Intersection over union, 0 to 1.
+    pub overlap: f64,
+    /// The tracker's score, 0 to 1.
+    pub score: f64,
+}
+
 /// What one seed gave.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeedRun {
-    /// The tracked box of every frame; that of the first is the given one.
-    pub boxes: Vec<Rect>,
-    /// Wall time spent in [`Tracker::step`] alone.
-    pub step_time: Duration,
+    /// The annotated frames after the first, in order; at least one.
+    pub scored: Vec<ScoredFrame>,
+    /// Mean wall time of one [`Tracker::step`] alone, in milliseconds.
+    pub step_ms: f64,
+}
+
+/// What all seeds gave on one sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SequenceRuns {
+    /// Name of the sequence.
+    pub name: String,
+    /// Number of frames.
+    pub frames: usize,
+    /// Number of annotated frames, the first among them.
+    pub annotated: usize,
+    /// The runs with the seeds 0, 1, 2 …; at least one, all with the same frames.
+    pub seeds: Vec<SeedRun>,
+}
+
+impl SequenceRuns {
+    /// Scores and hits of all frames of all seeds.
+    pub fn outcomes(&self) -> Vec<Judged> {
+        let scored = self.seeds.iter().flat_map(|seed| &seed.scored);
+        scored
+            .map(|frame| Judged {
+                score: frame.score,
+                hit: frame.overlap >= HIT_OVERLAP,
+            })
+            .collect()
+    }
 }
 
 impl SeedRun {
@@ -46,56 +85,39 @@ impl SeedRun {
                 source,
             }
         };
-        let first =
-            sequence.boxes[0].ok_or_else(|| EvalError::NothingToScore(sequence.name.clone()))?;
+        let nothing = || EvalError::NothingToScore(sequence.name.clone());
+        let first = sequence.boxes[0].ok_or_else(nothing)?;
         let mut tracker = Tracker::new(&sequence.frames[0], first, params).map_err(refuse(0))?;
-        let mut boxes = vec![first];
+        let mut scored = Vec::new();
         let mut step_time = Duration::ZERO;
         for (index, frame) in sequence.frames.iter().enumerate().skip(1) {
             let start = Instant::now();
             let estimate = tracker.step(frame);
             step_time += start.elapsed();
-            boxes.push(estimate.map_err(refuse(index))?.target);
+            let estimate = estimate.map_err(refuse(index))?;
+            let Some(annotated) = &sequence.boxes[index] else {
+                continue;
+            };
+            scored.push(ScoredFrame {
+                index,
+                center_error: measures::center_error(&estimate.target, annotated),
+                overlap: measures::overlap(&estimate.target, annotated),
+                score: f64::from(estimate.score),
+            });
         }
-        Ok(Self { boxes, step_time })
-    }
-
-    /// The figures of this run against the annotated frames after the first, which is given.
-    fn figures(&self, sequence: &Sequence) -> Result<Figures, EvalError> {
-        let scored: Vec<(&Rect, &Rect)> = self
-            .boxes
-            .iter()
-            .zip(&sequence.boxes)
-            .skip(1)
-            .filter_map(|(tracked, annotated)| Some((tracked, annotated.as_ref()?)))
-            .collect();
         if scored.is_empty() {
-            return Err(EvalError::NothingToScore(sequence.name.clone()));
+            return Err(nothing());
         }
-        let errors: Vec<f64> = scored
-            .iter()
-            .map(|(a, b)| measures::center_error(a, b))
-            .collect();
-        let overlaps: Vec<f64> = scored
-            .iter()
-            .map(|(a, b)| measures::overlap(a, b))
-            .collect();
-        let steps = (self.boxes.len() - 1) as f64;
-        Ok(Figures {
-            frames: self.boxes.len(),
-            annotated: sequence.boxes.iter().flatten().count(),
-            center_error: measures::mean(&errors),
-            center_error_sem: None,
-            precision_20: measures::precision(&errors, PRECISION_RADIUS),
-            overlap: measures::mean(&overlaps),
-            success_auc: measures::success_auc(&overlaps),
-            step_ms: self.step_time.as_secs_f64() * 1000.0 / steps,
+        let steps = (sequence.frames.len() - 1) as f64;
+        Ok(Self {
+            scored,
+            step_ms: step_time.as_secs_f64() * 1000.0 / steps,
         })
     }
 }
 
-/// Tracks through a sequence with the seeds 0 to `seeds` − 1, on `jobs` threads, and gives the means over the
-/// seeds. Times are honest with one job only: threads share the machine.
+/// Tracks through a sequence with the seeds 0 to `seeds` − 1, on `jobs` threads. Times are honest with one job only:
+/// threads share the machine.
 ///
 /// # Errors
 /// See [`EvalError`]; of several, that of the lowest seed.
@@ -104,13 +126,13 @@ pub fn run(
     params: &Params,
     seeds: NonZeroUsize,
     jobs: NonZeroUsize,
-) -> Result<Named, EvalError> {
+) -> Result<SequenceRuns, EvalError> {
     let one = |seed: usize| {
         let params = Params {
             seed: seed as u64,
             ..params.clone()
         };
-        SeedRun::track(sequence, params)?.figures(sequence)
+        SeedRun::track(sequence, params)
     };
     let next = AtomicUsize::new(0);
     let work = || {
@@ -123,7 +145,7 @@ pub fn run(
             done.push((seed, one(seed)));
         }
     };
-    let mut done: Vec<(usize, Result<Figures, EvalError>)> = if jobs.get() == 1 {
+    let mut done: Vec<(usize, Result<SeedRun, EvalError>)> = if jobs.get() == 1 {
         work()
     } else {
         thread::scope(|scope| {
@@ -141,12 +163,14 @@ pub fn run(
         })
     };
     done.sort_by_key(|(seed, _)| *seed);
-    let runs = done
+    let seeds = done
         .into_iter()
-        .map(|(_, figures)| figures)
-        .collect::<Result<Vec<Figures>, EvalError>>()?;
-    Ok(Named {
+        .map(|(_, run)| run)
+        .collect::<Result<Vec<SeedRun>, EvalError>>()?;
+    Ok(SequenceRuns {
         name: sequence.name.clone(),
-        figures: Figures::over_seeds(&runs),
+        frames: sequence.frames.len(),
+        annotated: sequence.boxes.iter().flatten().count(),
+        seeds,
     })
 }
