@@ -1,15 +1,19 @@
 //! `bagtrack sample`.
 
 use super::{output, progress};
-use bagtrack::sample::{Clip, Format, Settings};
+use bagtrack::sample::{Clip, Format, Scene, Settings};
 use std::path::PathBuf;
 
 /// Flags of `sample`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folder to write: img/0001.jpg and so on, and groundtruth_rect.txt (OTB layout, 1-based pixels).
+    /// Folder to write: img/0001.jpg and so on, groundtruth_rect.txt (OTB layout, 1-based pixels, 0,0,0,0 while nothing of
+    /// the target is seen), and visible.txt (1 or 0 a line: whether any of it is seen).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// What happens to the target.
+    #[arg(long, value_enum, default_value_t = SceneFlag::Default)]
+    scene: SceneFlag,
     /// Number of frames.
     #[arg(long, default_value_t = Settings::default().frames)]
     frames: u32,
@@ -33,13 +37,29 @@ enum FormatFlag {
     Png,
 }
 
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum SceneFlag {
+    /// It turns, grows, dims and is half covered for a while; it is always in sight.
+    Default,
+    /// It passes behind a post: out of sight for 20 frames, it comes out on the other side.
+    Covered,
+    /// It leaves the frame, and comes back at the same side after 25 frames, higher or lower.
+    Leaves,
+}
+
 /// Runs `sample`.
 pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     let format = match args.format {
         FormatFlag::Jpeg => Format::Jpeg,
         FormatFlag::Png => Format::Png,
     };
+    let scene = match args.scene {
+        SceneFlag::Default => Scene::Default,
+        SceneFlag::Covered => Scene::Covered,
+        SceneFlag::Leaves => Scene::Leaves,
+    };
     let clip = Clip::new(Settings {
+        scene,
         frames: args.frames,
         width: args.width,
         height: args.height,

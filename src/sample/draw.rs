@@ -1,7 +1,7 @@
 //! A frame: the wall, the card, the board, each averaged over the area of a pixel; then light and sensor noise.
 
 use super::Settings;
-use super::scene::Scene;
+use super::scene::Course;
 use super::texture::{self, Color};
 use crate::tracker::Rect;
 use image::{Rgb, RgbImage};
@@ -45,22 +45,22 @@ fn unit(settings: Settings) -> f64 {
 
 pub(super) fn frame(
     settings: Settings,
-    scene: &Scene,
+    course: &Course,
     background: &Background,
     index: u32,
 ) -> RgbImage {
     let mut pixels = background.pixels.clone();
     let (seed, unit) = (settings.seed, unit(settings));
-    let card = scene.target(index);
+    let card = course.target(index);
     lay(&mut pixels, settings, card, |x, y| {
         texture::card((x - card.x) / card.width, (y - card.y) / card.height, seed)
     });
-    if let Some(board) = scene.board(index) {
+    if let Some(board) = course.board(index) {
         lay(&mut pixels, settings, board, |x, y| {
             texture::board((x - board.x) / unit, (y - board.y) / unit, seed)
         });
     }
-    let light = 255.0 * scene.light(index);
+    let light = 255.0 * course.light(index);
     // One stream of noise a frame, so that any frame can be drawn by itself.
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(u64::from(index) + 1);

@@ -50,7 +50,7 @@ pub(super) fn write(
     };
     let pictures = dir.join("img");
     fs::create_dir_all(&pictures).map_err(|error| failed(&pictures, error.to_string()))?;
-    let mut truth = String::new();
+    let (mut truth, mut seen) = (String::new(), String::new());
     for index in 0..clip.frames() {
         let path = pictures.join(format!("{:04}.{}", index + 1, format.extension()));
         let bytes = format
@@ -58,15 +58,24 @@ pub(super) fn write(
             .map_err(|error| failed(&path, error.to_string()))?;
         fs::write(&path, bytes).map_err(|error| failed(&path, error.to_string()))?;
         let card = clip.target(index);
-        truth += &format!(
-            "{:.3},{:.3},{:.3},{:.3}\n",
-            card.x + 1.0,
-            card.y + 1.0,
-            card.width,
-            card.height
-        );
+        if clip.visible(index) > 0.0 {
+            truth += &format!(
+                "{:.3},{:.3},{:.3},{:.3}\n",
+                card.x + 1.0,
+                card.y + 1.0,
+                card.width,
+                card.height
+            );
+            seen += "1\n";
+        } else {
+            truth += "0,0,0,0\n";
+            seen += "0\n";
+        }
         progress();
     }
-    let path = dir.join("groundtruth_rect.txt");
-    fs::write(&path, truth).map_err(|error| failed(&path, error.to_string()))
+    for (name, text) in [("groundtruth_rect.txt", truth), ("visible.txt", seen)] {
+        let path = dir.join(name);
+        fs::write(&path, text).map_err(|error| failed(&path, error.to_string()))?;
+    }
+    Ok(())
 }

@@ -2,6 +2,8 @@
 //! comes nearer, passes through a dim spell and is half covered for a while, in front of a textured wall on
 //! which similar patches hang, seen by a sensor with noise.
 //!
+//! That is the default [`Scene`]; in others the card goes out of sight and comes back.
+//!
 //! The same settings draw the same clip, bit for bit, on one machine. What could go wrong: a frame so small
 //! that the card has no pixels to speak of; so sizes are checked.
 //!
@@ -21,11 +23,12 @@ mod scene;
 mod texture;
 
 pub use folder::Format;
+pub use scene::Scene;
 
 use crate::tracker::Rect;
 use draw::Background;
 use image::RgbImage;
-use scene::Scene;
+use scene::Course;
 use std::path::{Path, PathBuf};
 
 /// Smallest side of a frame: the card is then about ten pixels wide.
@@ -36,7 +39,9 @@ pub const MAX_SIDE: u32 = 4096;
 /// What the clip is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// Number of frames, 1 or more.
+    /// What happens.
+    pub scene: Scene,
+    /// Number of frames, [`Scene::least_frames`] or more.
     pub frames: u32,
     /// Width of a frame in pixels, [`MIN_SIDE`] to [`MAX_SIDE`].
     pub width: u32,
@@ -49,6 +54,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            scene: Scene::Default,
             frames: 150,
             width: 320,
             height: 240,
@@ -61,7 +67,7 @@ impl Default for Settings {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleError {
-    /// There are no frames, or a side is out of its range.
+    /// There are too few frames, or a side is out of its range.
     #[error("{name} is {value}; it must be {expected}")]
     Setting {
         /// Name of the setting.
@@ -85,7 +91,7 @@ pub enum SampleError {
 #[derive(Debug)]
 pub struct Clip {
     settings: Settings,
-    scene: Scene,
+    course: Course,
     background: Background,
 }
 
@@ -102,8 +108,10 @@ impl Clip {
                 expected,
             })
         };
-        if settings.frames == 0 {
-            return out_of_range("frames", 0, "1 or more".to_owned());
+        let least = settings.scene.least_frames();
+        if settings.frames < least {
+            let expected = format!("{least} or more in this scene");
+            return out_of_range("frames", settings.frames, expected);
         }
         for (name, side) in [("width", settings.width), ("height", settings.height)] {
             if !(MIN_SIDE..=MAX_SIDE).contains(&side) {
@@ -112,7 +120,7 @@ impl Clip {
         }
         Ok(Self {
             settings,
-            scene: Scene::new(settings),
+            course: Course::new(settings),
             background: Background::draw(settings),
         })
     }
@@ -122,25 +130,32 @@ impl Clip {
         self.settings.frames
     }
 
-    /// Where the card is in frame `index` (from 0): exactly, the covered part included, in pixels from the
+    /// Where the card is in frame `index` (from 0): exactly, the part that is not seen included, in pixels from the
     /// top-left corner of the frame.
     pub fn target(&self, index: u32) -> Rect {
-        self.scene.target(index)
+        self.course.target(index)
     }
 
-    /// The share of the card's area that is covered in frame `index`, 0 to 0.5.
+    /// The share of the card's area that something in front of it covers in frame `index`, 0 to 1 (in the default
+    /// scene 0 to 0.5).
     pub fn covered(&self, index: u32) -> f64 {
-        self.scene.covered(index)
+        self.course.covered(index)
+    }
+
+    /// The share of the card's area that is seen in frame `index`: in the frame, and not covered; 0 to 1.
+    pub fn visible(&self, index: u32) -> f64 {
+        self.course.visible(index)
     }
 
     /// Draws frame `index` (from 0).
     pub fn draw(&self, index: u32) -> RgbImage {
-        draw::frame(self.settings, &self.scene, &self.background, index)
+        draw::frame(self.settings, &self.course, &self.background, index)
     }
 
     /// Writes the clip into `dir` in the OTB layout: `img/0001.jpg` (or `.png`) and so on, and
-    /// `groundtruth_rect.txt` with `x,y,width,height` a line, in 1-based pixels. Files of these names are
-    /// written over. Calls `progress` after each frame.
+    /// `groundtruth_rect.txt` with `x,y,width,height` a line, in 1-based pixels: the whole card, and `0,0,0,0` (which
+    /// is not scored) while nothing of it is seen. `visible.txt` has 1 or 0 a line: whether any of it is seen. Files
+    /// of these names are written over. Calls `progress` after each frame.
     ///
     /// # Errors
     /// [`SampleError::Write`].

@@ -1,29 +1,54 @@
-//! What happens in the clip, frame by frame: where the card is, how large, how bright, how much of it is covered.
+//! What happens in the clip, frame by frame: where the card is, how large, how bright, and what stands before it.
+
+mod covered;
+mod default;
+mod leaves;
 
 use super::Settings;
 use crate::tracker::Rect;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::TAU;
 
 /// Width of the card by its height.
 const ASPECT: f64 = 0.8;
 /// Height of the card by the shorter side of the frame, at the start and at the end.
 const HEIGHT: (f64, f64) = (0.24, 0.36);
-/// Frames that the path takes to come back in x and in y: about 4 pixels a frame at 320 x 240.
-const PERIOD: (f64, f64) = (140.0, 97.0);
-/// Shares of the clip's length between which it is dim, and between which the card is half covered.
-const DIM: (f64, f64) = (0.25, 0.48);
-const COVERED: (f64, f64) = (0.58, 0.76);
 
-/// The course of events.
-#[derive(Debug)]
-pub(super) struct Scene {
-    settings: Settings,
-    phase: (f64, f64),
+/// What happens to the target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scene {
+    /// It moves in smooth turns, comes nearer, passes through a dim spell, and is half covered for a while. It is always
+    /// in sight.
+    #[default]
+    Default,
+    /// It passes behind a broad post that stands from the top of the frame to the bottom: for 20 frames in the middle of
+    /// the clip nothing of it is seen, and it comes out on the other side. The post does not move, so nothing
+    /// tells where the target is behind it.
+    Covered,
+    /// It leaves the frame at one side: for 25 frames in the middle of the clip nothing of it is seen, and it comes back
+    /// at the same side, but higher or lower by about two of its heights.
+    Leaves,
 }
 
 impl Scene {
+    /// The least number of frames: the target must be in full sight before and after.
+    pub fn least_frames(self) -> u32 {
+        match self {
+            Scene::Default => 1,
+            Scene::Covered | Scene::Leaves => 90,
+        }
+    }
+}
+
+/// The course of events.
+#[derive(Debug)]
+pub(super) struct Course {
+    settings: Settings,
+    /// Two numbers in [0, 1) by which the seed chooses the path.
+    phase: (f64, f64),
+}
+
+impl Course {
     pub(super) fn new(settings: Settings) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         Self {
@@ -37,49 +62,80 @@ impl Scene {
         f64::from(index) / f64::from(self.settings.frames.max(2) - 1)
     }
 
-    pub(super) fn target(&self, index: u32) -> Rect {
-        let (frame_width, frame_height) = (
+    /// Frames from the one in the middle of the clip, negative before it.
+    fn from_middle(&self, index: u32) -> f64 {
+        f64::from(index) - f64::from(self.settings.frames / 2)
+    }
+
+    fn size(&self) -> (f64, f64) {
+        (
             f64::from(self.settings.width),
             f64::from(self.settings.height),
-        );
+        )
+    }
+
+    /// Width and height of the card: it comes nearer.
+    fn card(&self, index: u32) -> (f64, f64) {
+        let (width, height) = self.size();
         let grown = smooth(self.progress(index));
-        let height = frame_width.min(frame_height) * (HEIGHT.0 + (HEIGHT.1 - HEIGHT.0) * grown);
-        let width = height * ASPECT;
-        let turn = |period: f64, phase: f64| (TAU * (f64::from(index) / period + phase)).sin();
-        let center_x = frame_width * (0.5 + 0.3 * turn(PERIOD.0, self.phase.0));
-        let center_y = frame_height * (0.5 + 0.2 * turn(PERIOD.1, self.phase.1));
+        let card = width.min(height) * (HEIGHT.0 + (HEIGHT.1 - HEIGHT.0) * grown);
+        (card * ASPECT, card)
+    }
+
+    /// `area` seen in a mirror, left for right, for half of the seeds.
+    fn mirrored(&self, area: Rect) -> Rect {
+        if self.phase.0 < 0.5 {
+            return area;
+        }
         Rect {
-            x: center_x - width / 2.0,
-            y: center_y - height / 2.0,
-            width,
-            height,
+            x: self.size().0 - area.x - area.width,
+            ..area
+        }
+    }
+
+    pub(super) fn target(&self, index: u32) -> Rect {
+        match self.settings.scene {
+            Scene::Default => default::target(self, index),
+            Scene::Covered => self.mirrored(covered::target(self, index)),
+            Scene::Leaves => self.mirrored(leaves::target(self, index)),
         }
     }
 
     /// Factor on all light.
     pub(super) fn light(&self, index: u32) -> f64 {
-        1.0 - 0.5 * spell(self.progress(index), DIM, 0.08)
-    }
-
-    pub(super) fn covered(&self, index: u32) -> f64 {
-        0.5 * spell(self.progress(index), COVERED, 0.05)
-    }
-
-    /// The board in front of the card: it comes up from below the frame with the card's motion to the side.
-    /// Its upper edge covers exactly the share that [`Scene::covered`] tells.
-    pub(super) fn board(&self, index: u32) -> Option<Rect> {
-        let covered = self.covered(index);
-        if covered == 0.0 {
-            return None;
+        match self.settings.scene {
+            Scene::Default => default::light(self, index),
+            Scene::Covered | Scene::Leaves => 1.0,
         }
+    }
+
+    /// What stands before the card.
+    pub(super) fn board(&self, index: u32) -> Option<Rect> {
+        match self.settings.scene {
+            Scene::Default => default::board(self, index),
+            Scene::Covered => Some(self.mirrored(covered::post(self))),
+            Scene::Leaves => None,
+        }
+    }
+
+    /// The share of the card that the board covers.
+    pub(super) fn covered(&self, index: u32) -> f64 {
+        match self.settings.scene {
+            Scene::Default => default::covered(self, index),
+            Scene::Covered | Scene::Leaves => {
+                let card = self.target(index);
+                let covered = |board: Rect| card.intersection(&board) / card.area();
+                self.board(index).map_or(0.0, covered)
+            }
+        }
+    }
+
+    /// The share of the card that is in the frame and not covered.
+    pub(super) fn visible(&self, index: u32) -> f64 {
         let card = self.target(index);
-        let y = card.y + card.height * (1.0 - covered);
-        Some(Rect {
-            x: card.x - 0.35 * card.width,
-            y,
-            width: 1.7 * card.width,
-            height: f64::from(self.settings.height) - y,
-        })
+        let (width, height) = self.size();
+        let inside = card.intersection(&Rect::new(0.0, 0.0, width, height)) / card.area();
+        (inside - self.covered(index)).max(0.0)
     }
 }
 
