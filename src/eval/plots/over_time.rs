@@ -1,4 +1,5 @@
-//! The centre error over time: for each frame the median over the seeds, and a band from the best seed to the worst.
+//! The centre error over time: for each frame the median over the seeds, and for the first variant a band from the
+//! best seed to the worst.
 
 use super::Evaluated;
 use super::curves::count;
@@ -7,7 +8,7 @@ use crate::eval::measures::PRECISION_RADIUS;
 use crate::eval::run::SequenceRuns;
 use plotters::prelude::*;
 
-/// As many variants as can be told apart with their bands.
+/// As many variants as can be told apart.
 const MOST: usize = 3;
 /// Annotated frames further apart than this are not joined: nothing is known of what is between.
 const LONGEST_GAP: f64 = 10.0;
@@ -29,16 +30,22 @@ pub(super) fn figure(evaluated: &[Evaluated], index: usize) -> Drawn {
     let shown = &evaluated[..evaluated.len().min(MOST)];
     let sequence = &shown[0].runs[index];
     let spreads: Vec<Vec<Spread>> = shown.iter().map(|v| spread(&v.runs[index])).collect();
-    let all = spreads.iter().flatten();
-    let highest = all.map(|at| at.most).fold(LEAST_HEIGHT, f64::max);
+    let medians = spreads.iter().flatten().map(|at| at.median);
+    let band = spreads[0].iter().map(|at| at.most);
+    let highest = medians.chain(band).fold(LEAST_HEIGHT, f64::max);
     let seeds = sequence.seeds.len();
     let title = if seeds == 1 {
         format!("{}: centre error over time, 1 seed", sequence.name)
     } else {
         format!(
-            "{}: centre error over time, median and range of {}",
+            "{}: centre error over time, median of {}{}",
             sequence.name,
-            count(seeds, "seed")
+            count(seeds, "seed"),
+            if shown.len() == 1 {
+                " and their range"
+            } else {
+                " (band: range of the first)"
+            }
         )
     };
     let labels = Labels {
@@ -61,16 +68,17 @@ pub(super) fn figure(evaluated: &[Evaluated], index: usize) -> Drawn {
         chart.draw_series(DashedLineSeries::new(limit, 3, 4, BLACK.mix(0.45).into()))?;
         for (curve, spread) in spreads.iter().enumerate().rev() {
             for part in spread.chunk_by(|a, b| b.frame - a.frame <= LONGEST_GAP) {
+                let median = part.iter().map(|at| (at.frame, at.median)).collect();
+                if curve > 0 {
+                    style::line(chart, curve, median)?;
+                    continue;
+                }
                 let top = part.iter().map(|at| (at.frame, at.most));
                 let bottom = part.iter().rev().map(|at| (at.frame, at.least));
                 let outline: Vec<(f64, f64)> = top.chain(bottom).collect();
                 let fill = style::color(curve).mix(0.2).filled();
                 chart.draw_series([Polygon::new(outline, fill)])?;
-                style::line(
-                    chart,
-                    curve,
-                    part.iter().map(|at| (at.frame, at.median)).collect(),
-                )?;
+                style::line(chart, curve, median)?;
             }
         }
         Ok(())

@@ -26,8 +26,9 @@ const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 const FONT: &str = "sans-serif";
 const MARGIN: u32 = 14;
-const TITLE: u32 = 34;
-const LEGEND_LINE: u32 = 20;
+const TITLE: u32 = 42;
+const LEGEND_LINE: u32 = 22;
+const LEGEND_GAP: u32 = 10;
 
 /// What a figure is about.
 pub(super) struct Labels<'a> {
@@ -69,23 +70,23 @@ pub(super) fn figure(
     let legend = LEGEND_LINE * labels.legend.len() as u32;
     let (width, height) = plane.size;
     {
-        let size = (width, TITLE + height + legend + MARGIN);
+        let size = (width, TITLE + height + LEGEND_GAP + legend + MARGIN);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, rest) = root.split_vertically(TITLE);
         head.draw(&Text::new(
             labels.title.clone(),
             (MARGIN as i32, MARGIN as i32),
-            (FONT, 17).into_font().color(&INK),
+            (FONT, 20).into_font().color(&INK),
         ))?;
         let (middle, foot) = rest.split_vertically(height);
         let mut chart = ChartBuilder::on(&middle)
             .margin_right(MARGIN * 2)
             .margin_left(MARGIN)
-            .x_label_area_size(44)
-            .y_label_area_size(54)
+            .x_label_area_size(48)
+            .y_label_area_size(58)
             .build_cartesian_2d(0.0..plane.x, 0.0..plane.y)?;
-        let small = (FONT, 13).into_font().color(&INK);
+        let small = (FONT, 16).into_font().color(&INK);
         chart
             .configure_mesh()
             .bold_line_style(GRID)
@@ -108,9 +109,10 @@ pub(super) fn figure(
 }
 
 fn legend_below(area: &Area<'_>, lines: &[String]) -> Result<(), Box<dyn std::error::Error>> {
-    let left = MARGIN as i32 + 54;
+    let left = MARGIN as i32 + 58;
     for (curve, text) in lines.iter().enumerate() {
-        let middle = LEGEND_LINE as i32 * curve as i32 + LEGEND_LINE as i32 / 2;
+        let top = LEGEND_GAP as i32 + LEGEND_LINE as i32 * curve as i32;
+        let middle = top + LEGEND_LINE as i32 / 2;
         let stroke = color(curve).stroke_width(3);
         // A dashed curve has two short strokes for a long one.
         let strokes: &[(i32, i32)] = if dashed(curve) {
@@ -125,7 +127,7 @@ fn legend_below(area: &Area<'_>, lines: &[String]) -> Result<(), Box<dyn std::er
         area.draw(&Text::new(
             text.clone(),
             (left + 36, middle - 7),
-            (FONT, 14).into_font().color(&INK),
+            (FONT, 17).into_font().color(&INK),
         ))?;
     }
     Ok(())
