@@ -53,7 +53,15 @@ fn json_has_exactly_the_promised_fields_and_the_mean_is_the_mean() {
     let report: Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!(
         names(&report),
-        sorted(&["preset", "seeds", "sequences", "mean"])
+        sorted(&[
+            "preset",
+            "seeds",
+            "sequences",
+            "mean",
+            "seed_means",
+            "worst_seed",
+            "score"
+        ])
     );
     assert_eq!(
         (&report["preset"], &report["seeds"]),
@@ -172,7 +180,8 @@ fn the_table_has_a_row_for_each_sequence_and_the_mean() {
     let note = parent.path().join("NOTES.md");
     fs::write(&note, "not a sequence").expect("the folder is writable");
     let table = succeeds(&["eval", text(&dir), text(&note)]);
-    let rows: Vec<&str> = table.lines().collect();
+    let (rows, lines) = table.split_once("\n\n").expect("lines follow the table");
+    let rows: Vec<&str> = rows.lines().collect();
     assert_eq!(rows.len(), 3, "{table}");
     assert!(
         rows[0].starts_with("sequence ") && rows[1].starts_with("a-long-name"),
@@ -183,6 +192,18 @@ fn the_table_has_a_row_for_each_sequence_and_the_mean() {
         rows.iter().all(|row| row.len() == rows[0].len()),
         "columns are not aligned:\n{table}"
     );
+    // One sequence has no standard error, and none to learn calibration from.
+    let lines: Vec<&str> = lines.lines().collect();
+    assert_eq!(lines.len(), 2, "{table}");
+    assert!(
+        lines[0].contains("worst") && lines[0].contains("(seed 0:"),
+        "{table}"
+    );
+    assert!(
+        lines[1].starts_with("score against overlap >= 0.5, 11 frames"),
+        "{table}"
+    );
+    assert!(lines[1].ends_with("leaving one sequence out -"), "{table}");
 }
 
 #[test]

@@ -45,6 +45,26 @@ fn sample_takes_size_and_format() {
 }
 
 #[test]
+fn sample_draws_the_scene_that_is_asked_for() {
+    let parent = folder();
+    for (scene, hidden) in [("default", 0), ("covered", 20), ("leaves", 25)] {
+        let extra = [
+            "--scene", scene, "--frames", "90", "--width", "80", "--height", "64",
+        ];
+        let dir = clip(parent.path(), scene, &extra);
+        let read = |name: &str| fs::read_to_string(dir.join(name)).expect("it was written");
+        let (truth, visible) = (read("groundtruth_rect.txt"), read("visible.txt"));
+        let count = |text: &str, line: &str| text.lines().filter(|found| *found == line).count();
+        assert_eq!(count(&truth, "0,0,0,0"), hidden, "{scene}");
+        assert_eq!(
+            (count(&visible, "0"), count(&visible, "1")),
+            (hidden, 90 - hidden),
+            "{scene}"
+        );
+    }
+}
+
+#[test]
 fn sample_never_writes_into_a_folder_with_something_in_it() {
     let parent = folder();
     fs::write(parent.path().join("mine.txt"), "keep").expect("the folder is writable");
@@ -64,6 +84,19 @@ fn sample_says_which_setting_is_wrong() {
     );
     let line = fails(&["sample", "--out", text(&out), "--frames", "0"]);
     assert!(line.contains("frames is 0"), "{line}");
+    let line = fails(&[
+        "sample",
+        "--out",
+        text(&out),
+        "--scene",
+        "leaves",
+        "--frames",
+        "60",
+    ]);
+    assert!(
+        line.contains("frames is 60; it must be 90 or more in this scene"),
+        "{line}"
+    );
     assert!(!out.exists());
 }
 

@@ -6,8 +6,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Frames for which nothing of the card is seen.
 const HIDDEN: u32 = 20;
-/// Frames that the way from one side to the other takes: about 2 pixels a frame at the post, at 320 x 240.
-const WAY: f64 = 150.0;
+/// Frames that the way from one side to the other takes: about 3 pixels a frame at the post, at 320 x 240.
+const WAY: f64 = 100.0;
 /// Frames from one rise and fall to the next.
 const SWAY: f64 = 97.0;
 

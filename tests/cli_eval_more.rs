@@ -1,0 +1,271 @@
+//! What `bagtrack eval` tells beyond the means: seeds, the score, variants side by side, figures.
+
+mod command;
+
+use command::{bagtrack, clip, fails, folder, succeeds, text};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn json(args: &[&str]) -> Value {
+    let mut all = vec!["eval", "--format", "json"];
+    all.extend(args);
+    serde_json::from_str(&succeeds(&all)).expect("it is JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn close(found: &Value, expected: f64) {
+    assert!(
+        (number(found) - expected).abs() < 1e-9,
+        "{found}, not {expected}"
+    );
+}
+
+/// Two clips on which the seeds differ.
+fn clips(parent: &Path) -> [String; 2] {
+    ["one", "two"].map(|name| {
+        let seed = if name == "one" { "1" } else { "2" };
+        let dir = clip(parent, name, &["--seed", seed, "--frames", "15"]);
+        text(&dir).to_owned()
+    })
+}
+
+#[test]
+fn seed_means_are_means_over_the_sequences_and_the_worst_is_among_them() {
+    let parent = folder();
+    let [one, two] = clips(parent.path());
+    let report = json(&[&one, &two, "--preset", "paper", "--seeds", "3"]);
+    let means = report["seed_means"].as_array().expect("a list");
+    assert_eq!(means.len(), 3);
+    for field in ["center_error", "overlap", "precision_20"] {
+        let sum: f64 = means.iter().map(|mean| number(&mean[field])).sum();
+        close(&report["mean"][field], sum / 3.0);
+    }
+    // The first seed alone is the evaluation with one seed.
+    let single = json(&[&one, &two, "--preset", "paper", "--seeds", "1"]);
+    assert_eq!(single["seed_means"][0], means[0]);
+    close(
+        &single["mean"]["center_error"],
+        number(&means[0]["center_error"]),
+    );
+    let worst = &report["worst_seed"];
+    assert!(means.contains(worst));
+    assert!(
+        means
+            .iter()
+            .all(|mean| number(&mean["center_error"]) <= number(&worst["center_error"]))
+    );
+    assert!(
+        means
+            .iter()
+            .any(|mean| mean["center_error"] != means[0]["center_error"]),
+        "{means:?}"
+    );
+    for (index, mean) in means.iter().enumerate() {
+        assert_eq!(mean["seed"], index);
+        assert_eq!(mean.as_object().expect("an object").len(), 4);
+    }
+}
+
+#[test]
+fn the_score_is_held_against_the_overlap() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &["--frames", "15"]);
+    let still = ["motion_std_x=0", "motion_std_y=0", "motion_std_scale=0"];
+    let mut args = vec![text(&dir), "--preset", "paper", "--seeds", "2"];
+    args.extend(still.iter().flat_map(|set| ["--set", set]));
+    // A box that stays, on boxes that are all elsewhere but in the second frame: 1 hit of 14 with each seed.
+    let mut truth = "51,61,40,40\n52,61,40,40\n".to_owned();
+    truth += &"201,161,40,40\n".repeat(13);
+    fs::write(dir.join("groundtruth_rect.txt"), &truth).expect("the folder is writable");
+    let score = json(&args)["score"].clone();
+    assert_eq!(score["frames"], 28);
+    assert_eq!(score["ece_leave_one_out"], Value::Null);
+    let (auc, error) = (number(&score["roc_auc"]), number(&score["ece"]));
+    assert!(
+        (0.0..=1.0).contains(&auc) && (0.0..=1.0).contains(&error),
+        "{score}"
+    );
+    // Misses alone have no ROC curve, and then the calibration error is the mean score.
+    let truth = truth.replace("52,61,40,40", "201,161,40,40");
+    fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
+    let misses = json(&args)["score"].clone();
+    assert_eq!(misses["roc_auc"], Value::Null);
+    assert!(number(&misses["ece"]) > error, "{misses} after {score}");
+    // Two sequences: one to learn from.
+    let other = clip(parent.path(), "other", &["--frames", "15"]);
+    let mut both = args.clone();
+    both.push(text(&other));
+    let score = json(&both)["score"].clone();
+    let learnt = number(&score["ece_leave_one_out"]);
+    assert!((0.0..=1.0).contains(&learnt), "{score}");
+    assert_eq!(score["frames"], 56);
+}
+
+#[test]
+fn the_ablation_has_the_preset_first_and_a_row_for_each_change() {
+    let parent = folder();
+    let [one, two] = clips(parent.path());
+    let common = [&*one, &*two, "--preset", "paper", "--seeds", "2"];
+    let mut args = common.to_vec();
+    args.push("--ablate");
+    let table = json(&args);
+    let rows = table["variants"].as_array().expect("a list");
+    assert_eq!(
+        (&rows[0]["label"], &rows[0]["set"]),
+        (&"paper".into(), &serde_json::json!({}))
+    );
+    assert_eq!(
+        (&table["sequences"], &table["seeds"]),
+        (&serde_json::json!(["one", "two"]), &2.into())
+    );
+    let plain = json(&common);
+    for field in [
+        "center_error",
+        "center_error_sem",
+        "precision_20",
+        "overlap",
+        "success_auc",
+    ] {
+        assert_eq!(rows[0][field], plain["mean"][field], "{field}");
+    }
+    assert_eq!(rows[0]["worst_seed"], plain["worst_seed"]);
+    for alpha in [0, 1] {
+        let row = rows
+            .iter()
+            .find(|row| row["set"] == serde_json::json!({ "alpha": alpha }))
+            .expect("the paper's ablation is in it");
+        let set = format!("alpha={alpha}");
+        let mut args = common.to_vec();
+        args.extend(["--set", &*set]);
+        assert_eq!(row["center_error"], json(&args)["mean"]["center_error"]);
+        assert_ne!(row["center_error"], rows[0]["center_error"]);
+    }
+}
+
+#[test]
+fn a_sweep_is_printed_as_a_table_and_as_markdown() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let sweep = parent.path().join("sweep.txt");
+    let lines =
+        "# what to try\nas it is:\n\nfew particles: particles=20\npaper: preset=paper sigma=0.02\n";
+    fs::write(&sweep, lines).expect("the folder is writable");
+    let args = ["eval", text(&dir), "--sweep", text(&sweep)];
+    let table = succeeds(&args);
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows.len(), 4, "{table}");
+    assert!(
+        rows.iter()
+            .all(|row| row.chars().count() == rows[0].chars().count()),
+        "{table}"
+    );
+    assert!(
+        rows[0].contains("worst seed") && rows[2].starts_with("few particles "),
+        "{table}"
+    );
+    let markdown = succeeds(&[&args[..], &["--format", "markdown"]].concat());
+    let rows: Vec<&str> = markdown.lines().collect();
+    assert_eq!(rows.len(), 5, "{markdown}");
+    assert!(rows[0].starts_with("| variant | centre error |") && rows[1].starts_with("|---|"));
+    assert!(rows[4].starts_with("| paper | "), "{markdown}");
+    let plain = succeeds(&["eval", text(&dir), "--format", "markdown"]);
+    assert!(plain.starts_with("| sequence | frames |"), "{plain}");
+}
+
+#[test]
+fn a_wrong_sweep_is_told_by_its_line_before_anything_is_run() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let sweep = parent.path().join("sweep.txt");
+    let refuse = |lines: &str| {
+        fs::write(&sweep, lines).expect("the folder is writable");
+        fails(&["eval", text(&dir), "--sweep", text(&sweep)])
+    };
+    let line = refuse("fine: alpha=1\ntoo much: alpha=2\n");
+    assert!(
+        line.contains("sweep.txt: line 2: ") && line.contains("from 0 to 1"),
+        "{line}"
+    );
+    assert!(refuse("odd: alhpa=1").contains("there is no such parameter; there are"));
+    assert!(refuse("").contains("no variant"));
+    let line = fails(&["eval", text(&dir), "--sweep", "nowhere.txt"]);
+    assert!(line.contains("nowhere.txt"), "{line}");
+    let both = bagtrack(&["eval", text(&dir), "--ablate", "--sweep", text(&sweep)]);
+    assert_eq!(both.status.code(), Some(2));
+}
+
+#[test]
+fn figures_are_drawn_with_a_curve_for_each_variant() {
+    let parent = folder();
+    let dir = clip(parent.path(), "a clip", &[]);
+    let elsewhere = parent.path().join("elsewhere");
+    fs::create_dir(&elsewhere).expect("the folder is writable");
+    let same_name = clip(&elsewhere, "a clip", &["--seed", "4"]);
+    let out = parent.path().join("docs/figures");
+    let draw = || {
+        succeeds(&[
+            "eval",
+            text(&dir),
+            text(&same_name),
+            "--ablate",
+            "--preset",
+            "paper",
+            "--seeds",
+            "2",
+            "--plots",
+            text(&out),
+        ]);
+        let mut names: Vec<String> = fs::read_dir(&out)
+            .expect("it was made")
+            .map(|entry| {
+                entry
+                    .expect("it is readable")
+                    .file_name()
+                    .into_string()
+                    .expect("plain names")
+            })
+            .collect();
+        names.sort();
+        names
+    };
+    let names = draw();
+    assert_eq!(
+        names,
+        [
+            "error-a_clip-2.svg",
+            "error-a_clip.svg",
+            "precision.svg",
+            "success.svg"
+        ]
+    );
+    let read = |name: &str| fs::read_to_string(out.join(name)).expect("it was written");
+    let precision = read("precision.svg");
+    assert!(precision.starts_with("<svg ") && precision.trim_end().ends_with("</svg>"));
+    for label in ["paper (", "α = 0: bases alone (", "α = 1: means alone ("] {
+        assert!(precision.contains(label), "{label}");
+    }
+    // A curve has a point for each radius from 0 to 50, axes and marks have two.
+    let curves = precision
+        .lines()
+        .filter(|line| line.starts_with("<polyline") && line.matches(',').count() > 50);
+    assert_eq!(curves.count(), 4);
+    assert!(read("error-a_clip.svg").contains("a clip: centre error over time"));
+    assert!(read("error-a_clip.svg").contains("<polygon"));
+    // Drawn again over the same files, the same comes out.
+    assert_eq!(draw(), names);
+    assert_eq!(read("precision.svg"), precision);
+    // A folder that cannot be made is told before the run.
+    let line = fails(&[
+        "eval",
+        text(&dir),
+        "--plots",
+        text(&dir.join("img/0001.jpg")),
+    ]);
+    assert!(line.contains("0001.jpg"), "{line}");
+}
