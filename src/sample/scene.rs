@@ -14,6 +14,9 @@ const ASPECT: f64 = 0.8;
 /// Height of the card by the shorter side of the frame, at the start and at the end.
 const HEIGHT: (f64, f64) = (0.24, 0.36);
 
+/// Shares of the card below this are none.
+const ROUNDING: f64 = 1e-9;
+
 /// What happens to the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scene {
@@ -135,7 +138,13 @@ impl Course {
         let card = self.target(index);
         let (width, height) = self.size();
         let inside = card.intersection(&Rect::new(0.0, 0.0, width, height)) / card.area();
-        (inside - self.covered(index)).max(0.0)
+        let visible = inside - self.covered(index);
+        // Rounding leaves a little where there is nothing, and takes a little where there is all.
+        match visible {
+            ..ROUNDING => 0.0,
+            visible if visible > 1.0 - ROUNDING => 1.0,
+            visible => visible,
+        }
     }
 }
 
