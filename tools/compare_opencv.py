@@ -17,7 +17,7 @@ The rules are those of `bagtrack eval`, so that the rows can be compared:
 - time is that of the update alone, decoding excluded, on one thread.
 
 OpenCV's trackers get the frames in colour, as its own examples do, and the box rounded to whole pixels, as their
-interface wants it. `static` is a box that never moves. Boosting, MIL and TLD draw random numbers: OpenCV's generator
+interface wants it. `static` is the given box, which never moves. Boosting, MIL and TLD draw random numbers: OpenCV's generator
 gets the same seed before each video.
 """
 
@@ -110,7 +110,7 @@ def track(name, frames, boxes):
     """One tracker through one sequence: its figures under the names that `bagtrack eval` gives them."""
     cv2.setRNGSeed(SEED)
     tracker = new_tracker(name)
-    held = tuple(round(value) for value in boxes[0])
+    held = boxes[0] if name == "static" else tuple(round(value) for value in boxes[0])
     tracker.init(frames[0], held)
     errors, overlaps, spent = [], [], 0.0
     for frame, truth in zip(frames[1:], boxes[1:]):
