@@ -134,7 +134,9 @@ fn the_ablation_has_the_preset_first_and_a_row_for_each_change() {
     ] {
         assert_eq!(rows[0][field], plain["mean"][field], "{field}");
     }
-    assert_eq!(rows[0]["worst_seed"], plain["worst_seed"]);
+    for field in ["worst_seed", "score"] {
+        assert_eq!(rows[0][field], plain[field]);
+    }
     for alpha in [0, 1] {
         let row = rows
             .iter()

@@ -1,6 +1,6 @@
 //! Several variants on the same sequences, a row each.
 
-use super::figures::SeedMean;
+use super::figures::{ScoreFigures, SeedMean};
 use super::report::Report;
 use super::table::{Table, figure};
 use super::variant::{Assignment, Variant};
@@ -33,6 +33,7 @@ struct Row {
     overlap: f64,
     success_auc: f64,
     worst_seed: SeedMean,
+    score: ScoreFigures,
     step_ms: f64,
 }
 
@@ -45,7 +46,7 @@ fn map<S: Serializer>(set: &[Assignment], serializer: S) -> Result<S::Ok, S::Err
 }
 
 /// The figures of several variants side by side. As text (`Display`) a table, as JSON (`Serialize`) the same in full
-/// precision.
+/// precision, and what each sets and how good its score is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     preset: Preset,
@@ -73,6 +74,7 @@ impl Comparison {
                 overlap: mean.overlap,
                 success_auc: mean.success_auc,
                 worst_seed: *report.worst_seed(),
+                score: *report.score(),
                 step_ms: mean.step_ms,
             }
         };

@@ -18,6 +18,7 @@ pub mod plots;
 mod report;
 mod run;
 mod sequence;
+mod sweep;
 mod table;
 mod variant;
 
@@ -27,6 +28,5 @@ pub use isotonic::Isotonic;
 pub use report::Report;
 pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};
 pub use sequence::{Sequence, SequenceError, parse_boxes};
-pub use variant::{
-    AssignError, Assignment, SweepError, Variant, assign, parse_assignment, parse_sweep,
-};
+pub use sweep::{SweepError, parse_sweep};
+pub use variant::{AssignError, Assignment, Variant, assign, parse_assignment};

@@ -58,6 +58,11 @@ impl Report {
         &self.worst_seed
     }
 
+    /// How good the score is.
+    pub fn score(&self) -> &ScoreFigures {
+        &self.score
+    }
+
     /// The table and the lines below it as markdown.
     pub fn markdown(&self) -> String {
         let lines = self.lines().replace('\n', "\n\n");

@@ -66,7 +66,7 @@ impl Course {
     }
 
     /// Frames from the one in the middle of the clip, negative before it.
-    fn from_middle(&self, index: u32) -> f64 {
+    fn frames_past_middle(&self, index: u32) -> f64 {
         f64::from(index) - f64::from(self.settings.frames / 2)
     }
 

@@ -13,7 +13,7 @@ const SWAY: f64 = 97.0;
 
 pub(super) fn target(course: &Course, index: u32) -> Rect {
     let ((frame_width, frame_height), (width, height)) = (course.size(), course.card(index));
-    let way = (course.from_middle(index) / WAY).clamp(-0.5, 0.5);
+    let way = (course.frames_past_middle(index) / WAY).clamp(-0.5, 0.5);
     let sway = (TAU * (f64::from(index) / SWAY + course.phase.1)).sin();
     Rect::centered(
         frame_width * (0.5 + 0.32 * (PI * way).sin()),

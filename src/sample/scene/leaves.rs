@@ -18,12 +18,12 @@ const SWAY: f64 = 43.0;
 
 pub(super) fn target(course: &Course, index: u32) -> Rect {
     let ((frame_width, frame_height), (width, height)) = (course.size(), course.card(index));
-    let from_middle = course.from_middle(index);
+    let frames_past_middle = course.frames_past_middle(index);
     let bend = |frames: f64| (PI * (frames / WAY).clamp(-0.5, 0.5)).cos();
     // The left edge is on the frame's edge half a frame before the first frame without it and half one after the last.
     let edge = bend(AWAY / 2.0);
-    let x = frame_width * (1.0 + (1.0 - START) * (bend(from_middle) - edge) / edge);
-    let climbed = smooth(0.5 + from_middle / CLIMB);
+    let x = frame_width * (1.0 + (1.0 - START) * (bend(frames_past_middle) - edge) / edge);
+    let climbed = smooth(0.5 + frames_past_middle / CLIMB);
     let (upper, lower) = (0.28, 0.72);
     let level = if course.phase.1 < 0.5 {
         upper + (lower - upper) * climbed
