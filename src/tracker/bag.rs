@@ -4,17 +4,63 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::background::Metric;
+use super::look::Look;
 use super::{AffineSubspace, Params};
+
+/// One affine subspace of the bag.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Entry {
+    pub subspace: AffineSubspace,
+    /// What it was made of; kept while there is a background, with whose every change it is made anew.
+    looks: Vec<Look>,
+}
 
 /// Up to K affine subspaces, oldest first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Bag {
-    entries: VecDeque<AffineSubspace>,
+    entries: VecDeque<Entry>,
+}
+
+impl Entry {
+    /// The subspace of feature vectors, of length D one after the other.
+    pub fn new(features: &[f32], metric: &Metric, params: &Params) -> Self {
+        let looks = if params.background_samples > 0 {
+            let vectors = features.chunks_exact(params.feature_len());
+            vectors.map(Look::new).collect()
+        } else {
+            Vec::new()
+        };
+        Self {
+            subspace: subspace(features.to_vec(), metric, params),
+            looks,
+        }
+    }
+
+    /// Whether this may be an entry of a tracker with `params`, but for its subspace.
+    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
+        let counts = if params.background_samples > 0 {
+            1..=params.history as usize + 1
+        } else {
+            0..=0
+        };
+        let len = params.feature_len();
+        counts.contains(&self.looks.len())
+            && self.looks.iter().all(|look| look.is_sound(len, greatest))
+    }
+}
+
+/// The subspace of feature vectors as the metric sees them.
+fn subspace(mut vectors: Vec<f32>, metric: &Metric, params: &Params) -> AffineSubspace {
+    let len = params.feature_len();
+    metric.apply(&mut vectors, len, params.unit_length, &mut Vec::new());
+    let vectors: Vec<&[f32]> = vectors.chunks_exact(len).collect();
+    AffineSubspace::of(&vectors, params.basis_dim as usize)
 }
 
 impl Bag {
     /// A bag that knows the first frame only.
-    pub fn new(first: AffineSubspace) -> Self {
+    pub fn new(first: Entry) -> Self {
         Self {
             entries: VecDeque::from([first]),
         }
@@ -25,16 +71,36 @@ impl Bag {
         frame.is_multiple_of(u64::from(params.update_every))
     }
 
-    /// Takes the latest subspace: while there are fewer than K the bag grows, then the oldest leaves.
-    pub fn admit(&mut self, latest: AffineSubspace, params: &Params) {
+    /// Takes the latest subspace: while there are fewer than K the bag grows, then the oldest that is not pinned leaves.
+    pub fn admit(&mut self, latest: Entry, params: &Params) {
         while self.entries.len() >= params.bag_size as usize {
-            self.entries.pop_front();
+            self.entries.remove(params.pinned as usize);
         }
         self.entries.push_back(latest);
     }
 
-    /// The subspaces, oldest first; never none.
-    pub fn entries(&self) -> &VecDeque<AffineSubspace> {
+    /// Makes all subspaces anew where there is a background: the metric may have changed.
+    pub fn rebuild_if_needed(&mut self, metric: &Metric, params: &Params) {
+        if params.background_samples == 0 {
+            return;
+        }
+        for entry in &mut self.entries {
+            let mut vectors = Vec::with_capacity(entry.looks.len() * params.feature_len());
+            entry
+                .looks
+                .iter()
+                .for_each(|look| look.append_to(&mut vectors));
+            entry.subspace = subspace(vectors, metric, params);
+        }
+    }
+
+    /// The entries, oldest first; never none.
+    pub fn entries(&self) -> &VecDeque<Entry> {
         &self.entries
+    }
+
+    /// Their subspaces.
+    pub fn subspaces(&self) -> impl ExactSizeIterator<Item = &AffineSubspace> + Clone {
+        self.entries.iter().map(|entry| &entry.subspace)
     }
 }

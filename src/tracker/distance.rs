@@ -14,7 +14,7 @@ use super::products::Products;
 #[derive(Debug, Clone)]
 pub(super) struct Distances {
     alpha: f64,
-    /// γ = 1 / D (equation 5).
+    /// γ (equation 5).
     gamma: f64,
     limit: usize,
     /// For each candidate, its distance to each entry.
@@ -29,7 +29,7 @@ impl Distances {
         let limit = params.basis_dim as usize;
         Self {
             alpha: params.alpha,
-            gamma: 1.0 / params.feature_len() as f64,
+            gamma: params.gamma(),
             limit,
             values: Vec::new(),
             pending: Vec::with_capacity(LANES),

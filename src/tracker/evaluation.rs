@@ -70,10 +70,7 @@ impl Evaluation {
     /// # Panics
     /// If no bag was set, there are more than P previous patches, or one of them is longer than D.
     pub fn compute(&mut self, history: &[&[f32]]) {
-        self.products.compute(history);
-        self.bases.compute(&self.products);
-        self.distances
-            .compute(&self.products, &self.bases, self.candidates, &self.entries);
+        self.compute_distances(history);
         let entries = self.entries.len();
         likelihood::normalized(
             self.distances.values(),
@@ -81,7 +78,15 @@ impl Evaluation {
             self.sigma,
             &mut self.likelihoods,
         );
-        likelihood::sum_rule(&self.likelihoods, entries, &mut self.weights);
+        likelihood::sum_rule(&self.likelihoods, entries, (0, 1.0), &mut self.weights);
+    }
+
+    /// The first half of [`compute`](Self::compute): distances alone.
+    pub(super) fn compute_distances(&mut self, history: &[&[f32]]) {
+        self.products.compute(history);
+        self.bases.compute(&self.products);
+        self.distances
+            .compute(&self.products, &self.bases, self.candidates, &self.entries);
     }
 
     /// dist(Aᵢ, B\[k\]) (equation 4), in [0, 1], of candidate `index` to each entry of the bag.

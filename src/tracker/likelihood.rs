@@ -23,12 +23,28 @@ pub(super) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mu
     }
 }
 
-/// The weight of each particle: the sum of its likelihoods over the bag (equation 9), scaled so that the weights
-/// sum to 1.
-pub(super) fn sum_rule(likelihoods: &[f64], entries: usize, out: &mut Vec<f64>) {
+/// The weight of each particle: the sum of its likelihoods over the bag (equation 9), the first `pinned` entries
+/// counting `pinned_weight` times, scaled so that the weights sum to 1.
+pub(super) fn sum_rule(
+    likelihoods: &[f64],
+    entries: usize,
+    (pinned, pinned_weight): (usize, f64),
+    out: &mut Vec<f64>,
+) {
+    let pinned = pinned.min(entries);
+    // Entries that all weigh nothing would be no likelihood at all.
+    let pinned_weight = if pinned == entries {
+        1.0
+    } else {
+        pinned_weight
+    };
+    let total = pinned_weight * pinned as f64 + (entries - pinned) as f64;
     out.clear();
-    let sums = likelihoods.chunks_exact(entries);
-    out.extend(sums.map(|row| row.iter().sum::<f64>() / entries as f64));
+    out.extend(likelihoods.chunks_exact(entries).map(|row| {
+        let (first, others) = row.split_at(pinned);
+        let first = pinned_weight * first.iter().sum::<f64>();
+        (first + others.iter().sum::<f64>()) / total
+    }));
 }
 
 /// The particle with the greatest weight (equation 12), the first of equals.
@@ -50,9 +66,19 @@ mod tests {
     fn equal_distances_give_equal_weights() {
         let (mut likelihoods, mut weights) = (Vec::new(), Vec::new());
         normalized(&[0.3; 12], 3, 0.01, &mut likelihoods);
-        sum_rule(&likelihoods, 3, &mut weights);
+        sum_rule(&likelihoods, 3, (0, 1.0), &mut weights);
         assert!(weights.iter().all(|weight| (weight - 0.25).abs() < 1e-15));
         assert_eq!(arg_max(&weights), 0);
+    }
+
+    #[test]
+    fn a_pinned_entry_counts_as_often_as_it_weighs() {
+        let mut weights = Vec::new();
+        sum_rule(&[0.9, 0.2, 0.1, 0.8], 2, (1, 3.0), &mut weights);
+        assert!((weights[0] - 2.9 / 4.0).abs() < 1e-15);
+        assert!((weights[1] - 1.1 / 4.0).abs() < 1e-15);
+        sum_rule(&[0.9, 0.1], 1, (1, 0.0), &mut weights);
+        assert_eq!(weights, [0.9, 0.1]);
     }
 
     #[test]

@@ -40,39 +40,51 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod background;
 mod bag;
+mod camera;
 mod candidate;
+mod comparison;
+mod discriminant;
 mod distance;
 mod downscale;
 mod eigen;
 mod evaluation;
 mod frame;
+mod gradients;
+mod learning;
 mod likelihood;
+mod look;
+mod matrix;
 mod motion;
 mod params;
 mod patch;
+mod presets;
 mod products;
+mod ranges;
 mod rect;
 mod score;
+mod search;
 mod snapshot;
+mod solitary;
 mod state;
 mod subspace;
+mod trust;
 
 pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
-pub use params::{Params, ParamsError, Preset};
+pub use params::{Features, Params, Search};
 pub use patch::patch;
+pub use presets::Preset;
+pub use ranges::ParamsError;
 pub use state::LEAST_BOX_SIDE;
 pub use subspace::{AffineSubspace, RANK_TOLERANCE};
 
-use std::collections::VecDeque;
-
 use serde::{Deserialize, Serialize};
 
-use bag::Bag;
-use motion::Particle;
-use patch::PatchCutter;
-use score::Usual;
+use comparison::Comparison;
+use motion::Draws;
+use search::Sought;
 use state::State;
 
 /// Whether the tracker believes its own box.
@@ -133,10 +145,6 @@ pub enum TrackerError {
 #[derive(Debug, Clone)]
 pub struct Tracker {
     state: State,
-    evaluation: Evaluation,
-    cutter: PatchCutter,
-    /// Room for the next particles, swapped with those of the state.
-    proposed: Vec<Particle>,
 }
 
 impl Tracker {
@@ -149,34 +157,10 @@ impl Tracker {
         params.validate()?;
         let source = frame.source_size();
         state::check_target(source, &target)?;
-        let (reach, particle) = State::aim(source, &target);
-        let first = patch(frame, &reach.area(&particle), &params);
-        let bag = Bag::new(AffineSubspace::of(&[&first], params.basis_dim as usize));
-        let mut state = State {
-            params,
-            source,
-            reach,
-            estimate: given(0, target),
-            particles: Vec::new(),
-            weights: Vec::new(),
-            history: VecDeque::from([first]),
-            bag,
-            usual: Usual::default(),
-        };
-        state.gather(particle);
-        Ok(Self::with_state(state))
-    }
-
-    /// A tracker in a valid state.
-    fn with_state(state: State) -> Self {
-        let mut evaluation = Evaluation::new(&state.params);
-        evaluation.set_bag(state.bag.entries().iter());
-        Self {
-            state,
-            evaluation,
-            cutter: PatchCutter::default(),
-            proposed: Vec::new(),
-        }
+        Ok(comparison::with(|room| {
+            let state = State::new(frame, target, params, room);
+            Self { state }
+        }))
     }
 
     /// Finds the target in the next frame.
@@ -184,53 +168,61 @@ impl Tracker {
     /// # Errors
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
+        state::check_frame(self.state.source, frame)?;
+        Ok(comparison::with(|room| self.find(frame, room)))
+    }
+
+    fn find(&mut self, frame: &GrayFrame, room: &mut Comparison) -> Estimate {
         let state = &mut self.state;
-        state::check_frame(state.source, frame)?;
         let number = state.estimate.frame + 1;
+        let mut draws = motion::generator(state.params.seed, number, Draws::Particles);
+        let camera = state.camera.as_mut();
+        let sought = Sought {
+            last: state.answer,
+            shift: camera.map_or((0.0, 0.0), |camera| camera.shift(frame)),
+            params: &state.params,
+            reach: &state.reach,
+        };
 
         // (A) Where it may be.
-        motion::propose(
-            &state.particles,
-            &state.weights,
-            &state.params,
-            &state.reach,
-            number,
-            &mut self.proposed,
-        );
-
-        // (B) What is seen there.
-        for (index, particle) in self.proposed.iter().enumerate() {
-            let area = state.reach.area(particle);
-            let values = self.evaluation.candidate_mut(index);
-            self.cutter.cut(frame, &area, &state.params, values);
+        room.begin(state);
+        match state.params.search {
+            Search::Resampled => motion::propose(state, &mut draws, &mut room.particles),
+            Search::Answer => sought.propose(&mut draws, &mut room.particles),
         }
 
-        // (D) How that compares with what is known.
-        let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();
-        self.evaluation.compute(&history);
-        let best = self.evaluation.best();
-        let nearest = self.evaluation.distances(best).iter().copied();
-        let (score, status) = state.usual.judge(nearest.fold(f64::INFINITY, f64::min));
+        // (B) What is seen there, and (D) how that compares with what is known.
+        let furthest = sought.furthest().max(state.learning_radius(number));
+        room.view
+            .open(frame, &state.answer, furthest, &state.reach, &state.params);
+        room.extend(frame, 0, state);
+        let mut best = room.weigh(&sought, &state.bag, &state.discriminant);
+        let first = room.particles.len();
+        if first < state.params.particles as usize {
+            sought.refine(&room.weights, &mut draws, &mut room.particles);
+            room.extend(frame, first, state);
+            best = room.weigh(&sought, &state.bag, &state.discriminant);
+        }
+        let radius = state.params.averaging_radius;
+        let answer = search::average(&room.particles, &room.weights, best, radius);
+        let distances = room.distances(best);
+        let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        let (score, status) = state.usual.judge(nearest);
+        let trusted = state.trust.judge(distances[0], number, &state.params);
 
         // (C) What is to be remembered of it.
-        let tracked = self.evaluation.candidate(best);
-        if Bag::admits(number, &state.params) {
-            let latest = state.subspace_with(&tracked);
-            state.bag.admit(latest, &state.params);
-            self.evaluation.set_bag(state.bag.entries().iter());
+        state.answer = answer;
+        state.keep_particles(&room.particles, &room.weights);
+        if trusted {
+            state.learn(frame, number, room);
         }
-        state.remember(tracked);
-
         state.estimate = Estimate {
             frame: number,
-            target: state.target_of(&self.proposed[best]),
+            target: state.target_of(&answer),
             score,
             status,
         };
-        std::mem::swap(&mut state.particles, &mut self.proposed);
-        state.weights.clear();
-        state.weights.extend_from_slice(self.evaluation.weights());
-        Ok(state.estimate)
+        state.estimate
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
@@ -239,20 +231,10 @@ impl Tracker {
     /// # Errors
     /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
     pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
-        let state = &mut self.state;
-        state::check_frame(state.source, frame)?;
-        state::check_target(state.source, &target)?;
-        let (reach, particle) = State::aim(state.source, &target);
-        let look = patch(frame, &reach.area(&particle), &state.params);
-        state.reach = reach;
-        state.history.clear();
-        let latest = state.subspace_with(&look);
-        state.bag.admit(latest, &state.params);
-        state.remember(look);
-        state.gather(particle);
-        state.estimate = given(state.estimate.frame + 1, target);
-        self.evaluation.set_bag(state.bag.entries().iter());
-        Ok(state.estimate)
+        state::check_frame(self.state.source, frame)?;
+        state::check_target(self.state.source, &target)?;
+        comparison::with(|room| self.state.retarget(frame, target, room));
+        Ok(self.state.estimate)
     }
 
     /// The last answer.
@@ -280,16 +262,6 @@ impl Tracker {
     /// # Errors
     /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
     pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
-        snapshot::read(snapshot).map(Self::with_state)
-    }
-}
-
-/// The answer to a frame whose box came from the user.
-fn given(frame: u64, target: Rect) -> Estimate {
-    Estimate {
-        frame,
-        target,
-        score: 1.0,
-        status: Status::Tracking,
+        snapshot::read(snapshot).map(|state| Self { state })
     }
 }

@@ -12,6 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
+use super::state::State;
 use super::{Params, Rect};
 
 /// One hypothesis z = (x, y, s): the centre in working pixels, and the scale against the reference box.
@@ -76,18 +77,40 @@ impl Reach {
     }
 }
 
-/// Draws the particles of frame `frame` into `out`: multinomial resampling of `previous` by `weights` (which are
-/// at least 0 and sum to 1), then Brownian motion.
-pub(super) fn propose(
-    previous: &[Particle],
-    weights: &[f64],
+/// What draws are for: each has draws of its own.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Draws {
+    /// The particles of a frame.
+    Particles,
+    /// Areas that the background and the discriminant learn from.
+    Examples,
+}
+
+/// The generator of the draws of frame `frame`.
+pub(super) fn generator(seed: u64, frame: u64, draws: Draws) -> ChaCha8Rng {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    // Frame numbers stay far below the bit that tells the two apart.
+    generator.set_stream(match draws {
+        Draws::Particles => frame,
+        Draws::Examples => frame | 1 << 63,
+    });
+    generator
+}
+
+/// Draws the next particles of `state` into `out`: multinomial resampling by weight, then Brownian motion.
+pub(super) fn propose(state: &State, generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
+    let cloud = (&state.particles[..], &state.weights[..]);
+    resample(cloud, &state.params, &state.reach, generator, out);
+}
+
+/// As [`propose`], of particles and their weights (which are at least 0 and sum to 1).
+fn resample(
+    (previous, weights): (&[Particle], &[f64]),
     params: &Params,
     reach: &Reach,
-    frame: u64,
+    generator: &mut ChaCha8Rng,
     out: &mut Vec<Particle>,
 ) {
-    let mut generator = ChaCha8Rng::seed_from_u64(params.seed);
-    generator.set_stream(frame);
     let mut total = 0.0;
     let cumulative: Vec<f64> = weights
         .iter()
@@ -97,14 +120,14 @@ pub(super) fn propose(
         })
         .collect();
     out.clear();
-    for _ in 0..params.particles {
+    for _ in 0..params.first_particles() {
         let draw = generator.random::<f64>() * total;
         // Rounding can put the draw at the very end.
         let chosen = cumulative
             .partition_point(|&sum| sum <= draw)
             .min(previous.len() - 1);
         let mut step = |std: f64| -> f64 {
-            let normal: f64 = StandardNormal.sample(&mut generator);
+            let normal: f64 = StandardNormal.sample(generator);
             normal * std
         };
         let origin = previous[chosen];
@@ -140,7 +163,9 @@ mod tests {
     fn proposals(frame: u64, params: &Params) -> Vec<Particle> {
         let mut out = Vec::new();
         let previous = [particle(60.0), particle(160.0), particle(260.0)];
-        propose(&previous, &[0.7, 0.0, 0.3], params, &REACH, frame, &mut out);
+        let cloud = (&previous[..], &[0.7, 0.0, 0.3][..]);
+        let mut draws = generator(params.seed, frame, Draws::Particles);
+        resample(cloud, params, &REACH, &mut draws, &mut out);
         out
     }
 

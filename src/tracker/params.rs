@@ -1,43 +1,31 @@
 //! The parameters, with their symbols in the paper.
 //!
-//! Every range has an upper end, so that no choice of parameters makes one session cost more than some fifty
-//! milliseconds a frame or keep more than a few megabytes.
+//! The first group is what the paper names. Each of the others is a mend of the printed tracker, with the value that
+//! switches it off; the preset `paper` has all of them off. `ranges` checks the values, `presets` names two sets.
 
 use serde::{Deserialize, Serialize};
 
-/// A named set of parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+use super::Preset;
+
+/// What a candidate area is turned into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Preset {
-    /// The equations and numbers as printed in the paper.
-    Paper,
-    /// The default: mended where the printed equations lose the object.
-    #[default]
-    Robust,
+pub enum Features {
+    /// H₁ x H₂ gray values in [0, 1], as the paper has it.
+    Gray,
+    /// For each of H₁ x H₂ cells how strong the gradient is in nine directions, and the cell's gray value.
+    Gradients,
 }
 
-impl Preset {
-    /// The parameters of this preset.
-    pub fn params(self) -> Params {
-        match self {
-            // No mend has been measured to pay yet: both are the paper's.
-            Self::Paper | Self::Robust => Params {
-                particles: 100,
-                patch_width: 32,
-                patch_height: 32,
-                basis_dim: 3,
-                history: 5,
-                bag_size: 10,
-                update_every: 5,
-                alpha: 0.5,
-                sigma: 0.01,
-                motion_std_x: 5.0,
-                motion_std_y: 5.0,
-                motion_std_scale: 0.01,
-                seed: 0,
-            },
-        }
-    }
+/// Where the particles of a frame come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Search {
+    /// From the last particles by their weights, as the paper has it.
+    Resampled,
+    /// From the last answer. A likelihood that is nearly flat hardly selects among particles, so a resampled cloud
+    /// dissolves; one that starts from the answer does not.
+    Answer,
 }
 
 /// Every parameter of the tracker. Lengths are in pixels of the working image
@@ -47,13 +35,13 @@ impl Preset {
 pub struct Params {
     /// N, the number of particles (section III-A), 1 to 1000.
     pub particles: u32,
-    /// H₁, the width in pixels to which a candidate area is resized (section III-B), 4 to 64.
+    /// H₁, the width in pixels (with gradients: in cells) to which a candidate area is resized (section III-B), 4 to 64.
     pub patch_width: u32,
-    /// H₂, the height in pixels to which a candidate area is resized (section III-B), 4 to 64.
+    /// H₂, the height in pixels (with gradients: in cells) to which a candidate area is resized (section III-B), 4 to 64.
     pub patch_height: u32,
     /// n, the number of basis vectors of an affine subspace (equation 1), 1 to 6. At most P + 1 of them exist.
     pub basis_dim: u32,
-    /// P, the number of previous tracked patches in a candidate's subspace (equation 2), 1 to 10.
+    /// P, the number of previous tracked patches in a subspace (equation 2), 1 to 10.
     pub history: u32,
     /// K, the number of subspaces in the full bag (equation 3), 1 to 32.
     pub bag_size: u32,
@@ -68,8 +56,70 @@ pub struct Params {
     /// Standard deviation of the Brownian motion along y, in pixels a frame (section III-A), 0 to 320.
     pub motion_std_y: f64,
     /// Standard deviation of the Brownian motion of the scale, a frame (section III-A), 0 to 1. The scale of the
-    /// first box is 1.
+    /// first box is 1. Searching from the answer it is that of the scale's logarithm.
     pub motion_std_scale: f64,
+
+    /// What is looked at. Gradients hardly change with the light.
+    pub features: Features,
+    /// The area that is looked at, as a multiple of the box on each side, 0.5 to 3. The rim of a target tells where it
+    /// ends. Off: 1.
+    pub context: f64,
+    /// With gradients: the weight of a cell's gray value beside them, 0 to 3. A blurred target has few gradients.
+    pub gray_weight: f64,
+    /// Whether feature vectors are brought to length 1 before they are compared, which takes contrast out of the
+    /// distance; γ is 1/4 then, since two unit vectors are at most 2 apart. Off: false.
+    pub unit_length: bool,
+    /// Whether a candidate's subspace is its own vector alone. As one of P + 1 columns a candidate drowns in the
+    /// history that it shares with all others. Then n = 1 for the candidate, and its one principal angle is that
+    /// between its vector and the entry's subspace. Off: false.
+    pub candidate_alone: bool,
+
+    /// How many vectors of areas beside the target the metric is made of, 0 to 256. Vectors are whitened by their
+    /// covariance, so that what the background has too counts less. Off: 0.
+    pub background_samples: u32,
+    /// Frames from one refresh of the background to the next, 1 to 1000.
+    pub background_every: u32,
+    /// The ridge of the background's covariance, as a multiple of its mean eigenvalue, 0.001 to 1000.
+    pub background_ridge: f64,
+
+    /// Where particles come from. Off: `resampled`.
+    pub search: Search,
+    /// The share of the particles that are drawn narrowly around the best of the others, 0 to 0.9. Off: 0.
+    pub refined_share: f64,
+    /// Around how many of the best, 1 to 50.
+    pub refined_modes: u32,
+    /// Standard deviation of these draws along x and along y, in pixels, 0 to 320.
+    pub refined_std: f64,
+    /// Standard deviation of the logarithm of their scale, 0 to 1.
+    pub refined_std_scale: f64,
+    /// Standard deviation of the prior on how far the target moves in a frame, in pixels, 0 to 1000: a twin far away
+    /// loses. Off: 0.
+    pub displacement_std: f64,
+    /// Standard deviation of the prior on how the logarithm of the scale changes in a frame, 0 to 10. Off: 0.
+    pub scale_change_std: f64,
+    /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
+    /// moves a target further than targets move. Off: false.
+    pub camera_shift: bool,
+    /// The answer is the weighted mean of the particles within this distance of the most likely one, in pixels, 0 to
+    /// 100. It is steadier than one particle. Off: 0, the arg max itself (equation 12).
+    pub averaging_radius: f64,
+
+    /// How many of the oldest subspaces never leave the bag, 0 to 16, fewer than K. What the user pointed at is the
+    /// one look that is known to be right. Off: 0.
+    pub pinned: u32,
+    /// The weight of a pinned subspace in the sum rule (equation 9), 0 to 100. Off: 1.
+    pub pinned_weight: f64,
+    /// The tracker learns from a frame only while the answer's distance to the first subspace is below this multiple
+    /// of what is usual, 0 to 100. Off: 0.
+    pub trusted_ratio: f64,
+
+    /// Weight of a linear score that is learned from all candidates of the past frames and tells the target from what
+    /// is beside it; the likelihood is multiplied by exp(weight · score), 0 to 100. Off: 0.
+    pub discriminant_weight: f64,
+    /// How strongly that score keeps to what it was, against the mean squared error over the candidates of a frame,
+    /// 0.001 to 1000.
+    pub discriminant_damping: f64,
+
     /// Seed of all random draws: the same seed and frames give the same boxes.
     pub seed: u64,
 }
@@ -80,92 +130,36 @@ impl Default for Params {
     }
 }
 
-/// A parameter out of its range.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("parameter {name} is {value}; it must be {expected}")]
-pub struct ParamsError {
-    /// The parameter's field name.
-    pub name: &'static str,
-    /// The value given.
-    pub value: f64,
-    /// The range it must be in.
-    pub expected: &'static str,
-}
-
 impl Params {
-    /// Checks every parameter against its range. NaN and infinities are out of every range.
-    ///
-    /// # Errors
-    /// The first parameter that is out of its range.
-    pub fn validate(&self) -> Result<(), ParamsError> {
-        count("particles", self.particles, 1..=1000, "from 1 to 1000")?;
-        count("patch_width", self.patch_width, 4..=64, "from 4 to 64")?;
-        count("patch_height", self.patch_height, 4..=64, "from 4 to 64")?;
-        count("basis_dim", self.basis_dim, 1..=6, "from 1 to 6")?;
-        count("history", self.history, 1..=10, "from 1 to 10")?;
-        count("bag_size", self.bag_size, 1..=32, "from 1 to 32")?;
-        count(
-            "update_every",
-            self.update_every,
-            1..=1000,
-            "from 1 to 1000",
-        )?;
-        real("alpha", self.alpha, 0.0..=1.0, "from 0 to 1")?;
-        real("sigma", self.sigma, 1e-4..=100.0, "from 0.0001 to 100")?;
-        real(
-            "motion_std_x",
-            self.motion_std_x,
-            0.0..=320.0,
-            "from 0 to 320",
-        )?;
-        real(
-            "motion_std_y",
-            self.motion_std_y,
-            0.0..=320.0,
-            "from 0 to 320",
-        )?;
-        real(
-            "motion_std_scale",
-            self.motion_std_scale,
-            0.0..=1.0,
-            "from 0 to 1",
-        )
-    }
-
     /// D, the length of a feature vector.
     pub fn feature_len(&self) -> usize {
-        self.patch_width as usize * self.patch_height as usize
+        let cells = self.patch_width as usize * self.patch_height as usize;
+        match self.features {
+            Features::Gray => cells,
+            Features::Gradients => cells * super::gradients::CHANNELS,
+        }
     }
-}
 
-fn count(
-    name: &'static str,
-    value: u32,
-    range: std::ops::RangeInclusive<u32>,
-    expected: &'static str,
-) -> Result<(), ParamsError> {
-    if range.contains(&value) {
-        return Ok(());
+    /// γ (equation 5): one over the greatest squared distance of two feature vectors.
+    pub(super) fn gamma(&self) -> f64 {
+        if self.unit_length {
+            0.25
+        } else {
+            1.0 / self.feature_len() as f64
+        }
     }
-    Err(ParamsError {
-        name,
-        value: f64::from(value),
-        expected,
-    })
-}
 
-fn real(
-    name: &'static str,
-    value: f64,
-    range: std::ops::RangeInclusive<f64>,
-    expected: &'static str,
-) -> Result<(), ParamsError> {
-    if range.contains(&value) {
-        return Ok(());
+    /// How many particles are kept from one frame to the next.
+    pub(super) fn stored_particles(&self) -> usize {
+        match self.search {
+            Search::Resampled => self.particles as usize,
+            Search::Answer => 0,
+        }
     }
-    Err(ParamsError {
-        name,
-        value,
-        expected,
-    })
+
+    /// How many of the particles are drawn first; the others are drawn around the best of these.
+    pub(super) fn first_particles(&self) -> usize {
+        let refined = (f64::from(self.particles) * self.refined_share) as usize;
+        (self.particles as usize - refined).max(1)
+    }
 }

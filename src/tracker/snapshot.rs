@@ -10,12 +10,13 @@
 
 use super::bag::Bag;
 use super::frame::working_size;
+use super::motion::Particle;
 use super::state::{self, State};
 use super::{Params, TrackerError};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -55,7 +56,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
         return Err(damaged);
     }
     match postcard::take_from_bytes::<State>(body) {
-        Ok((state, [])) => check(&state).map(|()| state),
+        Ok((mut state, [])) => {
+            check(&state)?;
+            state.background.learn(&state.params);
+            Ok(state)
+        }
         _ => Err(damaged),
     }
 }
@@ -65,7 +70,8 @@ fn check(state: &State) -> Result<(), TrackerError> {
     let sound = check_numbers(state)
         && check_particles(state)
         && check_history(state)
-        && check_bag(&state.bag, &state.params);
+        && check_bag(&state.bag, &state.params)
+        && check_mends(state);
     if sound {
         Ok(())
     } else {
@@ -105,22 +111,43 @@ fn check_numbers(state: &State) -> bool {
 }
 
 fn check_particles(state: &State) -> bool {
-    let count = state.params.particles as usize;
+    let count = state.params.stored_particles();
     let total: f64 = state.weights.iter().sum();
     state.particles.len() == count
         && state.weights.len() == count
+        && is_held(&state.answer, state)
         && state
             .weights
             .iter()
             .all(|weight| (0.0..=1.0).contains(weight))
-        && (total - 1.0).abs() < 1e-6
-        && state.particles.iter().all(|particle| {
-            // Those of a new box may be where a moved one may not: by a pixel.
-            let held = state.reach.hold(*particle);
-            (held.x - particle.x).abs() <= 2.0
-                && (held.y - particle.y).abs() <= 2.0
-                && held.scale == particle.scale
-        })
+        && (count == 0 || (total - 1.0).abs() < 1e-6)
+        && state
+            .particles
+            .iter()
+            .all(|particle| is_held(particle, state))
+}
+
+/// Whether a particle is where it may be. Those of a new box may be where a moved one may not: by a pixel. The mean of
+/// scales at a limit may be rounded beyond it.
+fn is_held(particle: &Particle, state: &State) -> bool {
+    let held = state.reach.hold(*particle);
+    (held.x - particle.x).abs() <= 2.0
+        && (held.y - particle.y).abs() <= 2.0
+        && (held.scale - particle.scale).abs() <= 1e-9
+}
+
+/// What only some parameters need: there when they ask for it, and not otherwise.
+fn check_mends(state: &State) -> bool {
+    let params = &state.params;
+    let (width, height) = working_size(state.source.0, state.source.1);
+    state.background.is_sound(params, GREATEST_FEATURE)
+        && state.discriminant.is_sound(params, GREATEST_FEATURE)
+        && state.camera.is_some() == params.camera_shift
+        && state
+            .camera
+            .as_ref()
+            .is_none_or(|camera| camera.is_sound(width as usize, height as usize))
+        && (0.0..=1e6).contains(&state.trust.usual)
 }
 
 fn check_history(state: &State) -> bool {
@@ -135,7 +162,11 @@ fn check_history(state: &State) -> bool {
 fn check_bag(bag: &Bag, params: &Params) -> bool {
     let len = params.feature_len();
     (1..=params.bag_size as usize).contains(&bag.entries().len())
-        && bag.entries().iter().all(|entry| {
+        && bag
+            .entries()
+            .iter()
+            .all(|entry| entry.is_sound(params, GREATEST_FEATURE))
+        && bag.subspaces().all(|entry| {
             entry.mean.len() == len
                 && entry.basis.len().is_multiple_of(len)
                 && entry.dim() <= params.basis_dim as usize

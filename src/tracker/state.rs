@@ -4,11 +4,15 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::bag::Bag;
+use super::background::Background;
+use super::bag::{Bag, Entry};
+use super::camera::Camera;
+use super::discriminant::Discriminant;
 use super::frame::working_size;
 use super::motion::{Particle, Reach};
 use super::score::Usual;
-use super::{AffineSubspace, Estimate, GrayFrame, Params, Rect, TrackerError};
+use super::trust::Trust;
+use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
@@ -20,12 +24,20 @@ pub(super) struct State {
     pub source: (u32, u32),
     pub reach: Reach,
     pub estimate: Estimate,
+    /// Where the target was found last.
+    pub answer: Particle,
+    /// The last particles; none where the next ones come from the answer.
     pub particles: Vec<Particle>,
     /// One for each particle, summing to 1.
     pub weights: Vec<f64>,
-    /// The tracked patches of the last frames, newest first, 1 to P of them.
+    /// The feature vectors of the last tracked frames, newest first, 1 to P of them.
     pub history: VecDeque<Vec<f32>>,
     pub bag: Bag,
+    pub background: Background,
+    pub discriminant: Discriminant,
+    /// Where a shift of the picture is looked for.
+    pub camera: Option<Camera>,
+    pub trust: Trust,
     pub usual: Usual,
 }
 
@@ -64,21 +76,24 @@ impl State {
 
     /// All particles at `particle`, with equal weights.
     pub fn gather(&mut self, particle: Particle) {
-        let count = self.params.particles as usize;
+        let count = self.params.stored_particles();
+        self.answer = particle;
         self.particles = vec![particle; count];
-        self.weights = vec![1.0 / count as f64; count];
+        self.weights = vec![1.0 / count.max(1) as f64; count];
     }
 
-    /// The subspace of `patch` and the previous patches (equation 2).
-    pub fn subspace_with(&self, patch: &[f32]) -> AffineSubspace {
-        let mut vectors = vec![patch];
-        vectors.extend(self.history.iter().map(Vec::as_slice));
-        AffineSubspace::of(&vectors, self.params.basis_dim as usize)
+    /// The subspace of `features` and those of the previous frames (equation 2).
+    pub fn entry_with(&self, features: &[f32]) -> Entry {
+        let mut vectors = features.to_vec();
+        self.history
+            .iter()
+            .for_each(|vector| vectors.extend_from_slice(vector));
+        Entry::new(&vectors, self.background.metric(), &self.params)
     }
 
-    /// Makes `patch` the newest of the history.
-    pub fn remember(&mut self, patch: Vec<f32>) {
-        self.history.push_front(patch);
+    /// Makes `features` the newest of the history.
+    pub fn remember(&mut self, features: Vec<f32>) {
+        self.history.push_front(features);
         self.history.truncate(self.params.history as usize);
     }
 }

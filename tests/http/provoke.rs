@@ -179,9 +179,9 @@ impl Blocked {
         let app = app.await;
         let id = app.open().await;
         // The most expensive parameters there are.
-        let params = r#"{"particles": 1000, "patch_width": 64, "patch_height": 64, "bag_size": 32,
+        let params = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
             "update_every": 1, "history": 10, "basis_dim": 6}"#;
-        let query = [("box", BOX), ("params", params)];
+        let query = [("box", BOX), ("preset", "paper"), ("params", params)];
         let response = app.create(pictures::png(0), &query).await;
         let heavy = response.headers()["location"].to_str().unwrap().to_owned();
         let part = || Part::bytes(pictures::png(1)).file_name("frame.png");

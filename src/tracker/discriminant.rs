@@ -1,0 +1,165 @@
+//! A linear score that tells the target from what is beside it.
+//!
+//! The bag knows what the target has looked like, but not by what it differs from its surroundings, so a twin or a
+//! half-missed target may lie near it too. Every frame evaluates hundreds of areas and then knows where the target was:
+//! each of them is an example, with a label that falls from 1 at the answer to 0 beside it. The score w · u of the unit
+//! vector u of an area is fitted to the labels y by least squares, frame by frame:
+//!
+//! w ← argmin  mean (w · uᵢ - yᵢ)² + damping · ‖w - w_before‖²
+//!
+//! so no example is kept, and one frame can change w only so far. A few steps of conjugate gradients do: the damping
+//! makes the problem well conditioned.
+
+use serde::{Deserialize, Serialize};
+
+use super::Params;
+use super::matrix;
+use super::motion::{Particle, Reach};
+
+/// Standard deviation of the labels' bell, as a share of the box along x and y, and of the logarithm of the scale.
+const LABEL_WIDTH: f64 = 0.15;
+/// Steps of conjugate gradients in a frame.
+const STEPS: usize = 5;
+/// The first frame knows nothing before it: it is fitted more closely, by this factor of the damping, and longer.
+const FIRST_DAMPING: f64 = 0.1;
+const FIRST_STEPS: usize = 25;
+
+/// The score's state; without vectors the discriminant is off.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct Discriminant {
+    /// The first frame's mean background, taken from all vectors: w means the same in all frames.
+    origin: Vec<f32>,
+    weights: Vec<f32>,
+}
+
+impl Discriminant {
+    /// A discriminant that knows nothing, for feature vectors around `origin` (of length D).
+    pub fn new(origin: Vec<f32>) -> Self {
+        Self {
+            weights: vec![0.0; origin.len()],
+            origin,
+        }
+    }
+
+    /// Whether the discriminant is used.
+    pub fn is_on(&self) -> bool {
+        !self.weights.is_empty()
+    }
+
+    /// Turns feature vectors into the unit vectors u.
+    pub fn prepare(&self, vectors: &mut [f32]) {
+        for vector in vectors.chunks_exact_mut(self.origin.len().max(1)) {
+            matrix::add(vector, -1.0, &self.origin);
+            matrix::normalize(vector);
+        }
+    }
+
+    /// The score of a prepared vector: about 1 on the target and 0 beside it, but not bounded.
+    pub fn score(&self, vector: &[f32]) -> f32 {
+        matrix::dot(vector, &self.weights)
+    }
+
+    /// Learns from the first frame.
+    pub fn begin(&mut self, vectors: &[f32], labels: &[f32], params: &Params) {
+        let damping = params.discriminant_damping * FIRST_DAMPING;
+        self.fit(vectors, labels, damping, FIRST_STEPS);
+    }
+
+    /// Learns from a further frame: the prepared vectors of its particles, and their labels.
+    pub fn learn(&mut self, vectors: &[f32], labels: &[f32], params: &Params) {
+        self.fit(vectors, labels, params.discriminant_damping, STEPS);
+    }
+
+    fn fit(&mut self, vectors: &[f32], labels: &[f32], damping: f64, steps: usize) {
+        let len = self.weights.len();
+        let damping = damping as f32 * labels.len() as f32;
+        let rows = || vectors.chunks_exact(len);
+        let residuals: Vec<f32> = rows()
+            .zip(labels)
+            .map(|(vector, label)| label - self.score(vector))
+            .collect();
+        // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
+        let mut gradient = vec![0.0; len];
+        for (vector, residual) in rows().zip(&residuals) {
+            matrix::add(&mut gradient, *residual, vector);
+        }
+        let mut direction = gradient.clone();
+        let mut product = vec![0.0; len];
+        let mut squared = matrix::dot(&gradient, &gradient);
+        let enough = squared * 1e-10;
+        for _ in 0..steps {
+            if squared <= enough {
+                break;
+            }
+            product.fill(0.0);
+            matrix::add(&mut product, damping, &direction);
+            for vector in rows() {
+                matrix::add(&mut product, matrix::dot(vector, &direction), vector);
+            }
+            let step = squared / matrix::dot(&direction, &product);
+            matrix::add(&mut self.weights, step, &direction);
+            matrix::add(&mut gradient, -step, &product);
+            let before = squared;
+            squared = matrix::dot(&gradient, &gradient);
+            for (direction, gradient) in direction.iter_mut().zip(&gradient) {
+                *direction = gradient + squared / before * *direction;
+            }
+        }
+    }
+
+    /// Whether this may be the discriminant of a tracker with `params`.
+    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
+        let len = if params.discriminant_weight > 0.0 {
+            params.feature_len()
+        } else {
+            0
+        };
+        let bounded = |values: &[f32]| values.iter().all(|value| value.abs() <= greatest);
+        self.origin.len() == len
+            && self.weights.len() == len
+            && bounded(&self.origin)
+            && bounded(&self.weights)
+    }
+}
+
+/// How much of the target an area shows, as the discriminant is taught: 1 at `target`, falling as a bell with the
+/// distance and the ratio of scales.
+pub(super) fn label(area: &Particle, target: &Particle, reach: &Reach) -> f32 {
+    let across = (area.x - target.x) / (reach.box_width * target.scale);
+    let down = (area.y - target.y) / (reach.box_height * target.scale);
+    let larger = (area.scale / target.scale).ln();
+    let squared = across * across + down * down + larger * larger;
+    (-0.5 * squared / (LABEL_WIDTH * LABEL_WIDTH)).exp() as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    #[test]
+    fn a_fit_is_the_solution_of_the_normal_equations() {
+        let (len, count) = (6, 15);
+        let number = |i: usize| ((i * i * 37 + i * 7919) % 1000) as f32 / 500.0 - 1.0;
+        let mut discriminant = Discriminant::new(vec![0.1; len]);
+        discriminant.weights = (0..len).map(number).collect();
+        let before = discriminant.weights.clone();
+        let mut vectors: Vec<f32> = (0..count * len).map(number).collect();
+        discriminant.prepare(&mut vectors);
+        let labels: Vec<f32> = (0..count).map(|i| number(i + 500)).collect();
+        discriminant.fit(&vectors, &labels, 0.2, 50);
+
+        let u = DMatrix::from_row_slice(count, len, &vectors).cast::<f64>();
+        let before = DVector::from_vec(before).cast::<f64>();
+        let residuals = DVector::from_vec(labels).cast::<f64>() - &u * &before;
+        let normal = u.transpose() * &u + DMatrix::identity(len, len) * (0.2 * count as f64);
+        let change = normal.lu().solve(&(u.transpose() * residuals));
+        let expected = before + change.expect("a damped matrix is regular");
+        for (expected, found) in expected.iter().zip(&discriminant.weights) {
+            assert!(
+                (expected - f64::from(*found)).abs() < 1e-4,
+                "{expected} {found}"
+            );
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! A feature vector as it is kept for later, in a byte a value.
+//!
+//! A session keeps more than a hundred of them: those the bag's subspaces were made of, and those of the background.
+//! Each has its own scale, so the error of a value is at most 1/254 of the vector's greatest.
+
+use serde::{Deserialize, Serialize};
+
+/// A feature vector in a byte a value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Look {
+    /// What one step of a value is worth.
+    scale: f32,
+    values: Vec<i8>,
+}
+
+impl Look {
+    /// Keeps `features`.
+    pub fn new(features: &[f32]) -> Self {
+        let greatest = features
+            .iter()
+            .fold(0.0_f32, |most, value| most.max(value.abs()));
+        let scale = greatest / 127.0;
+        let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
+        // A float that is too large for the type becomes its greatest value.
+        let values = features.iter().map(|value| (value * inverse).round() as i8);
+        Self {
+            scale,
+            values: values.collect(),
+        }
+    }
+
+    /// Appends the features to `out`.
+    pub fn append_to(&self, out: &mut Vec<f32>) {
+        out.extend(
+            self.values
+                .iter()
+                .map(|&value| f32::from(value) * self.scale),
+        );
+    }
+
+    /// Whether this may be a feature vector of length `len` with no value over `greatest`.
+    pub fn is_sound(&self, len: usize, greatest: f32) -> bool {
+        self.values.len() == len && (0.0..=greatest / 127.0).contains(&self.scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_comes_back_within_half_a_step() {
+        let features: Vec<f32> = (0..100).map(|i| (i as f32 * 0.7).sin() * 0.3).collect();
+        let mut back = Vec::new();
+        Look::new(&features).append_to(&mut back);
+        for (value, back) in features.iter().zip(&back) {
+            assert!((value - back).abs() <= 0.3 / 254.0 + 1e-6);
+        }
+        let mut zeros = Vec::new();
+        Look::new(&[0.0; 3]).append_to(&mut zeros);
+        assert_eq!(zeros, [0.0; 3]);
+    }
+}

@@ -1,0 +1,102 @@
+//! Two sets of parameters: what the paper prints, and what holds the target.
+
+use serde::{Deserialize, Serialize};
+
+use super::params::{Features, Params, Search};
+
+/// A named set of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// The equations and numbers as printed in the paper.
+    Paper,
+    /// The default: mended where the printed equations lose the object.
+    #[default]
+    Robust,
+}
+
+impl Preset {
+    /// The parameters of this preset.
+    pub fn params(self) -> Params {
+        match self {
+            Self::Paper => PAPER,
+            Self::Robust => ROBUST,
+        }
+    }
+}
+
+/// Section IV of the paper; every mend is off.
+const PAPER: Params = Params {
+    particles: 100,
+    patch_width: 32,
+    patch_height: 32,
+    basis_dim: 3,
+    history: 5,
+    bag_size: 10,
+    update_every: 5,
+    alpha: 0.5,
+    sigma: 0.01,
+    motion_std_x: 5.0,
+    motion_std_y: 5.0,
+    motion_std_scale: 0.01,
+    features: Features::Gray,
+    context: 1.0,
+    gray_weight: 0.0,
+    unit_length: false,
+    candidate_alone: false,
+    background_samples: 0,
+    background_every: 1,
+    background_ridge: 1.0,
+    search: Search::Resampled,
+    refined_share: 0.0,
+    refined_modes: 1,
+    refined_std: 0.0,
+    refined_std_scale: 0.0,
+    displacement_std: 0.0,
+    scale_change_std: 0.0,
+    camera_shift: false,
+    averaging_radius: 0.0,
+    pinned: 0,
+    pinned_weight: 1.0,
+    trusted_ratio: 0.0,
+    discriminant_weight: 0.0,
+    discriminant_damping: 1.0,
+    seed: 0,
+};
+
+/// The paper's α, σ, n, K and W stay.
+const ROBUST: Params = Params {
+    // Twice 150: as many wide as narrow.
+    particles: 300,
+    // Cells, not pixels.
+    patch_width: 8,
+    patch_height: 8,
+    // With the present one, W vectors: no vector is in two subspaces.
+    history: 4,
+    motion_std_x: 8.0,
+    motion_std_y: 8.0,
+    motion_std_scale: 0.02,
+    features: Features::Gradients,
+    context: 1.2,
+    gray_weight: 0.3,
+    unit_length: true,
+    candidate_alone: true,
+    background_samples: 64,
+    background_every: 10,
+    background_ridge: 1.0,
+    search: Search::Answer,
+    refined_share: 0.5,
+    refined_modes: 5,
+    refined_std: 2.0,
+    refined_std_scale: 0.01,
+    displacement_std: 12.0,
+    scale_change_std: 0.04,
+    camera_shift: true,
+    averaging_radius: 3.0,
+    pinned: 1,
+    pinned_weight: 3.0,
+    trusted_ratio: 1.5,
+    discriminant_weight: 12.0,
+    discriminant_damping: 0.5,
+    ..PAPER
+};

@@ -1,0 +1,152 @@
+//! (A) Where the particles of a frame are looked for, and what the place itself says.
+//!
+//! With [`Search::Answer`] the particles start from the last answer: itself, and draws around it; where the whole
+//! picture moved, half of the draws around where the answer moved to. With a refined share, the rest of the particles
+//! is then drawn narrowly around the best of these. The prior of a particle falls with its distance from the last
+//! answer (or from where that moved to) and with the change of its scale.
+
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::motion::{Particle, Reach};
+use super::{Params, Search};
+
+/// A shift below this, in working pixels, is within what a search covers anyway.
+const NOTABLE_SHIFT: f64 = 2.0;
+
+/// The search of one frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sought<'a> {
+    /// The last answer.
+    pub last: Particle,
+    /// How far the whole picture moved, in working pixels.
+    pub shift: (f64, f64),
+    pub params: &'a Params,
+    pub reach: &'a Reach,
+}
+
+fn normal(generator: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(generator)
+}
+
+impl Sought<'_> {
+    /// Where the last answer would be had it moved with the picture.
+    fn carried(&self) -> Particle {
+        Particle {
+            x: self.last.x + self.shift.0,
+            y: self.last.y + self.shift.1,
+            ..self.last
+        }
+    }
+
+    fn has_shift(&self) -> bool {
+        self.shift.0.abs().max(self.shift.1.abs()) > NOTABLE_SHIFT
+    }
+
+    /// How far from the last answer a particle may come to be, in working pixels, but for one draw in a thousand.
+    pub fn furthest(&self) -> f64 {
+        let draws = self.params.motion_std_x.max(self.params.motion_std_y);
+        let shift = self.shift.0.abs().max(self.shift.1.abs());
+        3.3 * (draws + self.params.refined_std) + shift
+    }
+
+    /// Draws the first particles around the last answer into `out`.
+    pub fn propose(&self, generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
+        let carried = self.carried();
+        out.clear();
+        out.push(self.reach.hold(self.last));
+        if self.has_shift() {
+            out.push(self.reach.hold(carried));
+        }
+        let count = self.params.first_particles().max(out.len());
+        while out.len() < count {
+            let moved = self.has_shift() && out.len().is_multiple_of(2);
+            let from = if moved { carried } else { self.last };
+            let params = self.params;
+            let drawn = Particle {
+                x: from.x + params.motion_std_x * normal(generator),
+                y: from.y + params.motion_std_y * normal(generator),
+                scale: from.scale * (params.motion_std_scale * normal(generator)).exp(),
+            };
+            out.push(self.reach.hold(drawn));
+        }
+    }
+
+    /// Draws the rest of the particles around the best, by `weights`, of those in `particles`.
+    pub fn refine(
+        &self,
+        weights: &[f64],
+        generator: &mut ChaCha8Rng,
+        particles: &mut Vec<Particle>,
+    ) {
+        let mut order: Vec<usize> = (0..particles.len()).collect();
+        order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
+        order.truncate(self.params.refined_modes as usize);
+        let params = self.params;
+        for &mode in order.iter().cycle() {
+            if particles.len() >= params.particles as usize {
+                break;
+            }
+            let from = particles[mode];
+            let drawn = Particle {
+                x: from.x + params.refined_std * normal(generator),
+                y: from.y + params.refined_std * normal(generator),
+                scale: from.scale * (params.refined_std_scale * normal(generator)).exp(),
+            };
+            particles.push(self.reach.hold(drawn));
+        }
+    }
+
+    /// The prior of a particle, 1 at the last answer and where it was carried to.
+    pub fn prior(&self, particle: &Particle) -> f64 {
+        if self.params.search == Search::Resampled {
+            return 1.0;
+        }
+        let squared =
+            |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
+        let mut exponent = 0.0;
+        if self.params.displacement_std > 0.0 {
+            let nearest = squared(&self.last).min(squared(&self.carried()));
+            exponent += nearest / self.params.displacement_std.powi(2);
+        }
+        if self.params.scale_change_std > 0.0 {
+            let change = (particle.scale / self.last.scale).ln();
+            exponent += (change / self.params.scale_change_std).powi(2);
+        }
+        (-0.5 * exponent).exp()
+    }
+}
+
+/// The weighted mean of the particles within `radius` (working pixels) of the one at `best`.
+pub(super) fn average(
+    particles: &[Particle],
+    weights: &[f64],
+    best: usize,
+    radius: f64,
+) -> Particle {
+    let center = particles[best];
+    let mut mean = Particle {
+        x: 0.0,
+        y: 0.0,
+        scale: 0.0,
+    };
+    let mut total = 0.0;
+    for (particle, &weight) in particles.iter().zip(weights) {
+        let distance = (particle.x - center.x).hypot(particle.y - center.y);
+        if distance < radius {
+            mean.x += weight * particle.x;
+            mean.y += weight * particle.y;
+            mean.scale += weight * particle.scale;
+            total += weight;
+        }
+    }
+    if total > 0.0 {
+        Particle {
+            x: mean.x / total,
+            y: mean.y / total,
+            scale: mean.scale / total,
+        }
+    } else {
+        center
+    }
+}

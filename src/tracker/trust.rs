@@ -1,0 +1,68 @@
+//! Whether a frame may teach the tracker.
+//!
+//! What is learned while something covers the target is the thing that covers it. The look that the user pointed at
+//! does not change, so the distance of the answer to the bag's first subspace tells: it jumps when the target is
+//! covered, and creeps when the target turns. A frame is trusted while that distance is below a multiple of what is
+//! usual. What is usual follows slowly in frames that are not trusted, too, so that a lasting change is accepted in
+//! the end.
+
+use serde::{Deserialize, Serialize};
+
+use super::Params;
+
+/// A running mean needs some frames before anything can be compared with it; a target that changes fast from the start
+/// would never be learned otherwise.
+const UNTIL_USUAL: u64 = 20;
+/// What counts as usual before anything was seen, and what is always trusted: distances are at most 1, and these are
+/// those of a look that shares about half with the first.
+const FIRST_USUAL: f64 = 0.25;
+const ALWAYS_TRUSTED: f64 = 0.37;
+/// The share of the newest frame in the running mean, when trusted and when not.
+const RENEWAL: f64 = 0.1;
+const RENEWAL_UNTRUSTED: f64 = 0.02;
+
+/// What distances to the first subspace have been usual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Trust {
+    pub usual: f64,
+}
+
+impl Default for Trust {
+    fn default() -> Self {
+        Self { usual: FIRST_USUAL }
+    }
+}
+
+impl Trust {
+    /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
+    pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
+        let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
+        let trusted = params.trusted_ratio <= 0.0 || number < UNTIL_USUAL || distance < limit;
+        let renewal = if trusted { RENEWAL } else { RENEWAL_UNTRUSTED };
+        self.usual += renewal * (distance - self.usual);
+        trusted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::Preset;
+
+    #[test]
+    fn a_jump_is_not_trusted_until_it_has_lasted() {
+        let params = Preset::Robust.params();
+        let mut trust = Trust::default();
+        assert!((1..50).all(|number| trust.judge(0.2, number, &params)));
+        let untrusted = (50..500).take_while(|&number| !trust.judge(0.6, number, &params));
+        let untrusted = untrusted.count();
+        assert!((10..100).contains(&untrusted), "{untrusted}");
+    }
+
+    #[test]
+    fn a_creeping_change_is_trusted_all_along() {
+        let params = Preset::Robust.params();
+        let mut trust = Trust::default();
+        assert!((1..200).all(|number| trust.judge(0.2 + number as f64 * 0.003, number, &params)));
+    }
+}
