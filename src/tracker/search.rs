@@ -55,7 +55,8 @@ impl Sought<'_> {
         let carried = self.carried();
         out.clear();
         out.push(self.reach.hold(self.last));
-        if self.has_shift() {
+        // A search of one particle has no room for another.
+        if self.has_shift() && self.params.particles > 1 {
             out.push(self.reach.hold(carried));
         }
         let count = self.params.first_particles().max(out.len());
