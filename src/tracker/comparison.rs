@@ -10,6 +10,7 @@ use super::discriminant::Discriminant;
 use super::gradients::GradientSums;
 use super::motion::{Particle, Reach};
 use super::patch::PatchCutter;
+use super::score::Evidence;
 use super::search::Sought;
 use super::solitary::Solitary;
 use super::state::State;
@@ -232,9 +233,15 @@ impl Comparison {
         likelihood::arg_max(&self.weights)
     }
 
-    /// The distances of particle `index` to the entries of the bag.
-    pub fn distances(&self, index: usize) -> &[f64] {
+    /// What particle `index` says about itself.
+    pub fn evidence(&self, index: usize) -> Evidence {
         let entries = self.distances.len() / self.particles.len();
-        &self.distances[index * entries..][..entries]
+        let distances = &self.distances[index * entries..][..entries];
+        Evidence {
+            first: distances[0],
+            nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
+            discriminant: self.scores.get(index).copied(),
+            scale: self.particles[index].scale,
+        }
     }
 }

@@ -61,6 +61,7 @@ impl State {
             camera,
             trust: Trust::default(),
             usual: Usual::default(),
+            frames_lost: 0,
         };
         state.gather(answer);
         let features = state.survey(frame, 0, room);
@@ -74,6 +75,7 @@ impl State {
         let number = self.estimate.frame + 1;
         let (reach, answer) = Self::aim(self.source, &target);
         self.reach = reach;
+        self.frames_lost = 0;
         self.gather(answer);
         if let Some(camera) = &mut self.camera {
             *camera = Camera::new(frame);

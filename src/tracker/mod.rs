@@ -176,10 +176,12 @@ impl Tracker {
         let state = &mut self.state;
         let number = state.estimate.frame + 1;
         let mut draws = motion::generator(state.params.seed, number, Draws::Particles);
+        let widening = state.widening();
         let camera = state.camera.as_mut();
         let sought = Sought {
             last: state.answer,
             shift: camera.map_or((0.0, 0.0), |camera| camera.shift(frame)),
+            widening,
             params: &state.params,
             reach: &state.reach,
         };
@@ -203,12 +205,18 @@ impl Tracker {
             room.extend(frame, first, state);
             best = room.weigh(&sought, &state.bag, &state.discriminant);
         }
-        let radius = state.params.averaging_radius;
-        let answer = search::average(&room.particles, &room.weights, best, radius);
-        let distances = room.distances(best);
-        let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
-        let (score, status) = state.usual.judge(nearest);
-        let trusted = state.trust.judge(distances[0], number, &state.params);
+        let evidence = room.evidence(best);
+        let lost = state.is_out_of_sight(&evidence);
+        let answer = if lost {
+            state.frames_lost = state.frames_lost.saturating_add(1);
+            state.reach.hold(sought.carried())
+        } else {
+            state.frames_lost = 0;
+            let radius = state.params.averaging_radius;
+            search::average(&room.particles, &room.weights, best, radius)
+        };
+        let trusted = !lost && state.trust.judge(evidence.first, number, &state.params);
+        let (score, status) = state.usual.judge(&evidence, lost, trusted);
 
         // (C) What is to be remembered of it.
         state.answer = answer;

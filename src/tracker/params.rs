@@ -97,6 +97,9 @@ pub struct Params {
     pub displacement_std: f64,
     /// Standard deviation of the prior on how the logarithm of the scale changes in a frame, 0 to 10. Off: 0.
     pub scale_change_std: f64,
+    /// Standard deviation of the prior on the logarithm of the scale against the first box, 0 to 10: without a reason a
+    /// box stays as large as it was. Off: 0.
+    pub scale_std: f64,
     /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
     /// moves a target further than targets move. Off: false.
     pub camera_shift: bool,
@@ -119,6 +122,9 @@ pub struct Params {
     /// How strongly that score keeps to what it was, against the mean squared error over the candidates of a frame,
     /// 0.001 to 1000.
     pub discriminant_damping: f64,
+    /// Below this score of the discriminant, at the best particle, the target counts as out of sight, 0 to 1: the box
+    /// stays, nothing is learned, and the search widens from frame to frame until the target is found again. Off: 0.
+    pub lost_below: f64,
 
     /// Seed of all random draws: the same seed and frames give the same boxes.
     pub seed: u64,

@@ -54,6 +54,7 @@ const PAPER: Params = Params {
     refined_std_scale: 0.0,
     displacement_std: 0.0,
     scale_change_std: 0.0,
+    scale_std: 0.0,
     camera_shift: false,
     averaging_radius: 0.0,
     pinned: 0,
@@ -61,6 +62,7 @@ const PAPER: Params = Params {
     trusted_ratio: 0.0,
     discriminant_weight: 0.0,
     discriminant_damping: 1.0,
+    lost_below: 0.0,
     seed: 0,
 };
 
@@ -91,6 +93,7 @@ const ROBUST: Params = Params {
     refined_std_scale: 0.01,
     displacement_std: 12.0,
     scale_change_std: 0.04,
+    scale_std: 0.5,
     camera_shift: true,
     averaging_radius: 3.0,
     pinned: 1,
@@ -98,5 +101,7 @@ const ROBUST: Params = Params {
     trusted_ratio: 1.5,
     discriminant_weight: 12.0,
     discriminant_damping: 0.5,
+    // On the target 0.5 to 1, on what is beside it about 0.1.
+    lost_below: 0.35,
     ..PAPER
 };

@@ -112,6 +112,8 @@ impl Params {
             0.0..=10.0,
             "from 0 to 10",
         )?;
+        real("scale_std", self.scale_std, 0.0..=10.0, "from 0 to 10")?;
+        real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(
             "averaging_radius",
             self.averaging_radius,

@@ -21,6 +21,8 @@ pub(super) struct Sought<'a> {
     pub last: Particle,
     /// How far the whole picture moved, in working pixels.
     pub shift: (f64, f64),
+    /// How many times as wide as usual the search is: more than once where the target is out of sight.
+    pub widening: f64,
     pub params: &'a Params,
     pub reach: &'a Reach,
 }
@@ -31,7 +33,7 @@ fn normal(generator: &mut ChaCha8Rng) -> f64 {
 
 impl Sought<'_> {
     /// Where the last answer would be had it moved with the picture.
-    fn carried(&self) -> Particle {
+    pub fn carried(&self) -> Particle {
         Particle {
             x: self.last.x + self.shift.0,
             y: self.last.y + self.shift.1,
@@ -45,7 +47,7 @@ impl Sought<'_> {
 
     /// How far from the last answer a particle may come to be, in working pixels, but for one draw in a thousand.
     pub fn furthest(&self) -> f64 {
-        let draws = self.params.motion_std_x.max(self.params.motion_std_y);
+        let draws = self.widening * self.params.motion_std_x.max(self.params.motion_std_y);
         let shift = self.shift.0.abs().max(self.shift.1.abs());
         3.3 * (draws + self.params.refined_std) + shift
     }
@@ -65,8 +67,8 @@ impl Sought<'_> {
             let from = if moved { carried } else { self.last };
             let params = self.params;
             let drawn = Particle {
-                x: from.x + params.motion_std_x * normal(generator),
-                y: from.y + params.motion_std_y * normal(generator),
+                x: from.x + self.widening * params.motion_std_x * normal(generator),
+                y: from.y + self.widening * params.motion_std_y * normal(generator),
                 scale: from.scale * (params.motion_std_scale * normal(generator)).exp(),
             };
             out.push(self.reach.hold(drawn));
@@ -108,11 +110,14 @@ impl Sought<'_> {
         let mut exponent = 0.0;
         if self.params.displacement_std > 0.0 {
             let nearest = squared(&self.last).min(squared(&self.carried()));
-            exponent += nearest / self.params.displacement_std.powi(2);
+            exponent += nearest / (self.widening * self.params.displacement_std).powi(2);
         }
         if self.params.scale_change_std > 0.0 {
             let change = (particle.scale / self.last.scale).ln();
             exponent += (change / self.params.scale_change_std).powi(2);
+        }
+        if self.params.scale_std > 0.0 {
+            exponent += (particle.scale.ln() / self.params.scale_std).powi(2);
         }
         (-0.5 * exponent).exp()
     }

@@ -10,12 +10,18 @@ use super::camera::Camera;
 use super::discriminant::Discriminant;
 use super::frame::working_size;
 use super::motion::{Particle, Reach};
-use super::score::Usual;
+use super::score::{Evidence, Usual};
 use super::trust::Trust;
 use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
+
+/// By how much of its usual width the search grows in each frame in which the target is out of sight.
+const WIDENING: f64 = 0.5;
+
+/// How much better than what counts as lost a target must look that is found again.
+const FOUND_MARGIN: f64 = 0.25;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,6 +45,8 @@ pub(super) struct State {
     pub camera: Option<Camera>,
     pub trust: Trust,
     pub usual: Usual,
+    /// For how many frames the target has been out of sight.
+    pub frames_lost: u32,
 }
 
 impl State {
@@ -89,6 +97,32 @@ impl State {
             .iter()
             .for_each(|vector| vectors.extend_from_slice(vector));
         Entry::new(&vectors, self.background.metric(), &self.params)
+    }
+
+    /// How many times as wide as usual the next search is. The longer a target is out of sight, the further it may have
+    /// come, until the search covers the frame.
+    pub fn widening(&self) -> f64 {
+        let std = self
+            .params
+            .motion_std_x
+            .max(self.params.motion_std_y)
+            .max(1.0);
+        let most = self.reach.frame_width.max(self.reach.frame_height) / 3.0 / std;
+        let widened = 1.0 + WIDENING * f64::from(self.frames_lost);
+        widened.min(most.max(1.0))
+    }
+
+    /// Whether the best particle is not the target. Once the target is out of sight the search covers much more, and
+    /// finds more that looks a little like it: so to be found again takes a better score, and a look that is trusted.
+    pub fn is_out_of_sight(&self, evidence: &Evidence) -> bool {
+        let Some(score) = evidence.discriminant else {
+            return false;
+        };
+        let (score, below) = (f64::from(score), self.params.lost_below);
+        if self.frames_lost == 0 {
+            return score < below;
+        }
+        score < below + FOUND_MARGIN || !self.trust.accepts(evidence.first, &self.params)
     }
 
     /// Makes `features` the newest of the history.

@@ -34,10 +34,15 @@ impl Default for Trust {
 }
 
 impl Trust {
+    /// Whether `distance` from the first subspace is not far beyond what is usual.
+    pub fn accepts(&self, distance: f64, params: &Params) -> bool {
+        let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
+        params.trusted_ratio <= 0.0 || distance < limit
+    }
+
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
     pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
-        let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
-        let trusted = params.trusted_ratio <= 0.0 || number < UNTIL_USUAL || distance < limit;
+        let trusted = number < UNTIL_USUAL || self.accepts(distance, params);
         let renewal = if trusted { RENEWAL } else { RENEWAL_UNTRUSTED };
         self.usual += renewal * (distance - self.usual);
         trusted
