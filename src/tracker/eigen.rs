@@ -17,10 +17,19 @@ const MAX_SWEEPS: usize = 16;
 /// An off-diagonal element below this share of the trace is rounding.
 const NEGLIGIBLE: f64 = 1e-16;
 
+/// The same where no eigenvectors are wanted: leaving out an element changes an eigenvalue by its square over a gap, and
+/// by the element itself at most.
+const NEGLIGIBLE_FOR_VALUES: f64 = 1e-13;
+
 /// Diagonalises [`LANES`] symmetric positive semidefinite matrices of size `dim`, each `dim * dim` in row order.
 /// Their diagonals end as the eigenvalues, in no order. `vectors`, if given, ends with the eigenvector of the
 /// `j`-th diagonal element in its `j`-th row.
+#[inline(always)]
 pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<&mut [Lanes]>) {
+    let negligible = match vectors {
+        Some(_) => NEGLIGIBLE,
+        None => NEGLIGIBLE_FOR_VALUES,
+    };
     if let Some(vectors) = vectors.as_deref_mut() {
         vectors.fill([0.0; LANES]);
         for j in 0..dim {
@@ -30,7 +39,7 @@ pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<
     let mut floor = [0.0; LANES];
     for j in 0..dim {
         for (sum, value) in floor.iter_mut().zip(&matrix[j * dim + j]) {
-            *sum += value * NEGLIGIBLE;
+            *sum += value * negligible;
         }
     }
     for _ in 0..MAX_SWEEPS {
@@ -52,6 +61,7 @@ pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<
 }
 
 /// Zeroes element (p, q) of every lane, p < q. Only the upper triangle is read and written.
+#[inline(always)]
 fn rotate(matrix: &mut [Lanes], dim: usize, p: usize, q: usize, vectors: Option<&mut [Lanes]>) {
     let (pp, qq, pq) = (p * dim + p, q * dim + q, p * dim + q);
     let (diagonal_p, diagonal_q, off) = (matrix[pp], matrix[qq], matrix[pq]);
@@ -81,7 +91,7 @@ fn rotate(matrix: &mut [Lanes], dim: usize, p: usize, q: usize, vectors: Option<
     }
 }
 
-#[inline]
+#[inline(always)]
 fn turn(values: &mut [Lanes], p: usize, q: usize, cosine: &Lanes, sine: &Lanes) {
     let (at_p, at_q) = (values[p], values[q]);
     for lane in 0..LANES {

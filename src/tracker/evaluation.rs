@@ -1,5 +1,7 @@
 //! (D) The candidates of a frame against the bag: distances, likelihoods, the best one.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::candidate::CandidateBases;
 use super::distance::Distances;
 use super::products::Products;
@@ -22,6 +24,22 @@ pub struct Evaluation {
     distances: Distances,
     likelihoods: Vec<f64>,
     weights: Vec<f64>,
+}
+
+/// [`Evaluation::compute`], to be compiled for the instructions that this machine has. Everything in it is inlined,
+/// since a function of its own would be compiled for the least of machines.
+struct Compute<'a> {
+    evaluation: &'a mut Evaluation,
+    history: &'a [&'a [f32]],
+}
+
+impl WithSimd for Compute<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.evaluation.compute_all(self.history);
+    }
 }
 
 impl Evaluation {
@@ -58,6 +76,11 @@ impl Evaluation {
         self.products.candidate_mut(index)
     }
 
+    /// The feature vectors of all N candidates, one after the other, to be filled in.
+    pub fn candidates_mut(&mut self) -> &mut [f64] {
+        self.products.candidates_mut()
+    }
+
     /// The feature vector v of candidate `index` as it is stored in histories.
     pub fn candidate(&self, index: usize) -> Vec<f32> {
         let values = self.products.candidate(index).iter();
@@ -70,6 +93,14 @@ impl Evaluation {
     /// # Panics
     /// If no bag was set, there are more than P previous patches, or one of them is longer than D.
     pub fn compute(&mut self, history: &[&[f32]]) {
+        Arch::new().dispatch(Compute {
+            evaluation: self,
+            history,
+        });
+    }
+
+    #[inline(always)]
+    fn compute_all(&mut self, history: &[&[f32]]) {
         self.products.compute(history);
         self.bases.compute(&self.products);
         self.distances

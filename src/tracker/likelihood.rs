@@ -6,6 +6,7 @@
 
 /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equations 10 and 11) of `distances`, which hold for each candidate its
 /// distance to each of `entries` entries; the result in the same order. Each entry's sum over the candidates is 1.
+#[inline(always)]
 pub(super) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mut Vec<f64>) {
     out.clear();
     out.extend_from_slice(distances);
@@ -25,6 +26,7 @@ pub(super) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mu
 
 /// The weight of each particle: the sum of its likelihoods over the bag (equation 9), scaled so that the weights
 /// sum to 1.
+#[inline(always)]
 pub(super) fn sum_rule(likelihoods: &[f64], entries: usize, out: &mut Vec<f64>) {
     out.clear();
     let sums = likelihoods.chunks_exact(entries);

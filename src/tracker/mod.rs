@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod angle;
 mod bag;
 mod candidate;
 mod distance;
@@ -199,11 +200,12 @@ impl Tracker {
         );
 
         // (B) What is seen there.
-        for (index, particle) in self.proposed.iter().enumerate() {
-            let area = state.reach.area(particle);
-            let values = self.evaluation.candidate_mut(index);
-            self.cutter.cut(frame, &area, &state.params, values);
-        }
+        let areas = self
+            .proposed
+            .iter()
+            .map(|particle| state.reach.area(particle));
+        let vectors = self.evaluation.candidates_mut();
+        self.cutter.cut(frame, areas, &state.params, vectors);
 
         // (D) How that compares with what is known.
         let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();

@@ -26,7 +26,8 @@ pub(super) struct Products {
     stride: usize,
     /// The candidates, then Q (P slots, zero where there is no direction), then the sum of H: one vector a row.
     left: Vec<f64>,
-    /// Q, the sum of H, and for each entry of the bag its mean and n basis vectors: one vector a column.
+    /// Q, the sum of H, the means of the bag's entries, their first basis vectors, their second and so on: one vector a
+    /// column.
     right: Vec<f64>,
     /// One column for each vector of `left`, one row for each of `right`.
     out: DMatrix<f64>,
@@ -62,6 +63,11 @@ impl Products {
         &mut self.left[index * self.len..(index + 1) * self.len]
     }
 
+    /// The feature vectors of all candidates, one after the other, to be filled in.
+    pub fn candidates_mut(&mut self) -> &mut [f64] {
+        &mut self.left[..self.candidates * self.len]
+    }
+
     /// The feature vector of candidate `index`.
     pub fn candidate(&self, index: usize) -> &[f64] {
         &self.left[index * self.len..(index + 1) * self.len]
@@ -73,12 +79,14 @@ impl Products {
         let columns = (first + entries.len() * self.stride).max(LEAST_SIDE);
         self.right.clear();
         self.right.resize(columns * self.len, 0.0);
-        for (entry, block) in
-            entries.zip(self.right[first * self.len..].chunks_exact_mut(self.stride * self.len))
-        {
-            let values = entry.mean.iter().chain(&entry.basis);
-            for (target, &value) in block.iter_mut().zip(values) {
-                *target = f64::from(value);
+        let (count, len) = (entries.len(), self.len);
+        for (k, entry) in entries.enumerate() {
+            let vectors = entry.mean.chunks_exact(len).chain(entry.basis());
+            for (column, vector) in vectors.enumerate() {
+                let target = &mut self.right[(first + column * count + k) * len..][..len];
+                for (target, &value) in target.iter_mut().zip(vector) {
+                    *target = f64::from(value);
+                }
             }
         }
         let rows = self.left.len() / self.len;
@@ -86,6 +94,7 @@ impl Products {
     }
 
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
+    #[inline(always)]
     pub fn compute(&mut self, history: &[&[f32]]) {
         self.factor(history);
         let (len, columns, rows) = (self.len, self.out.nrows(), self.out.ncols());
@@ -110,6 +119,7 @@ impl Products {
     }
 
     /// Q = H R Λ^(-1/2), where HᵀH = R Λ Rᵀ, and the sum of H.
+    #[inline(always)]
     fn factor(&mut self, history: &[&[f32]]) {
         let (len, count) = (self.len, history.len());
         let shared = &mut self.left[self.candidates * len..][..(self.slots + 1) * len];
@@ -148,6 +158,7 @@ impl Products {
         self.row(self.candidates + self.slots)
     }
 
+    #[inline(always)]
     fn row(&self, index: usize) -> Row<'_> {
         let rows = self.out.nrows();
         let all = &self.out.as_slice()[index * rows..(index + 1) * rows];
@@ -187,10 +198,12 @@ pub(super) struct Row<'a> {
     pub with_directions: &'a [f64],
     /// With the sum of H.
     pub with_sum: f64,
-    /// With the bag: for each entry its mean, then n basis vectors (0 for those it does not have).
+    /// With the means of the bag's entries, with their first basis vectors, and so on to the n-th (0 for those that an
+    /// entry does not have).
     pub with_bag: &'a [f64],
 }
 
+#[inline(always)]
 fn norm_squared(vector: &[f64]) -> f64 {
     let mut parts = [0.0_f64; 8];
     let (chunks, rest) = vector.as_chunks::<8>();

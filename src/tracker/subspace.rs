@@ -70,6 +70,7 @@ impl AffineSubspace {
 }
 
 /// How many of the eigenvalues of a Gram matrix, largest first, count as directions: at most `limit`.
+#[inline(always)]
 pub(super) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> usize {
     let mut least = 0.0;
     eigenvalues
@@ -85,6 +86,7 @@ pub(super) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> 
 }
 
 /// VᵀV of vectors, in double precision and row order.
+#[inline(always)]
 pub(super) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
     let count = vectors.len();
     let mut gram = vec![0.0; count * count];
@@ -99,6 +101,7 @@ pub(super) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
 }
 
 /// The inner product, summed in double precision in eight parts so that the loop vectorises.
+#[inline(always)]
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
     let mut parts = [0.0_f64; 8];
     let (a_chunks, a_rest) = a.as_chunks::<8>();
@@ -116,6 +119,7 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
 }
 
 /// `sum += weight * vector`.
+#[inline(always)]
 pub(super) fn accumulate(sum: &mut [f64], vector: &[f32], weight: f64) {
     for (sum, &value) in sum.iter_mut().zip(vector) {
         *sum += weight * f64::from(value);
