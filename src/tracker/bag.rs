@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::eigen::Spectrum;
 use super::{AffineSubspace, Params};
 
 /// Up to K affine subspaces, oldest first.
@@ -25,11 +26,20 @@ impl Bag {
         frame.is_multiple_of(u64::from(params.update_every))
     }
 
-    /// Takes the latest subspace: while there are fewer than K the bag grows, then the oldest leaves.
-    pub fn admit(&mut self, latest: AffineSubspace, params: &Params) {
+    /// Takes the subspace of `vectors`: while there are fewer than K the bag grows, then the oldest leaves.
+    pub fn admit(&mut self, vectors: &[&[f32]], params: &Params, spectrum: &mut Spectrum) {
+        let basis_dim = params.basis_dim as usize;
+        let mut oldest = None;
         while self.entries.len() >= params.bag_size as usize {
-            self.entries.pop_front();
+            oldest = self.entries.pop_front();
         }
+        let latest = match oldest {
+            Some(mut entry) => {
+                entry.become_of(vectors, basis_dim, spectrum);
+                entry
+            }
+            None => AffineSubspace::of(vectors, basis_dim),
+        };
         self.entries.push_back(latest);
     }
 

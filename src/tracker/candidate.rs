@@ -17,7 +17,7 @@ use super::subspace;
 const NO_REST: f64 = 1e-13;
 
 /// The bases of all candidates of a frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct CandidateBases {
     /// n.
     limit: usize,
@@ -34,18 +34,16 @@ pub(super) struct CandidateBases {
 }
 
 impl CandidateBases {
-    pub fn new(params: &Params) -> Self {
-        let (limit, size) = (params.basis_dim as usize, params.history as usize + 1);
+    /// Makes room for these parameters.
+    pub fn prepare(&mut self, params: &Params) {
+        (self.limit, self.size) = (params.basis_dim as usize, params.history as usize + 1);
         let count = params.particles as usize;
-        Self {
-            limit,
-            size,
-            coefficients: vec![0.0; count * limit * size],
-            dims: vec![0; count],
-            rests: vec![0.0; count],
-            matrix: vec![[0.0; LANES]; size * size],
-            vectors: vec![[0.0; LANES]; size * size],
-        }
+        self.coefficients
+            .resize(count * self.limit * self.size, 0.0);
+        self.dims.resize(count, 0);
+        self.rests.resize(count, 0.0);
+        self.matrix.resize(self.size * self.size, [0.0; LANES]);
+        self.vectors.resize(self.size * self.size, [0.0; LANES]);
     }
 
     /// Finds the basis of every candidate.

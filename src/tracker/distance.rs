@@ -12,7 +12,7 @@ use super::eigen::{self, LANES, Lanes};
 use super::products::Products;
 
 /// The distances of all candidates to all entries of the bag.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Distances {
     alpha: f64,
     /// γ = 1 / D (equation 5).
@@ -31,18 +31,12 @@ pub(super) struct Distances {
 }
 
 impl Distances {
-    pub fn new(params: &Params) -> Self {
-        let limit = params.basis_dim as usize;
-        Self {
-            alpha: params.alpha,
-            gamma: 1.0 / params.feature_len() as f64,
-            limit,
-            values: Vec::new(),
-            product: Vec::new(),
-            pairs: Vec::new(),
-            dims: Vec::new(),
-            squares: vec![[0.0; LANES]; limit * limit],
-        }
+    /// Makes room for these parameters.
+    pub fn prepare(&mut self, params: &Params) {
+        self.limit = params.basis_dim as usize;
+        self.alpha = params.alpha;
+        self.gamma = 1.0 / params.feature_len() as f64;
+        self.squares.resize(self.limit * self.limit, [0.0; LANES]);
     }
 
     /// Computes dist(Aᵢ, B\[k\]) (equation 4) of every candidate i and entry k. `entries` gives ‖μₖ‖² and the number of

@@ -100,19 +100,46 @@ fn turn(values: &mut [Lanes], p: usize, q: usize, cosine: &Lanes, sine: &Lanes) 
     }
 }
 
-/// Eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix in row order.
-pub(super) fn eigenpairs(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
-    let mut lanes: Vec<Lanes> = matrix.iter().map(|&value| [value; LANES]).collect();
-    let mut vectors = vec![[0.0; LANES]; dim * dim];
-    diagonalize(&mut lanes, dim, Some(&mut vectors));
-    let mut pairs: Vec<(f64, Vec<f64>)> = (0..dim)
-        .map(|j| {
-            let vector = (0..dim).map(|r| vectors[j * dim + r][0]).collect();
-            (lanes[j * dim + j][0], vector)
-        })
-        .collect();
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    pairs
+/// The eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix; keeps its room.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Spectrum {
+    dim: usize,
+    matrix: Vec<Lanes>,
+    vectors: Vec<Lanes>,
+    /// From the place among the eigenvalues to that on the diagonal.
+    order: Vec<usize>,
+}
+
+impl Spectrum {
+    /// Solves the matrix of `dim` rows whose element (i, j), j >= i, is `element(i, j)`.
+    #[inline(always)]
+    pub fn solve(&mut self, dim: usize, element: impl Fn(usize, usize) -> f64) {
+        self.dim = dim;
+        self.matrix.clear();
+        self.matrix.resize(dim * dim, [0.0; LANES]);
+        self.vectors.resize(dim * dim, [0.0; LANES]);
+        for i in 0..dim {
+            for j in i..dim {
+                self.matrix[i * dim + j] = [element(i, j); LANES];
+            }
+        }
+        diagonalize(&mut self.matrix, dim, Some(&mut self.vectors));
+        self.order.clear();
+        self.order.extend(0..dim);
+        let value = |j: usize| self.matrix[j * dim + j][0];
+        self.order
+            .sort_unstable_by(|&a, &b| value(b).total_cmp(&value(a)).then(a.cmp(&b)));
+    }
+
+    /// The eigenvalues, largest first.
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.order.iter().map(|&j| self.matrix[j * self.dim + j][0])
+    }
+
+    /// Component `index` of the eigenvector of the eigenvalue at `place`.
+    pub fn weight(&self, place: usize, index: usize) -> f64 {
+        self.vectors[self.order[place] * self.dim + index][0]
+    }
 }
 
 #[cfg(test)]
@@ -120,6 +147,15 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+
+    fn eigenpairs(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
+        let mut spectrum = Spectrum::default();
+        spectrum.solve(dim, |i, j| matrix[i * dim + j]);
+        let values = spectrum.values().enumerate();
+        values
+            .map(|(place, value)| (value, (0..dim).map(|i| spectrum.weight(place, i)).collect()))
+            .collect()
+    }
 
     /// A positive semidefinite matrix of some rank, with eigenvalues of very different sizes.
     fn matrix(dim: usize, rank: usize, seed: usize) -> DMatrix<f64> {

@@ -13,7 +13,7 @@ use super::{Params, likelihood};
 /// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
 /// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.
 /// The buffers are kept, so one value serves all frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Evaluation {
     sigma: f64,
     candidates: usize,
@@ -45,16 +45,19 @@ impl WithSimd for Compute<'_> {
 impl Evaluation {
     /// The evaluation for `params`, which must be valid.
     pub fn new(params: &Params) -> Self {
-        Self {
-            sigma: params.sigma,
-            candidates: params.particles as usize,
-            entries: Vec::new(),
-            products: Products::new(params),
-            bases: CandidateBases::new(params),
-            distances: Distances::new(params),
-            likelihoods: Vec::new(),
-            weights: Vec::new(),
-        }
+        let mut evaluation = Self::default();
+        evaluation.prepare(params);
+        evaluation
+    }
+
+    /// Becomes the evaluation for `params`, in the room that it has. The bag must be set again.
+    pub(super) fn prepare(&mut self, params: &Params) {
+        self.sigma = params.sigma;
+        self.candidates = params.particles as usize;
+        self.entries.clear();
+        self.products.prepare(params);
+        self.bases.prepare(params);
+        self.distances.prepare(params);
     }
 
     /// Takes the entries of the bag: at least one, each with means of length D and at most n basis vectors.
@@ -81,10 +84,11 @@ impl Evaluation {
         self.products.candidates_mut()
     }
 
-    /// The feature vector v of candidate `index` as it is stored in histories.
-    pub fn candidate(&self, index: usize) -> Vec<f32> {
+    /// The feature vector v of candidate `index` as it is stored in histories, into `out`.
+    pub fn candidate(&self, index: usize, out: &mut Vec<f32>) {
+        out.clear();
         let values = self.products.candidate(index).iter();
-        values.map(|&value| value as f32).collect()
+        out.extend(values.map(|&value| value as f32));
     }
 
     /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every

@@ -58,6 +58,7 @@ mod score;
 mod snapshot;
 mod state;
 mod subspace;
+mod workspace;
 
 pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
@@ -71,10 +72,10 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use bag::Bag;
-use motion::Particle;
-use patch::PatchCutter;
+use eigen::Spectrum;
 use score::Usual;
 use state::State;
+use workspace::{BagStamp, Workspace};
 
 /// Whether the tracker believes its own box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,10 +135,8 @@ pub enum TrackerError {
 #[derive(Debug, Clone)]
 pub struct Tracker {
     state: State,
-    evaluation: Evaluation,
-    cutter: PatchCutter,
-    /// Room for the next particles, swapped with those of the state.
-    proposed: Vec<Particle>,
+    /// Another one whenever the bag changes.
+    bag: BagStamp,
 }
 
 impl Tracker {
@@ -170,13 +169,9 @@ impl Tracker {
 
     /// A tracker in a valid state.
     fn with_state(state: State) -> Self {
-        let mut evaluation = Evaluation::new(&state.params);
-        evaluation.set_bag(state.bag.entries().iter());
         Self {
             state,
-            evaluation,
-            cutter: PatchCutter::default(),
-            proposed: Vec::new(),
+            bag: BagStamp::new(),
         }
     }
 
@@ -185,8 +180,15 @@ impl Tracker {
     /// # Errors
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
+        state::check_frame(self.state.source, frame)?;
+        Workspace::with(|workspace| self.step_in(workspace, frame));
+        Ok(self.state.estimate)
+    }
+
+    fn step_in(&mut self, workspace: &mut Workspace, frame: &GrayFrame) {
         let state = &mut self.state;
-        state::check_frame(state.source, frame)?;
+        workspace.prepare(state, self.bag);
+        let evaluation = &mut workspace.evaluation;
         let number = state.estimate.frame + 1;
 
         // (A) Where it may be.
@@ -196,43 +198,40 @@ impl Tracker {
             &state.params,
             &state.reach,
             number,
-            &mut self.proposed,
+            &mut workspace.cumulative,
+            &mut workspace.proposed,
         );
 
         // (B) What is seen there.
-        let areas = self
-            .proposed
-            .iter()
-            .map(|particle| state.reach.area(particle));
-        let vectors = self.evaluation.candidates_mut();
-        self.cutter.cut(frame, areas, &state.params, vectors);
+        let particles = workspace.proposed.iter();
+        let areas = particles.map(|particle| state.reach.area(particle));
+        let vectors = evaluation.candidates_mut();
+        workspace.cutter.cut(frame, areas, &state.params, vectors);
 
         // (D) How that compares with what is known.
-        let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();
-        self.evaluation.compute(&history);
-        let best = self.evaluation.best();
-        let nearest = self.evaluation.distances(best).iter().copied();
+        state.with_history(|history| evaluation.compute(history));
+        let best = evaluation.best();
+        let nearest = evaluation.distances(best).iter().copied();
         let (score, status) = state.usual.judge(nearest.fold(f64::INFINITY, f64::min));
 
         // (C) What is to be remembered of it.
-        let tracked = self.evaluation.candidate(best);
+        let tracked = &mut workspace.tracked;
+        evaluation.candidate(best, tracked);
         if Bag::admits(number, &state.params) {
-            let latest = state.subspace_with(&tracked);
-            state.bag.admit(latest, &state.params);
-            self.evaluation.set_bag(state.bag.entries().iter());
+            state.admit(tracked, &mut workspace.spectrum);
+            self.bag = BagStamp::new();
         }
         state.remember(tracked);
 
         state.estimate = Estimate {
             frame: number,
-            target: state.target_of(&self.proposed[best]),
+            target: state.target_of(&workspace.proposed[best]),
             score,
             status,
         };
-        std::mem::swap(&mut state.particles, &mut self.proposed);
+        std::mem::swap(&mut state.particles, &mut workspace.proposed);
         state.weights.clear();
-        state.weights.extend_from_slice(self.evaluation.weights());
-        Ok(state.estimate)
+        state.weights.extend_from_slice(evaluation.weights());
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
@@ -248,12 +247,11 @@ impl Tracker {
         let look = patch(frame, &reach.area(&particle), &state.params);
         state.reach = reach;
         state.history.clear();
-        let latest = state.subspace_with(&look);
-        state.bag.admit(latest, &state.params);
-        state.remember(look);
+        state.admit(&look, &mut Spectrum::default());
+        self.bag = BagStamp::new();
+        state.remember(&look);
         state.gather(particle);
         state.estimate = given(state.estimate.frame + 1, target);
-        self.evaluation.set_bag(state.bag.entries().iter());
         Ok(state.estimate)
     }
 

@@ -77,25 +77,24 @@ impl Reach {
 }
 
 /// Draws the particles of frame `frame` into `out`: multinomial resampling of `previous` by `weights` (which are
-/// at least 0 and sum to 1), then Brownian motion.
+/// at least 0 and sum to 1), then Brownian motion. `cumulative` is room for the sums of weights.
 pub(super) fn propose(
     previous: &[Particle],
     weights: &[f64],
     params: &Params,
     reach: &Reach,
     frame: u64,
+    cumulative: &mut Vec<f64>,
     out: &mut Vec<Particle>,
 ) {
     let mut generator = ChaCha8Rng::seed_from_u64(params.seed);
     generator.set_stream(frame);
     let mut total = 0.0;
-    let cumulative: Vec<f64> = weights
-        .iter()
-        .map(|weight| {
-            total += weight;
-            total
-        })
-        .collect();
+    cumulative.clear();
+    cumulative.extend(weights.iter().map(|weight| {
+        total += weight;
+        total
+    }));
     out.clear();
     for _ in 0..params.particles {
         let draw = generator.random::<f64>() * total;
@@ -140,7 +139,16 @@ mod tests {
     fn proposals(frame: u64, params: &Params) -> Vec<Particle> {
         let mut out = Vec::new();
         let previous = [particle(60.0), particle(160.0), particle(260.0)];
-        propose(&previous, &[0.7, 0.0, 0.3], params, &REACH, frame, &mut out);
+        let room = &mut Vec::new();
+        propose(
+            &previous,
+            &[0.7, 0.0, 0.3],
+            params,
+            &REACH,
+            frame,
+            room,
+            &mut out,
+        );
         out
     }
 

@@ -9,16 +9,17 @@
 //! difference. In single precision it would be gone. The product in double precision takes the same time here
 //! (both are bound by bringing the candidates in), so everything is in double precision.
 
-use nalgebra::{DMatrix, DMatrixView, Dyn};
+use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
 
+use super::Params;
+use super::eigen::Spectrum;
 use super::subspace::{self, AffineSubspace};
-use super::{Params, eigen};
 
 /// nalgebra hands a product to the fast kernel from six rows and columns on; zeros fill up.
 const LEAST_SIDE: usize = 8;
 
 /// The inner products of (candidates, Q, the sum of H) with (Q, the sum of H, the bag).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Products {
     len: usize,
     candidates: usize,
@@ -29,8 +30,11 @@ pub(super) struct Products {
     /// Q, the sum of H, the means of the bag's entries, their first basis vectors, their second and so on: one vector a
     /// column.
     right: Vec<f64>,
-    /// One column for each vector of `left`, one row for each of `right`.
-    out: DMatrix<f64>,
+    /// For each vector of `left` its products with those of `right`.
+    out: Vec<f64>,
+    /// The number of vectors of `right`.
+    width: usize,
+    spectrum: Spectrum,
     norms: Vec<f64>,
     history_eigenvalues: Vec<f64>,
     history_len: usize,
@@ -38,24 +42,16 @@ pub(super) struct Products {
 }
 
 impl Products {
-    pub fn new(params: &Params) -> Self {
-        let len = params.feature_len();
-        let candidates = params.particles as usize;
-        let slots = params.history as usize;
-        let rows = (candidates + slots + 1).max(LEAST_SIDE);
-        Self {
-            len,
-            candidates,
-            slots,
-            stride: params.basis_dim as usize + 1,
-            left: vec![0.0; rows * len],
-            right: Vec::new(),
-            out: DMatrix::zeros(0, 0),
-            norms: vec![0.0; candidates],
-            history_eigenvalues: vec![0.0; slots],
-            history_len: 0,
-            sum_norm: 0.0,
-        }
+    /// Makes room for these parameters.
+    pub fn prepare(&mut self, params: &Params) {
+        self.len = params.feature_len();
+        self.candidates = params.particles as usize;
+        self.slots = params.history as usize;
+        self.stride = params.basis_dim as usize + 1;
+        let rows = (self.candidates + self.slots + 1).max(LEAST_SIDE);
+        self.left.resize(rows * self.len, 0.0);
+        self.norms.resize(self.candidates, 0.0);
+        self.history_eigenvalues.resize(self.slots, 0.0);
     }
 
     /// The feature vector of candidate `index`, to be filled in.
@@ -90,14 +86,16 @@ impl Products {
             }
         }
         let rows = self.left.len() / self.len;
-        self.out = DMatrix::zeros(columns, rows);
+        self.width = columns;
+        self.out.resize(columns * rows, 0.0);
     }
 
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
     #[inline(always)]
     pub fn compute(&mut self, history: &[&[f32]]) {
         self.factor(history);
-        let (len, columns, rows) = (self.len, self.out.nrows(), self.out.ncols());
+        let (len, columns) = (self.len, self.width);
+        let rows = self.left.len() / len;
         let left = DMatrixView::from_slice_with_strides_generic(
             &self.left,
             Dyn(len),
@@ -112,7 +110,7 @@ impl Products {
             Dyn(len),
             Dyn(1),
         );
-        self.out.gemm(1.0, &right, &left, 0.0);
+        DMatrixViewMut::from_slice(&mut self.out, columns, rows).gemm(1.0, &right, &left, 0.0);
         for index in 0..self.candidates {
             self.norms[index] = norm_squared(self.candidate(index));
         }
@@ -128,14 +126,16 @@ impl Products {
         for vector in history {
             subspace::accumulate(sum, vector, 1.0);
         }
-        let pairs = eigen::eigenpairs(&subspace::gram(history), count);
-        let rank = subspace::dominant(pairs.iter().map(|pair| pair.0), count);
+        let spectrum = &mut self.spectrum;
+        spectrum.solve(count, |i, j| subspace::dot(history[i], history[j]));
+        let rank = subspace::dominant(spectrum.values(), count);
         self.history_eigenvalues.fill(0.0);
-        for (slot, (value, weights)) in pairs[..rank].iter().enumerate() {
-            self.history_eigenvalues[slot] = *value;
+        for (slot, value) in spectrum.values().take(rank).enumerate() {
+            self.history_eigenvalues[slot] = value;
             let direction = &mut directions[slot * len..(slot + 1) * len];
-            for (vector, weight) in history.iter().zip(weights) {
-                subspace::accumulate(direction, vector, weight / value.sqrt());
+            for (index, vector) in history.iter().enumerate() {
+                let weight = spectrum.weight(slot, index) / value.sqrt();
+                subspace::accumulate(direction, vector, weight);
             }
         }
         self.history_len = count;
@@ -160,8 +160,7 @@ impl Products {
 
     #[inline(always)]
     fn row(&self, index: usize) -> Row<'_> {
-        let rows = self.out.nrows();
-        let all = &self.out.as_slice()[index * rows..(index + 1) * rows];
+        let all = &self.out[index * self.width..(index + 1) * self.width];
         let (with_directions, rest) = all.split_at(self.slots);
         Row {
             with_directions,

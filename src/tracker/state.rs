@@ -5,13 +5,17 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::bag::Bag;
+use super::eigen::Spectrum;
 use super::frame::working_size;
 use super::motion::{Particle, Reach};
 use super::score::Usual;
-use super::{AffineSubspace, Estimate, GrayFrame, Params, Rect, TrackerError};
+use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
+
+/// The longest history that parameters allow.
+const MOST_PATCHES: usize = 10;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,17 +73,34 @@ impl State {
         self.weights = vec![1.0 / count as f64; count];
     }
 
-    /// The subspace of `patch` and the previous patches (equation 2).
-    pub fn subspace_with(&self, patch: &[f32]) -> AffineSubspace {
-        let mut vectors = vec![patch];
-        vectors.extend(self.history.iter().map(Vec::as_slice));
-        AffineSubspace::of(&vectors, self.params.basis_dim as usize)
+    /// Calls `work` with the previous patches, newest first.
+    pub fn with_history<T>(&self, work: impl FnOnce(&[&[f32]]) -> T) -> T {
+        let mut slots: [&[f32]; MOST_PATCHES] = [&[]; MOST_PATCHES];
+        for (slot, patch) in slots.iter_mut().zip(&self.history) {
+            *slot = patch;
+        }
+        work(&slots[..self.history.len()])
     }
 
-    /// Makes `patch` the newest of the history.
-    pub fn remember(&mut self, patch: Vec<f32>) {
-        self.history.push_front(patch);
-        self.history.truncate(self.params.history as usize);
+    /// Puts the subspace of `patch` and the previous patches (equation 2) into the bag.
+    pub fn admit(&mut self, patch: &[f32], spectrum: &mut Spectrum) {
+        let mut vectors = [patch; MOST_PATCHES + 1];
+        for (slot, previous) in vectors[1..].iter_mut().zip(&self.history) {
+            *slot = previous;
+        }
+        let vectors = &vectors[..=self.history.len()];
+        self.bag.admit(vectors, &self.params, spectrum);
+    }
+
+    /// Makes `patch` the newest of the history, in the room of the oldest.
+    pub fn remember(&mut self, patch: &[f32]) {
+        let mut newest = Vec::new();
+        while self.history.len() >= self.params.history as usize {
+            newest = self.history.pop_back().unwrap_or_default();
+        }
+        newest.clear();
+        newest.extend_from_slice(patch);
+        self.history.push_front(newest);
     }
 }
 
