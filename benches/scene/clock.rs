@@ -2,8 +2,11 @@
 
 use std::time::Instant;
 
+/// What is timed.
+pub type Action<'a> = Box<dyn FnMut() + 'a>;
+
 /// Calls every one of `actions` `rounds` times, in turns; gives the median seconds of each.
-pub fn medians(rounds: usize, actions: &mut [&mut dyn FnMut()]) -> Vec<f64> {
+pub fn medians(rounds: usize, mut actions: Vec<Action<'_>>) -> Vec<f64> {
     let mut times = vec![Vec::with_capacity(rounds); actions.len()];
     for _ in 0..rounds {
         for (action, times) in actions.iter_mut().zip(&mut times) {

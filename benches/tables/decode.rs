@@ -36,13 +36,13 @@ pub fn print(files: &[&str]) {
         }
         let times = clock::medians(
             ROUNDS,
-            &mut [
-                &mut || {
+            vec![
+                Box::new(|| {
                     black_box(ingest::decode(black_box(&bytes), &limits)).expect("decoded before");
-                },
-                &mut || {
+                }),
+                Box::new(|| {
                     black_box(tracker.step(&frame)).expect("the same frame");
-                },
+                }),
             ],
         );
         println!(

@@ -4,6 +4,7 @@ use std::hint::black_box;
 
 use bagtrack::tracker::{GrayFrame, Params, Preset, Tracker};
 
+use crate::clock::Action;
 use crate::{clock, scene, warm};
 
 const ROUNDS: usize = 200;
@@ -62,20 +63,15 @@ fn micros(seconds: &[f64]) -> String {
 /// The median time of a step at each of these settings, in turns.
 fn steps(settings: Vec<Params>) -> Vec<f64> {
     let mut trackers: Vec<(Tracker, Vec<GrayFrame>)> = settings.into_iter().map(warm).collect();
-    let mut actions: Vec<Box<dyn FnMut()>> = trackers
-        .iter_mut()
-        .map(|(tracker, frames)| {
-            let mut t = 0;
-            let step = move || {
-                t += 1;
-                black_box(tracker.step(&frames[t % scene::ROUND])).expect("frames of one size");
-            };
-            Box::new(step) as Box<dyn FnMut()>
-        })
-        .collect();
-    let mut actions: Vec<&mut dyn FnMut()> =
-        actions.iter_mut().map(|action| &mut **action).collect();
-    clock::medians(ROUNDS, &mut actions)
+    let actions = trackers.iter_mut().map(|(tracker, frames)| {
+        let mut t = 0;
+        let step = move || {
+            t += 1;
+            black_box(tracker.step(&frames[t % scene::ROUND])).expect("frames of one size");
+        };
+        Box::new(step) as Action
+    });
+    clock::medians(ROUNDS, actions.collect())
 }
 
 /// Downscaling grows with the pixels, the step does not.
@@ -98,13 +94,13 @@ fn frame_sizes() {
         }
         let times = clock::medians(
             ROUNDS / 4,
-            &mut [
-                &mut || {
+            vec![
+                Box::new(|| {
                     black_box(frame(&luma));
-                },
-                &mut || {
+                }),
+                Box::new(|| {
                     black_box(tracker.step(&second)).expect("frames of one size");
-                },
+                }),
             ],
         );
         downscales.push(times[0]);

@@ -3,7 +3,7 @@
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
 //! - `growth`: the time of a step against N, D, K, P and the frame's size;
 //! - `decode FILE...`: decoding each file against a step;
-//! - `memory COUNT`: resident memory of so many live trackers;
+//! - `memory PRESET COUNT`: resident memory of so many live trackers;
 //! - `repeat step COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
 
 #[path = "../scene/clock.rs"]
@@ -44,14 +44,15 @@ fn main() {
         ["ratios"] => ratios::print(),
         ["growth"] => growth::print(),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
-        ["memory", count] => memory::print(number(count)),
+        ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
+        ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
         ["repeat", "step", count] => repeat_step(number(count)),
         ["repeat", "decode", count, file] => decode::repeat(number(count), file),
         // `cargo bench` and `cargo test --benches` start it without a table.
         [] => ratios::print(),
         _ => {
             eprintln!(
-                "tables: ratios | growth | decode FILE... | memory COUNT | repeat step COUNT | repeat decode COUNT FILE"
+                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step COUNT | repeat decode COUNT FILE"
             );
             std::process::exit(2);
         }

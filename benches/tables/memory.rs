@@ -12,24 +12,23 @@ fn resident() -> u64 {
     kib.unwrap_or(0) * 1024
 }
 
-/// Prints the resident memory of up to `count` trackers with full bags, each stepped once more.
-pub fn print(count: usize) {
-    println!("| preset | live | resident MiB | KiB each |");
-    println!("|---|---|---|---|");
-    for (name, preset) in [("paper", Preset::Paper), ("robust", Preset::Robust)] {
-        let (mut first, frames) = warm(preset.params());
-        let before = resident();
-        let mut trackers: Vec<Tracker> = Vec::with_capacity(count);
-        for live in 1..=count {
-            first
-                .step(&frames[live % scene::ROUND])
-                .expect("frames of one size");
-            trackers.push(first.clone());
-            if live == count || (live.is_power_of_two() && live >= count / 16) {
-                let bytes = resident().saturating_sub(before);
-                let (mib, each) = (bytes >> 20, bytes as f64 / 1024.0 / live as f64);
-                println!("| {name} | {live} | {mib} | {each:.0} |");
-            }
+/// Prints the resident memory of up to `count` trackers with full bags, all of one preset: what another preset has
+/// freed would count as free.
+pub fn print(preset: Preset, count: usize) {
+    println!("| live | resident MiB | KiB each |");
+    println!("|---|---|---|");
+    let (mut first, frames) = warm(preset.params());
+    let before = resident();
+    let mut trackers: Vec<Tracker> = Vec::with_capacity(count);
+    for live in 1..=count {
+        first
+            .step(&frames[live % scene::ROUND])
+            .expect("frames of one size");
+        trackers.push(first.clone());
+        if live == count || (live.is_power_of_two() && live >= count / 16) {
+            let bytes = resident().saturating_sub(before);
+            let (mib, each) = (bytes >> 20, bytes as f64 / 1024.0 / live as f64);
+            println!("| {live} | {mib} | {each:.0} |");
         }
     }
 }

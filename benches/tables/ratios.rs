@@ -47,20 +47,20 @@ pub fn print() {
     let (mut t, mut u) = (0, 0);
     let times = clock::medians(
         ROUNDS,
-        &mut [
-            &mut || {
+        vec![
+            Box::new(|| {
                 t += 1;
                 black_box(paper.step(&frames[t % scene::ROUND])).expect("frames of one size");
-            },
-            &mut || {
+            }),
+            Box::new(|| {
                 u += 1;
                 black_box(robust.step(&frames[u % scene::ROUND])).expect("frames of one size");
-            },
-            &mut || evaluation.compute(black_box(history)),
-            &mut || product.gemm(1.0, black_box(&left), black_box(&right), 0.0),
-            &mut || {
+            }),
+            Box::new(|| evaluation.compute(black_box(history))),
+            Box::new(|| product.gemm(1.0, black_box(&left), black_box(&right), 0.0)),
+            Box::new(|| {
                 black_box(textbook::evaluate(&candidates, history, &bag, &params));
-            },
+            }),
         ],
     );
     let [step, robust, evaluation, product, textbook] = times[..] else {

@@ -84,6 +84,7 @@ impl WithSimd for Average<'_> {
             source,
             target,
         } = self;
+        let is_whole = source.0.is_multiple_of(target.0);
         let columns = cells(source.0, target.0);
         let rows = shares(source.1, target.1);
         let mut out = Vec::with_capacity(target.0 as usize * target.1 as usize);
@@ -105,7 +106,13 @@ impl WithSimd for Average<'_> {
                 .get(index + 1)
                 .is_none_or(|next| next.target > share.target);
             if last_of_cell {
-                average_row(&sums, &columns, source, target.0, &mut out);
+                match source.0 / target.0 {
+                    2 if is_whole => average_whole::<2>(&sums, source.1, &mut out),
+                    3 if is_whole => average_whole::<3>(&sums, source.1, &mut out),
+                    4 if is_whole => average_whole::<4>(&sums, source.1, &mut out),
+                    6 if is_whole => average_whole::<6>(&sums, source.1, &mut out),
+                    _ => average_row(&sums, &columns, source, target.0, &mut out),
+                }
                 std::mem::swap(&mut sums, &mut next_sums);
                 next_sums.fill(0);
             }
@@ -130,6 +137,20 @@ fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, ou
             total += u64::from(sums[cell.end]) * u64::from(cell.after);
         }
         quotient(total + full / 2, full, inverse) as u8
+    }));
+}
+
+/// The same where a cell is `WIDTH` whole columns, as it is for the usual sizes of video: no loop within a cell.
+#[inline(always)]
+fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
+    let full = WIDTH as u32 * height;
+    let inverse = 1.0 / f64::from(full);
+    let cells = sums.as_chunks::<WIDTH>().0;
+    out.extend(cells.iter().map(|cell| {
+        let value = cell.iter().sum::<u32>() + full / 2;
+        let near = (f64::from(value) * inverse) as i32 as u32;
+        let near = near - u32::from(near * full > value);
+        (near + u32::from((near + 1) * full <= value)) as u8
     }));
 }
 
