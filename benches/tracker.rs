@@ -15,44 +15,9 @@ use nalgebra::DMatrix;
 #[path = "../tests/textbook/mod.rs"]
 mod textbook;
 
-const WIDTH: usize = 320;
-const HEIGHT: usize = 240;
+mod scene;
 
-fn texture(x: usize, y: usize, seed: u32) -> u8 {
-    // Blocks of 4 x 4 pixels with hashed gray values, softened by a gradient.
-    let (column, row) = ((x / 4) as u32, (y / 4) as u32);
-    let cell = column.wrapping_mul(73_856_093) ^ row.wrapping_mul(19_349_663) ^ seed;
-    let hash = cell.wrapping_mul(2_654_435_761) >> 24;
-    (hash / 2 + (x * 3 + y * 2) as u32 % 120) as u8
-}
-
-/// Where the target of 60 x 48 pixels is in frame `t`: on a circle.
-fn place(t: usize) -> (usize, usize) {
-    let angle = t as f64 / 64.0 * std::f64::consts::TAU;
-    let (sine, cosine) = angle.sin_cos();
-    (
-        (130.0 + 60.0 * cosine) as usize,
-        (96.0 + 50.0 * sine) as usize,
-    )
-}
-
-fn frame(t: usize) -> GrayFrame {
-    let (left, top) = place(t);
-    let mut luma: Vec<u8> = (0..WIDTH * HEIGHT)
-        .map(|i| texture(i % WIDTH, i / WIDTH, 1))
-        .collect();
-    for y in 0..48 {
-        for x in 0..60 {
-            luma[(top + y) * WIDTH + left + x] = texture(x, y, 2);
-        }
-    }
-    GrayFrame::from_luma(WIDTH as u32, HEIGHT as u32, luma).expect("a frame of this size")
-}
-
-fn target(t: usize) -> Rect {
-    let (left, top) = place(t);
-    Rect::new(left as f64, top as f64, 60.0, 48.0)
-}
+use scene::{frame, target};
 
 fn step(criterion: &mut Criterion) {
     let frames: Vec<GrayFrame> = (0..64).map(frame).collect();

@@ -17,7 +17,7 @@ use super::subspace;
 const NO_REST: f64 = 1e-13;
 
 /// The bases of all candidates of a frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct CandidateBases {
     /// n.
     limit: usize,
@@ -34,21 +34,20 @@ pub(super) struct CandidateBases {
 }
 
 impl CandidateBases {
-    pub fn new(params: &Params) -> Self {
-        let (limit, size) = (params.basis_dim as usize, params.history as usize + 1);
+    /// Makes room for these parameters.
+    pub fn prepare(&mut self, params: &Params) {
+        (self.limit, self.size) = (params.basis_dim as usize, params.history as usize + 1);
         let count = params.particles as usize;
-        Self {
-            limit,
-            size,
-            coefficients: vec![0.0; count * limit * size],
-            dims: vec![0; count],
-            rests: vec![0.0; count],
-            matrix: vec![[0.0; LANES]; size * size],
-            vectors: vec![[0.0; LANES]; size * size],
-        }
+        self.coefficients
+            .resize(count * self.limit * self.size, 0.0);
+        self.dims.resize(count, 0);
+        self.rests.resize(count, 0.0);
+        self.matrix.resize(self.size * self.size, [0.0; LANES]);
+        self.vectors.resize(self.size * self.size, [0.0; LANES]);
     }
 
     /// Finds the basis of every candidate.
+    #[inline(always)]
     pub fn compute(&mut self, products: &Products) {
         let count = self.dims.len();
         for first in (0..count).step_by(LANES) {
@@ -65,6 +64,7 @@ impl CandidateBases {
     }
 
     /// diag(Λ, 0) + z zᵀ of one candidate, upper triangle.
+    #[inline(always)]
     fn fill(&mut self, products: &Products, candidate: usize, lane: usize) {
         let row = products.of_candidate(candidate);
         let norm = products.norm(candidate);
@@ -89,6 +89,7 @@ impl CandidateBases {
     }
 
     /// The n dominant eigenvectors of one candidate.
+    #[inline(always)]
     fn take(&mut self, products: &Products, candidate: usize, lane: usize) {
         let size = self.size;
         let value = |j: usize| self.matrix[j * size + j][lane];
@@ -118,32 +119,34 @@ impl CandidateBases {
     }
 
     /// The number of basis vectors of a candidate.
+    #[inline(always)]
     pub fn dim(&self, candidate: usize) -> usize {
         self.dims[candidate]
     }
 
-    /// Uᵀ\[bag\] of a candidate, into `out`: for each of its n columns (zero beyond its dimension) a row as long as
-    /// the products with the bag.
-    pub fn times_bag(&self, products: &Products, candidate: usize, out: &mut Vec<f64>) {
-        let row = products.of_candidate(candidate);
-        let width = row.with_bag.len();
+    /// UᵀF of a candidate with the bases of a bag of `count` entries, into `out`: for each of the n columns of U (zero
+    /// beyond its dimension) and each of F a value for each entry.
+    #[inline(always)]
+    pub fn times_bag(&self, products: &Products, candidate: usize, count: usize, out: &mut [f64]) {
+        // The first values are those of the means.
+        let bases = count..count * (self.limit + 1);
+        let of_candidate = &products.of_candidate(candidate).with_bag[bases.clone()];
         let slots = self.size - 1;
-        out.clear();
-        out.resize(self.limit * width, 0.0);
+        out.fill(0.0);
         let block = &self.coefficients[candidate * self.limit * self.size..];
-        for (target, column) in out
-            .chunks_exact_mut(width)
-            .zip(block.chunks_exact(self.size))
-        {
+        let columns = block.chunks_exact(self.size);
+        for (target, column) in out.chunks_exact_mut(count * self.limit).zip(columns) {
             for (slot, &coefficient) in column[..slots].iter().enumerate() {
-                add(target, products.of_direction(slot).with_bag, coefficient);
+                let of_direction = &products.of_direction(slot).with_bag[bases.clone()];
+                add(target, of_direction, coefficient);
             }
-            add(target, row.with_bag, column[slots]);
+            add(target, of_candidate, column[slots]);
         }
     }
 }
 
 /// `sum += weight * values`.
+#[inline(always)]
 fn add(sum: &mut [f64], values: &[f64], weight: f64) {
     for (sum, value) in sum.iter_mut().zip(values) {
         *sum += weight * value;

@@ -24,7 +24,6 @@ const LARGER: f64 = 1.15;
 pub(super) struct View {
     cutter: PatchCutter,
     gradients: GradientSums,
-    exact: Vec<f64>,
 }
 
 impl View {
@@ -59,20 +58,37 @@ impl View {
         let len = params.feature_len();
         let before = out.len();
         out.resize(before + particles.len() * len, 0.0);
-        let vectors = out[before..].chunks_exact_mut(len);
-        for (particle, vector) in particles.iter().zip(vectors) {
-            let area = seen(particle, reach, params);
-            match params.features {
-                Features::Gray => {
-                    self.exact.resize(len, 0.0);
-                    self.cutter.cut(frame, &area, params, &mut self.exact);
-                    for (value, exact) in vector.iter_mut().zip(&self.exact) {
-                        *value = *exact as f32;
-                    }
+        match params.features {
+            Features::Gray => {
+                let mut exact = vec![0.0; particles.len() * len];
+                self.cut(frame, particles, reach, params, &mut exact);
+                for (value, exact) in out[before..].iter_mut().zip(&exact) {
+                    *value = *exact as f32;
                 }
-                Features::Gradients => self.gradients.features(&area, params, vector),
+            }
+            Features::Gradients => {
+                let vectors = out[before..].chunks_exact_mut(len);
+                for (particle, vector) in particles.iter().zip(vectors) {
+                    let area = seen(particle, reach, params);
+                    self.gradients.features(&area, params, vector);
+                }
             }
         }
+    }
+
+    /// Writes gray features, exact in single precision, to `out`.
+    fn cut(
+        &mut self,
+        frame: &GrayFrame,
+        particles: &[Particle],
+        reach: &Reach,
+        params: &Params,
+        out: &mut [f64],
+    ) {
+        let areas = particles
+            .iter()
+            .map(|particle| seen(particle, reach, params));
+        self.cutter.cut(frame, areas, params, out);
     }
 }
 
@@ -86,6 +102,15 @@ fn seen(particle: &Particle, reach: &Reach, params: &Params) -> Rect {
         area.width * params.context,
         area.height * params.context,
     )
+}
+
+/// Whether candidates go into the printed evaluation as they are cut: no other vector is made of them.
+fn is_printed(params: &Params) -> bool {
+    params.features == Features::Gray
+        && !params.candidate_alone
+        && !params.unit_length
+        && params.background_samples == 0
+        && params.discriminant_weight <= 0.0
 }
 
 /// The particles of a frame, and all that is computed of them.
@@ -150,6 +175,20 @@ impl Comparison {
     /// Looks at the particles from `first` on, and computes their distances and scores.
     pub fn extend(&mut self, frame: &GrayFrame, first: usize, state: &State) {
         let (params, len) = (&state.params, state.params.feature_len());
+        if let (true, Some((_, evaluation))) = (is_printed(params), &mut self.evaluation) {
+            let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();
+            let count = self.particles.len() - first;
+            let candidates = &mut evaluation.candidates_mut()[..count * len];
+            let particles = &self.particles[first..];
+            self.view
+                .cut(frame, particles, &state.reach, params, candidates);
+            evaluation.compute_distances(&history);
+            for index in 0..count {
+                self.distances
+                    .extend_from_slice(evaluation.distances(index));
+            }
+            return;
+        }
         self.vectors.clear();
         self.view.features(
             frame,

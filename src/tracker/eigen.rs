@@ -17,10 +17,19 @@ const MAX_SWEEPS: usize = 16;
 /// An off-diagonal element below this share of the trace is rounding.
 const NEGLIGIBLE: f64 = 1e-16;
 
+/// The same where no eigenvectors are wanted: leaving out an element changes an eigenvalue by its square over a gap, and
+/// by the element itself at most.
+const NEGLIGIBLE_FOR_VALUES: f64 = 1e-13;
+
 /// Diagonalises [`LANES`] symmetric positive semidefinite matrices of size `dim`, each `dim * dim` in row order.
 /// Their diagonals end as the eigenvalues, in no order. `vectors`, if given, ends with the eigenvector of the
 /// `j`-th diagonal element in its `j`-th row.
+#[inline(always)]
 pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<&mut [Lanes]>) {
+    let negligible = match vectors {
+        Some(_) => NEGLIGIBLE,
+        None => NEGLIGIBLE_FOR_VALUES,
+    };
     if let Some(vectors) = vectors.as_deref_mut() {
         vectors.fill([0.0; LANES]);
         for j in 0..dim {
@@ -30,7 +39,7 @@ pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<
     let mut floor = [0.0; LANES];
     for j in 0..dim {
         for (sum, value) in floor.iter_mut().zip(&matrix[j * dim + j]) {
-            *sum += value * NEGLIGIBLE;
+            *sum += value * negligible;
         }
     }
     for _ in 0..MAX_SWEEPS {
@@ -52,6 +61,7 @@ pub(super) fn diagonalize(matrix: &mut [Lanes], dim: usize, mut vectors: Option<
 }
 
 /// Zeroes element (p, q) of every lane, p < q. Only the upper triangle is read and written.
+#[inline(always)]
 fn rotate(matrix: &mut [Lanes], dim: usize, p: usize, q: usize, vectors: Option<&mut [Lanes]>) {
     let (pp, qq, pq) = (p * dim + p, q * dim + q, p * dim + q);
     let (diagonal_p, diagonal_q, off) = (matrix[pp], matrix[qq], matrix[pq]);
@@ -81,7 +91,7 @@ fn rotate(matrix: &mut [Lanes], dim: usize, p: usize, q: usize, vectors: Option<
     }
 }
 
-#[inline]
+#[inline(always)]
 fn turn(values: &mut [Lanes], p: usize, q: usize, cosine: &Lanes, sine: &Lanes) {
     let (at_p, at_q) = (values[p], values[q]);
     for lane in 0..LANES {
@@ -90,19 +100,46 @@ fn turn(values: &mut [Lanes], p: usize, q: usize, cosine: &Lanes, sine: &Lanes) 
     }
 }
 
-/// Eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix in row order.
-pub(super) fn eigenpairs(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
-    let mut lanes: Vec<Lanes> = matrix.iter().map(|&value| [value; LANES]).collect();
-    let mut vectors = vec![[0.0; LANES]; dim * dim];
-    diagonalize(&mut lanes, dim, Some(&mut vectors));
-    let mut pairs: Vec<(f64, Vec<f64>)> = (0..dim)
-        .map(|j| {
-            let vector = (0..dim).map(|r| vectors[j * dim + r][0]).collect();
-            (lanes[j * dim + j][0], vector)
-        })
-        .collect();
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    pairs
+/// The eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix; keeps its room.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Spectrum {
+    dim: usize,
+    matrix: Vec<Lanes>,
+    vectors: Vec<Lanes>,
+    /// From the place among the eigenvalues to that on the diagonal.
+    order: Vec<usize>,
+}
+
+impl Spectrum {
+    /// Solves the matrix of `dim` rows whose element (i, j), j >= i, is `element(i, j)`.
+    #[inline(always)]
+    pub fn solve(&mut self, dim: usize, element: impl Fn(usize, usize) -> f64) {
+        self.dim = dim;
+        self.matrix.clear();
+        self.matrix.resize(dim * dim, [0.0; LANES]);
+        self.vectors.resize(dim * dim, [0.0; LANES]);
+        for i in 0..dim {
+            for j in i..dim {
+                self.matrix[i * dim + j] = [element(i, j); LANES];
+            }
+        }
+        diagonalize(&mut self.matrix, dim, Some(&mut self.vectors));
+        self.order.clear();
+        self.order.extend(0..dim);
+        let value = |j: usize| self.matrix[j * dim + j][0];
+        self.order
+            .sort_unstable_by(|&a, &b| value(b).total_cmp(&value(a)).then(a.cmp(&b)));
+    }
+
+    /// The eigenvalues, largest first.
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.order.iter().map(|&j| self.matrix[j * self.dim + j][0])
+    }
+
+    /// Component `index` of the eigenvector of the eigenvalue at `place`.
+    pub fn weight(&self, place: usize, index: usize) -> f64 {
+        self.vectors[self.order[place] * self.dim + index][0]
+    }
 }
 
 #[cfg(test)]
@@ -110,6 +147,15 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
+
+    fn eigenpairs(matrix: &[f64], dim: usize) -> Vec<(f64, Vec<f64>)> {
+        let mut spectrum = Spectrum::default();
+        spectrum.solve(dim, |i, j| matrix[i * dim + j]);
+        let values = spectrum.values().enumerate();
+        values
+            .map(|(place, value)| (value, (0..dim).map(|i| spectrum.weight(place, i)).collect()))
+            .collect()
+    }
 
     /// A positive semidefinite matrix of some rank, with eigenvalues of very different sizes.
     fn matrix(dim: usize, rank: usize, seed: usize) -> DMatrix<f64> {

@@ -1,5 +1,7 @@
 //! (D) The candidates of a frame against the bag: distances, likelihoods, the best one.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::candidate::CandidateBases;
 use super::distance::Distances;
 use super::products::Products;
@@ -11,7 +13,7 @@ use super::{Params, likelihood};
 /// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
 /// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.
 /// The buffers are kept, so one value serves all frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Evaluation {
     sigma: f64,
     candidates: usize,
@@ -24,19 +26,38 @@ pub struct Evaluation {
     weights: Vec<f64>,
 }
 
+/// [`Evaluation::compute`], to be compiled for the instructions that this machine has. Everything in it is inlined,
+/// since a function of its own would be compiled for the least of machines.
+struct Compute<'a> {
+    evaluation: &'a mut Evaluation,
+    history: &'a [&'a [f32]],
+}
+
+impl WithSimd for Compute<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.evaluation.compute_all(self.history);
+    }
+}
+
 impl Evaluation {
     /// The evaluation for `params`, which must be valid.
     pub fn new(params: &Params) -> Self {
-        Self {
-            sigma: params.sigma,
-            candidates: params.particles as usize,
-            entries: Vec::new(),
-            products: Products::new(params),
-            bases: CandidateBases::new(params),
-            distances: Distances::new(params),
-            likelihoods: Vec::new(),
-            weights: Vec::new(),
-        }
+        let mut evaluation = Self::default();
+        evaluation.prepare(params);
+        evaluation
+    }
+
+    /// Becomes the evaluation for `params`, in the room that it has. The bag must be set again.
+    pub(super) fn prepare(&mut self, params: &Params) {
+        self.sigma = params.sigma;
+        self.candidates = params.particles as usize;
+        self.entries.clear();
+        self.products.prepare(params);
+        self.bases.prepare(params);
+        self.distances.prepare(params);
     }
 
     /// Takes the entries of the bag: at least one, each with means of length D and at most n basis vectors.
@@ -58,10 +79,16 @@ impl Evaluation {
         self.products.candidate_mut(index)
     }
 
-    /// The feature vector v of candidate `index` as it is stored in histories.
-    pub fn candidate(&self, index: usize) -> Vec<f32> {
+    /// The feature vectors of all N candidates, one after the other, to be filled in.
+    pub fn candidates_mut(&mut self) -> &mut [f64] {
+        self.products.candidates_mut()
+    }
+
+    /// The feature vector v of candidate `index` as it is stored in histories, into `out`.
+    pub fn candidate(&self, index: usize, out: &mut Vec<f32>) {
+        out.clear();
         let values = self.products.candidate(index).iter();
-        values.map(|&value| value as f32).collect()
+        out.extend(values.map(|&value| value as f32));
     }
 
     /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every
@@ -81,8 +108,16 @@ impl Evaluation {
         likelihood::sum_rule(&self.likelihoods, entries, (0, 1.0), &mut self.weights);
     }
 
-    /// The first half of [`compute`](Self::compute): distances alone.
+    /// The first half of [`compute`](Self::compute): the distances alone.
     pub(super) fn compute_distances(&mut self, history: &[&[f32]]) {
+        Arch::new().dispatch(Compute {
+            evaluation: self,
+            history,
+        });
+    }
+
+    #[inline(always)]
+    fn compute_all(&mut self, history: &[&[f32]]) {
         self.products.compute(history);
         self.bases.compute(&self.products);
         self.distances

@@ -6,6 +6,7 @@
 
 /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equations 10 and 11) of `distances`, which hold for each candidate its
 /// distance to each of `entries` entries; the result in the same order. Each entry's sum over the candidates is 1.
+#[inline(always)]
 pub(super) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mut Vec<f64>) {
     out.clear();
     out.extend_from_slice(distances);

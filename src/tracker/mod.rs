@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod angle;
 mod background;
 mod bag;
 mod camera;

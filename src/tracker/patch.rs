@@ -3,104 +3,209 @@
 //! The area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
 //! gray values in [0, 1] (section III-B). Outside the frame the nearest edge pixel counts.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::{GrayFrame, Params, Rect};
 
-/// Cuts patches out of frames; keeps its buffers from one patch to the next.
+/// How many columns are worked on together.
+const BLOCK: usize = 8;
+
+/// Most rows or columns of cells; whole blocks.
+const MOST_CELLS: usize = 64;
+
+/// More than the quads of a row; a power of two, so that a masked index needs no check.
+const WINDOW: usize = 512;
+const _: () = assert!((super::WORKING_SIDE as usize) < WINDOW);
+
+/// Cuts the patches of many areas out of one frame; keeps its buffers from one frame to the next.
 ///
-/// This takes as long as everything else that a step does, so each loop is one that the compiler can turn into vector
-/// instructions: two rows blended into a line, neighbours gathered from the line, neighbours blended.
+/// This took as long as everything else that a step does. So the four pixels between which a cell lies are one 32-bit
+/// word, a *quad*, made once a frame for all areas; a cell is then one load, and the rest is vector instructions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PatchCutter {
-    /// For each column, where the left neighbour is in the line, and the share of the right one.
-    at: Vec<usize>,
-    shares: Vec<f32>,
-    /// The source pixels of one row of cells, in [0, 255].
-    line: Vec<f32>,
-    left: Vec<f32>,
-    right: Vec<f32>,
+    /// For each pixel of the region row by row: itself, the one right of it, and the two below these, lowest byte first.
+    quads: Vec<u32>,
 }
 
-/// Two neighbouring pixels, `first` and the one after it, and the share of the second.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    first: usize,
-    share: f32,
+/// For each cell along one axis, the pixel at or before its centre, and the share of the pixel after that one.
+struct Axis {
+    first: [u32; MOST_CELLS],
+    share: [f32; MOST_CELLS],
+}
+
+/// The pixels that cells can lie between, as quads: from (`left`, `top`), `width` a row, `height` rows.
+struct Region {
+    left: u32,
+    top: u32,
+    width: usize,
+    height: usize,
+}
+
+/// All cuts of a frame, to be compiled for the instructions that this machine has.
+struct Cuts<'a, A> {
+    quads: &'a mut Vec<u32>,
+    image: &'a GrayFrame,
+    areas: A,
+    params: &'a Params,
+    out: &'a mut [f64],
 }
 
 impl PatchCutter {
-    /// Writes the feature vector of `area` (working pixels, finite, sides above 0) to `out`, of length D. The
+    /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each. The
     /// values are exact in single precision.
-    pub fn cut(&mut self, image: &GrayFrame, area: &Rect, params: &Params, out: &mut [f64]) {
-        let (width, height) = (image.width() as usize, image.height() as usize);
-        let (columns, rows) = (params.patch_width, params.patch_height);
-        let (from, until) = self.lay_columns(area, columns, width);
-        for (i, target) in (0..rows).zip(out.chunks_exact_mut(columns as usize)) {
-            let row = sample(area.y, area.height, i, rows, height);
-            let below = (row.first + 1).min(height - 1);
-            let pixels = image.pixels();
-            let upper = &pixels[row.first * width + from..row.first * width + until];
-            let lower = &pixels[below * width + from..below * width + until];
-            for ((value, &a), &b) in self.line.iter_mut().zip(upper).zip(lower) {
-                let (a, b) = (f32::from(a), f32::from(b));
-                *value = a + (b - a) * row.share;
-            }
-            if from + self.line.len() > until {
-                self.line[until - from] = self.line[until - from - 1];
-            }
-            let neighbours = self.left.iter_mut().zip(&mut self.right);
-            let line = self.line.as_slice();
-            for ((left, right), &at) in neighbours.zip(&self.at) {
-                let pair = &line[at..at + 2];
-                (*left, *right) = (pair[0], pair[1]);
-            }
-            let neighbours = self.left.iter_mut().zip(&self.right);
-            for ((left, &right), &share) in neighbours.zip(&self.shares) {
-                let gray = (*left + (right - *left) * share) * (1.0 / 255.0);
-                // Not f32::min, which takes four instructions for the sake of NaN.
-                *left = if gray < 1.0 { gray } else { 1.0 };
-            }
-            for (value, &gray) in target.iter_mut().zip(&self.left) {
-                *value = f64::from(gray);
-            }
-        }
-    }
-
-    /// Lays out the columns of `area`; returns the range of source columns that they need.
-    fn lay_columns(&mut self, area: &Rect, columns: u32, width: usize) -> (usize, usize) {
-        let count = columns as usize;
-        self.left.resize(count, 0.0);
-        self.right.resize(count, 0.0);
-        self.at.clear();
-        self.shares.clear();
-        let from = sample(area.x, area.width, 0, columns, width).first;
-        for i in 0..columns {
-            let sample = sample(area.x, area.width, i, columns, width);
-            self.at.push(sample.first - from);
-            self.shares.push(sample.share);
-        }
-        let len = self.at[count - 1] + 2;
-        self.line.resize(len, 0.0);
-        // The second of the last two; at the right edge it is the edge pixel again.
-        (from, (from + len).min(width))
+    pub fn cut(
+        &mut self,
+        image: &GrayFrame,
+        areas: impl Iterator<Item = Rect> + Clone,
+        params: &Params,
+        out: &mut [f64],
+    ) {
+        Arch::new().dispatch(Cuts {
+            quads: &mut self.quads,
+            image,
+            areas,
+            params,
+            out,
+        });
     }
 }
 
-/// Where the centre of cell `index` of `count` over `[start, start + extent)` lies among `pixels` pixels, whose
-/// own centres are at a half.
-fn sample(start: f64, extent: f64, index: u32, count: u32, pixels: usize) -> Sample {
-    let center = start + extent * (f64::from(index) + 0.5) / f64::from(count) - 0.5;
-    let clamped = center.clamp(0.0, (pixels - 1) as f64);
-    let first = clamped as u32;
-    Sample {
-        first: first as usize,
-        share: (clamped - f64::from(first)) as f32,
+impl<A: Iterator<Item = Rect> + Clone> WithSimd for Cuts<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            quads,
+            image,
+            areas,
+            params,
+            out,
+        } = self;
+        let region = Region::around(image, areas.clone());
+        region.fill(image, quads);
+        let columns = params.patch_width as usize;
+        for (area, patch) in areas.zip(out.chunks_exact_mut(params.feature_len())) {
+            let across = Axis::lay(area.x, area.width, params.patch_width, image.width());
+            let down = Axis::lay(area.y, area.height, params.patch_height, image.height());
+            let at = across.first.map(|first| first.wrapping_sub(region.left));
+            let rows = down.first.iter().zip(&down.share);
+            for (target, (&row, &share)) in patch.chunks_exact_mut(columns).zip(rows) {
+                let start = (row - region.top) as usize * region.width;
+                let row = quads[start..]
+                    .first_chunk()
+                    .expect("a window of room after the last quad");
+                cut_row(row, &at, &across.share, share, target);
+            }
+        }
+    }
+}
+
+/// One row of cells: `at` and `shares` by column, `lower` the share of the lower pixels.
+#[inline(always)]
+fn cut_row(
+    row: &[u32; WINDOW],
+    at: &[u32; MOST_CELLS],
+    shares: &[f32; MOST_CELLS],
+    lower: f32,
+    target: &mut [f64],
+) {
+    let blocks = at.as_chunks::<BLOCK>().0.iter();
+    let blocks = blocks.zip(shares.as_chunks::<BLOCK>().0);
+    for (target, (at, shares)) in target.chunks_mut(BLOCK).zip(blocks) {
+        let quads = at.map(|at| row[at as usize % WINDOW]);
+        let mut values = [0.0; BLOCK];
+        for lane in 0..BLOCK {
+            let [a, b, c, d] = quads[lane].to_le_bytes().map(f32::from);
+            let left = a + (c - a) * lower;
+            let right = b + (d - b) * lower;
+            let gray = (left + (right - left) * shares[lane]) * (1.0 / 255.0);
+            // Not f32::min, which takes four instructions for the sake of NaN.
+            values[lane] = f64::from(if gray < 1.0 { gray } else { 1.0 });
+        }
+        match target.as_mut_array::<BLOCK>() {
+            Some(target) => *target = values,
+            None => target.copy_from_slice(&values[..target.len()]),
+        }
+    }
+}
+
+impl Axis {
+    /// `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
+    #[inline(always)]
+    fn lay(start: f64, extent: f64, count: u32, pixels: u32) -> Self {
+        let mut axis = Self {
+            first: [0; MOST_CELLS],
+            share: [0.0; MOST_CELLS],
+        };
+        let step = extent / f64::from(count);
+        let last = f64::from(pixels - 1);
+        let whole = (count as usize).next_multiple_of(BLOCK);
+        let cells = axis.first[..whole].iter_mut().zip(&mut axis.share);
+        for (index, (first, share)) in (0_u32..).zip(cells) {
+            let center = start + step * (f64::from(index) + 0.5) - 0.5;
+            let clamped = center.clamp(0.0, last);
+            let below = clamped.floor();
+            // The low bits of 2^52 + n are n; a conversion would be done one by one.
+            *first = (below + (1_u64 << 52) as f64).to_bits() as u32;
+            *share = (clamped - below) as f32;
+        }
+        axis
+    }
+}
+
+impl Region {
+    /// The pixels between which the cells of `areas` lie.
+    #[inline(always)]
+    fn around(image: &GrayFrame, areas: impl Iterator<Item = Rect>) -> Self {
+        let (mut left, mut top) = (f64::INFINITY, f64::INFINITY);
+        let (mut right, mut bottom) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for area in areas {
+            (left, right) = (left.min(area.x), right.max(area.x + area.width));
+            (top, bottom) = (top.min(area.y), bottom.max(area.y + area.height));
+        }
+        // Cells are half a pixel or more inside their area, if it is wide; otherwise the rounding down covers them.
+        let pixel = |at: f64, pixels: u32| (at - 0.5).clamp(0.0, f64::from(pixels - 1)) as u32;
+        let (left, top) = (pixel(left, image.width()), pixel(top, image.height()));
+        let (right, bottom) = (pixel(right, image.width()), pixel(bottom, image.height()));
+        Self {
+            left,
+            top,
+            width: (right - left) as usize + 1,
+            height: (bottom - top) as usize + 1,
+        }
+    }
+
+    /// Makes the quads of the region, and room for a window at the end.
+    #[inline(always)]
+    fn fill(&self, image: &GrayFrame, quads: &mut Vec<u32>) {
+        quads.resize(self.width * self.height + WINDOW, 0);
+        let (width, left) = (image.width() as usize, self.left as usize);
+        // The last column of the image has no right neighbour.
+        let inner = self.width.min(width - 1 - left);
+        let last_row = image.height() as usize - 1;
+        for (y, quads) in
+            (self.top as usize..).zip(quads.chunks_exact_mut(self.width).take(self.height))
+        {
+            let row = |y: usize| &image.pixels()[y * width + left..(y + 1) * width];
+            let (upper, lower) = (row(y), row((y + 1).min(last_row)));
+            let pairs = upper[..inner].iter().zip(&upper[1..]);
+            let pairs = pairs.zip(lower[..inner].iter().zip(&lower[1..]));
+            for (quad, ((&a, &b), (&c, &d))) in quads.iter_mut().zip(pairs) {
+                *quad = u32::from_le_bytes([a, b, c, d]);
+            }
+            if let Some(quad) = quads.get_mut(inner) {
+                let (a, c) = (upper[inner], lower[inner]);
+                *quad = u32::from_le_bytes([a, a, c, c]);
+            }
+        }
     }
 }
 
 /// The feature vector of `area` of `image`, both in working pixels: D gray values in [0, 1], row by row.
 pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
     let mut values = vec![0.0; params.feature_len()];
-    PatchCutter::default().cut(image, area, params, &mut values);
+    PatchCutter::default().cut(image, std::iter::once(*area), params, &mut values);
     values.into_iter().map(|value| value as f32).collect()
 }
 

@@ -9,16 +9,17 @@
 //! difference. In single precision it would be gone. The product in double precision takes the same time here
 //! (both are bound by bringing the candidates in), so everything is in double precision.
 
-use nalgebra::{DMatrix, DMatrixView, Dyn};
+use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
 
+use super::Params;
+use super::eigen::Spectrum;
 use super::subspace::{self, AffineSubspace};
-use super::{Params, eigen};
 
 /// nalgebra hands a product to the fast kernel from six rows and columns on; zeros fill up.
 const LEAST_SIDE: usize = 8;
 
 /// The inner products of (candidates, Q, the sum of H) with (Q, the sum of H, the bag).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Products {
     len: usize,
     candidates: usize,
@@ -26,10 +27,14 @@ pub(super) struct Products {
     stride: usize,
     /// The candidates, then Q (P slots, zero where there is no direction), then the sum of H: one vector a row.
     left: Vec<f64>,
-    /// Q, the sum of H, and for each entry of the bag its mean and n basis vectors: one vector a column.
+    /// Q, the sum of H, the means of the bag's entries, their first basis vectors, their second and so on: one vector a
+    /// column.
     right: Vec<f64>,
-    /// One column for each vector of `left`, one row for each of `right`.
-    out: DMatrix<f64>,
+    /// For each vector of `left` its products with those of `right`.
+    out: Vec<f64>,
+    /// The number of vectors of `right`.
+    width: usize,
+    spectrum: Spectrum,
     norms: Vec<f64>,
     history_eigenvalues: Vec<f64>,
     history_len: usize,
@@ -37,29 +42,26 @@ pub(super) struct Products {
 }
 
 impl Products {
-    pub fn new(params: &Params) -> Self {
-        let len = params.feature_len();
-        let candidates = params.particles as usize;
-        let slots = params.history as usize;
-        let rows = (candidates + slots + 1).max(LEAST_SIDE);
-        Self {
-            len,
-            candidates,
-            slots,
-            stride: params.basis_dim as usize + 1,
-            left: vec![0.0; rows * len],
-            right: Vec::new(),
-            out: DMatrix::zeros(0, 0),
-            norms: vec![0.0; candidates],
-            history_eigenvalues: vec![0.0; slots],
-            history_len: 0,
-            sum_norm: 0.0,
-        }
+    /// Makes room for these parameters.
+    pub fn prepare(&mut self, params: &Params) {
+        self.len = params.feature_len();
+        self.candidates = params.particles as usize;
+        self.slots = params.history as usize;
+        self.stride = params.basis_dim as usize + 1;
+        let rows = (self.candidates + self.slots + 1).max(LEAST_SIDE);
+        self.left.resize(rows * self.len, 0.0);
+        self.norms.resize(self.candidates, 0.0);
+        self.history_eigenvalues.resize(self.slots, 0.0);
     }
 
     /// The feature vector of candidate `index`, to be filled in.
     pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
         &mut self.left[index * self.len..(index + 1) * self.len]
+    }
+
+    /// The feature vectors of all candidates, one after the other, to be filled in.
+    pub fn candidates_mut(&mut self) -> &mut [f64] {
+        &mut self.left[..self.candidates * self.len]
     }
 
     /// The feature vector of candidate `index`.
@@ -73,22 +75,27 @@ impl Products {
         let columns = (first + entries.len() * self.stride).max(LEAST_SIDE);
         self.right.clear();
         self.right.resize(columns * self.len, 0.0);
-        for (entry, block) in
-            entries.zip(self.right[first * self.len..].chunks_exact_mut(self.stride * self.len))
-        {
-            let values = entry.mean.iter().chain(&entry.basis);
-            for (target, &value) in block.iter_mut().zip(values) {
-                *target = f64::from(value);
+        let (count, len) = (entries.len(), self.len);
+        for (k, entry) in entries.enumerate() {
+            let vectors = entry.mean.chunks_exact(len).chain(entry.basis());
+            for (column, vector) in vectors.enumerate() {
+                let target = &mut self.right[(first + column * count + k) * len..][..len];
+                for (target, &value) in target.iter_mut().zip(vector) {
+                    *target = f64::from(value);
+                }
             }
         }
         let rows = self.left.len() / self.len;
-        self.out = DMatrix::zeros(columns, rows);
+        self.width = columns;
+        self.out.resize(columns * rows, 0.0);
     }
 
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
+    #[inline(always)]
     pub fn compute(&mut self, history: &[&[f32]]) {
         self.factor(history);
-        let (len, columns, rows) = (self.len, self.out.nrows(), self.out.ncols());
+        let (len, columns) = (self.len, self.width);
+        let rows = self.left.len() / len;
         let left = DMatrixView::from_slice_with_strides_generic(
             &self.left,
             Dyn(len),
@@ -103,13 +110,14 @@ impl Products {
             Dyn(len),
             Dyn(1),
         );
-        self.out.gemm(1.0, &right, &left, 0.0);
+        DMatrixViewMut::from_slice(&mut self.out, columns, rows).gemm(1.0, &right, &left, 0.0);
         for index in 0..self.candidates {
             self.norms[index] = norm_squared(self.candidate(index));
         }
     }
 
     /// Q = H R Λ^(-1/2), where HᵀH = R Λ Rᵀ, and the sum of H.
+    #[inline(always)]
     fn factor(&mut self, history: &[&[f32]]) {
         let (len, count) = (self.len, history.len());
         let shared = &mut self.left[self.candidates * len..][..(self.slots + 1) * len];
@@ -118,14 +126,16 @@ impl Products {
         for vector in history {
             subspace::accumulate(sum, vector, 1.0);
         }
-        let pairs = eigen::eigenpairs(&subspace::gram(history), count);
-        let rank = subspace::dominant(pairs.iter().map(|pair| pair.0), count);
+        let spectrum = &mut self.spectrum;
+        spectrum.solve(count, |i, j| subspace::dot(history[i], history[j]));
+        let rank = subspace::dominant(spectrum.values(), count);
         self.history_eigenvalues.fill(0.0);
-        for (slot, (value, weights)) in pairs[..rank].iter().enumerate() {
-            self.history_eigenvalues[slot] = *value;
+        for (slot, value) in spectrum.values().take(rank).enumerate() {
+            self.history_eigenvalues[slot] = value;
             let direction = &mut directions[slot * len..(slot + 1) * len];
-            for (vector, weight) in history.iter().zip(weights) {
-                subspace::accumulate(direction, vector, weight / value.sqrt());
+            for (index, vector) in history.iter().enumerate() {
+                let weight = spectrum.weight(slot, index) / value.sqrt();
+                subspace::accumulate(direction, vector, weight);
             }
         }
         self.history_len = count;
@@ -148,9 +158,9 @@ impl Products {
         self.row(self.candidates + self.slots)
     }
 
+    #[inline(always)]
     fn row(&self, index: usize) -> Row<'_> {
-        let rows = self.out.nrows();
-        let all = &self.out.as_slice()[index * rows..(index + 1) * rows];
+        let all = &self.out[index * self.width..(index + 1) * self.width];
         let (with_directions, rest) = all.split_at(self.slots);
         Row {
             with_directions,
@@ -187,10 +197,12 @@ pub(super) struct Row<'a> {
     pub with_directions: &'a [f64],
     /// With the sum of H.
     pub with_sum: f64,
-    /// With the bag: for each entry its mean, then n basis vectors (0 for those it does not have).
+    /// With the means of the bag's entries, with their first basis vectors, and so on to the n-th (0 for those that an
+    /// entry does not have).
     pub with_bag: &'a [f64],
 }
 
+#[inline(always)]
 fn norm_squared(vector: &[f64]) -> f64 {
     let mut parts = [0.0_f64; 8];
     let (chunks, rest) = vector.as_chunks::<8>();

@@ -119,7 +119,7 @@ impl Sought<'_> {
             exponent += (change / self.params.scale_change_std).powi(2);
         }
         if self.params.scale_std > 0.0 {
-            exponent += (particle.scale.ln() / self.params.scale_std).powi(2);
+            exponent += particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
         }
         (-0.5 * exponent).exp()
     }
@@ -181,11 +181,13 @@ mod tests {
             let params = Params {
                 displacement_std: std,
                 scale_change_std: std.min(10.0),
+                scale_std: 0.0,
                 ..Preset::Robust.params()
             };
             let sought = Sought {
                 last,
                 shift: (0.0, 0.0),
+                widening: 1.0,
                 params: &params,
                 reach: &reach,
             };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::eigen;
+use super::eigen::Spectrum;
 
 /// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
 /// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
@@ -24,33 +24,39 @@ impl AffineSubspace {
     /// # Panics
     /// If there are no vectors, or their lengths differ.
     pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
+        let mut subspace = Self {
+            mean: Vec::new(),
+            basis: Vec::new(),
+        };
+        subspace.become_of(vectors, basis_dim, &mut Spectrum::default());
+        subspace
+    }
+
+    /// Becomes [`of`](Self::of) these vectors, in the room that it has.
+    pub(super) fn become_of(
+        &mut self,
+        vectors: &[&[f32]],
+        basis_dim: usize,
+        spectrum: &mut Spectrum,
+    ) {
         let len = vectors[0].len();
         assert!(
             vectors.iter().all(|vector| vector.len() == len),
             "feature vectors of one length"
         );
-        let count = vectors.len();
-        let mut sum = vec![0.0_f64; len];
-        for vector in vectors {
-            accumulate(&mut sum, vector, 1.0);
-        }
-        let mean = sum
-            .iter()
-            .map(|value| (value / count as f64) as f32)
-            .collect();
+        let share = 1.0 / vectors.len() as f64;
+        self.mean.clear();
+        combine(vectors, |_| share, len, &mut self.mean);
 
         // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
-        let gram = gram(vectors);
-        let pairs = eigen::eigenpairs(&gram, count);
-        let mut basis = Vec::with_capacity(len * basis_dim);
-        for (value, weights) in &pairs[..dominant(pairs.iter().map(|pair| pair.0), basis_dim)] {
-            let mut column = vec![0.0_f64; len];
-            for (vector, weight) in vectors.iter().zip(weights) {
-                accumulate(&mut column, vector, weight / value.sqrt());
-            }
-            basis.extend(column.iter().map(|&value| value as f32));
+        spectrum.solve(vectors.len(), |i, j| dot(vectors[i], vectors[j]));
+        self.basis.clear();
+        self.basis.reserve_exact(len * basis_dim);
+        let dim = dominant(spectrum.values(), basis_dim);
+        for (place, value) in spectrum.values().take(dim).enumerate() {
+            let weight = |index| spectrum.weight(place, index) / value.sqrt();
+            combine(vectors, weight, len, &mut self.basis);
         }
-        Self { mean, basis }
     }
 
     /// The origin μ, of length D.
@@ -70,6 +76,7 @@ impl AffineSubspace {
 }
 
 /// How many of the eigenvalues of a Gram matrix, largest first, count as directions: at most `limit`.
+#[inline(always)]
 pub(super) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> usize {
     let mut least = 0.0;
     eigenvalues
@@ -85,6 +92,7 @@ pub(super) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> 
 }
 
 /// VᵀV of vectors, in double precision and row order.
+#[inline(always)]
 pub(super) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
     let count = vectors.len();
     let mut gram = vec![0.0; count * count];
@@ -99,6 +107,7 @@ pub(super) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
 }
 
 /// The inner product, summed in double precision in eight parts so that the loop vectorises.
+#[inline(always)]
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
     let mut parts = [0.0_f64; 8];
     let (a_chunks, a_rest) = a.as_chunks::<8>();
@@ -115,7 +124,21 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
             .sum::<f64>()
 }
 
+/// Appends the sum of vectors of length `len`, each with its weight, to `out`; summed in double precision.
+fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, len: usize, out: &mut Vec<f32>) {
+    const BLOCK: usize = 64;
+    for first in (0..len).step_by(BLOCK) {
+        let mut sums = [0.0; BLOCK];
+        let sums = &mut sums[..BLOCK.min(len - first)];
+        for (index, vector) in vectors.iter().enumerate() {
+            accumulate(sums, &vector[first..first + sums.len()], weight(index));
+        }
+        out.extend(sums.iter().map(|&sum| sum as f32));
+    }
+}
+
 /// `sum += weight * vector`.
+#[inline(always)]
 pub(super) fn accumulate(sum: &mut [f64], vector: &[f32], weight: f64) {
     for (sum, &value) in sum.iter_mut().zip(vector) {
         *sum += weight * f64::from(value);

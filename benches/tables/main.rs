@@ -1,0 +1,77 @@
+//! The tables of docs/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
+//!
+//! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
+//! - `growth`: the time of a step against N, D, K, P and the frame's size;
+//! - `decode FILE...`: decoding each file against a step;
+//! - `memory PRESET COUNT`: resident memory of so many live trackers;
+//! - `repeat step COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
+
+#[path = "../scene/clock.rs"]
+mod clock;
+mod decode;
+mod growth;
+mod memory;
+mod ratios;
+#[path = "../scene/mod.rs"]
+mod scene;
+#[path = "../../tests/textbook/mod.rs"]
+mod textbook;
+
+use bagtrack::tracker::{Params, Preset, Tracker};
+
+/// A tracker of the scene with a full history and a full bag, and its frames.
+fn warm(params: Params) -> (Tracker, Vec<bagtrack::tracker::GrayFrame>) {
+    let frames = scene::frames();
+    let until = (params.bag_size * params.update_every) as usize + 1;
+    let mut tracker =
+        Tracker::new(&frames[0], scene::target(0), params).expect("a box inside the frame");
+    for t in 1..=until.next_multiple_of(scene::ROUND) {
+        tracker
+            .step(&frames[t % scene::ROUND])
+            .expect("frames of one size");
+    }
+    (tracker, frames)
+}
+
+fn main() {
+    // Cargo adds `--bench`.
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments[..] {
+        ["ratios"] => ratios::print(),
+        ["growth"] => growth::print(),
+        ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
+        ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
+        ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
+        ["repeat", "step", count] => repeat_step(number(count)),
+        ["repeat", "decode", count, file] => decode::repeat(number(count), file),
+        // `cargo bench` and `cargo test --benches` start it without a table.
+        [] => ratios::print(),
+        _ => {
+            eprintln!(
+                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step COUNT | repeat decode COUNT FILE"
+            );
+            std::process::exit(2);
+        }
+    }
+}
+
+fn number(argument: &str) -> usize {
+    argument.parse().unwrap_or_else(|error| {
+        eprintln!("tables: {argument}: {error}");
+        std::process::exit(2);
+    })
+}
+
+fn repeat_step(count: usize) {
+    let (mut tracker, frames) = warm(Preset::Paper.params());
+    for t in 1..=count {
+        tracker
+            .step(&frames[t % scene::ROUND])
+            .expect("frames of one size");
+    }
+    println!("{:?}", tracker.estimate().target);
+}

@@ -1,0 +1,34 @@
+//! What live sessions cost.
+
+use bagtrack::tracker::{Preset, Tracker};
+
+use crate::{scene, warm};
+
+/// Resident bytes of this process.
+fn resident() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}
+
+/// Prints the resident memory of up to `count` trackers with full bags, all of one preset: what another preset has
+/// freed would count as free.
+pub fn print(preset: Preset, count: usize) {
+    println!("| live | resident MiB | KiB each |");
+    println!("|---|---|---|");
+    let (mut first, frames) = warm(preset.params());
+    let before = resident();
+    let mut trackers: Vec<Tracker> = Vec::with_capacity(count);
+    for live in 1..=count {
+        first
+            .step(&frames[live % scene::ROUND])
+            .expect("frames of one size");
+        trackers.push(first.clone());
+        if live == count || (live.is_power_of_two() && live >= count / 16) {
+            let bytes = resident().saturating_sub(before);
+            let (mib, each) = (bytes >> 20, bytes as f64 / 1024.0 / live as f64);
+            println!("| {live} | {mib} | {each:.0} |");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! A step against what it is measured by.
+
+use std::hint::black_box;
+
+use bagtrack::tracker::{AffineSubspace, Preset, Rect, patch};
+use nalgebra::DMatrix;
+
+use crate::{clock, scene, textbook, warm};
+
+const ROUNDS: usize = 300;
+
+/// Prints the table.
+pub fn print() {
+    let params = Preset::Paper.params();
+    let look = |t: usize, shift: f64| {
+        let area = scene::target(t);
+        let moved = Rect::new(
+            area.x + shift,
+            area.y - shift / 2.0,
+            area.width,
+            area.height,
+        );
+        patch(&scene::frame(t), &moved, &params)
+    };
+    let looks: Vec<Vec<f32>> = (0..55).map(|t| look(t, (t % 7) as f64 * 0.3)).collect();
+    let looks: Vec<&[f32]> = looks.iter().map(Vec::as_slice).collect();
+    let candidates: Vec<Vec<f32>> = (0..params.particles)
+        .map(|i| look(61, f64::from(i) / 5.0 - 10.0))
+        .collect();
+    let bag: Vec<AffineSubspace> = looks[..50]
+        .chunks(5)
+        .map(|looks| AffineSubspace::of(looks, params.basis_dim as usize))
+        .collect();
+    let history = &looks[50..];
+
+    let mut evaluation = textbook::shipped(&candidates, history, &bag, &params);
+    let (mut paper, frames) = warm(params.clone());
+    let (mut robust, _) = warm(Preset::Robust.params());
+    // The sizes of the product that the evaluation contains.
+    let rows = (params.particles + params.history + 1) as usize;
+    let columns = (params.history + 1 + params.bag_size * (params.basis_dim + 1)) as usize;
+    let len = params.feature_len();
+    let left = DMatrix::from_fn(columns, len, |i, j| (i * 31 + j * 7) as f64 % 13.0);
+    let right = DMatrix::from_fn(len, rows, |i, j| (i * 17 + j * 5) as f64 % 11.0);
+    let mut product = DMatrix::zeros(columns, rows);
+
+    let (mut t, mut u) = (0, 0);
+    let times = clock::medians(
+        ROUNDS,
+        vec![
+            Box::new(|| {
+                t += 1;
+                black_box(paper.step(&frames[t % scene::ROUND])).expect("frames of one size");
+            }),
+            Box::new(|| {
+                u += 1;
+                black_box(robust.step(&frames[u % scene::ROUND])).expect("frames of one size");
+            }),
+            Box::new(|| evaluation.compute(black_box(history))),
+            Box::new(|| product.gemm(1.0, black_box(&left), black_box(&right), 0.0)),
+            Box::new(|| {
+                black_box(textbook::evaluate(&candidates, history, &bag, &params));
+            }),
+        ],
+    );
+    let [step, robust, evaluation, product, textbook] = times[..] else {
+        unreachable!("one time for each action")
+    };
+    println!("median of {ROUNDS} rounds, in turns, one thread\n");
+    println!("| what | µs | |");
+    println!("|---|---|---|");
+    let line = |what: &str, seconds: f64, note: String| {
+        println!("| {what} | {:.0} | {note} |", seconds * 1e6);
+    };
+    line("`Tracker::step`, `paper`", step, String::new());
+    line("`Tracker::step`, `robust`", robust, String::new());
+    let note = format!("{:.1} × the product", evaluation / product);
+    line(
+        "its arithmetic: feature vectors to weights, `paper`",
+        evaluation,
+        note,
+    );
+    let what = format!("one bare product, {columns} × {len} by {len} × {rows}, f64");
+    line(&what, product, String::new());
+    let note = format!(
+        "{:.0} × the arithmetic, {:.0} × the whole step",
+        textbook / evaluation,
+        textbook / step
+    );
+    line("the textbook version of the same", textbook, note);
+}

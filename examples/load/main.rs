@@ -1,0 +1,131 @@
+//! A load generator: `cargo build --release && cargo run --release --example load -- --help`.
+//!
+//! It starts a server of its own on a free loopback port and prints, from one run:
+//! - the processor time of decoding and tracking a frame in this process, one thread;
+//! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
+//! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
+//!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
+//! - the processor time of the server process for a frame against that of decoding and tracking.
+//!
+//! Frames, sessions and time are bounded. Linux only: processor time is read from `/proc`.
+
+mod drive;
+mod pictures;
+mod process;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use bagtrack::ingest::{self, Limits};
+use bagtrack::tracker::Tracker;
+use clap::Parser;
+use process::{Server, cpu_seconds};
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+#[derive(Debug, Parser)]
+struct Options {
+    /// Sessions at once.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    sessions: u32,
+    /// Frames of each measurement.
+    #[arg(long, default_value_t = 6000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    frames: u32,
+    /// Frames a second in the open loop; otherwise half of what many sessions got through.
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Times 320 x 240 pixels.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
+    zoom: u32,
+    /// Preset of the sessions: paper or robust.
+    #[arg(long, default_value = "paper")]
+    preset: String,
+    /// Seconds after which a measurement ends whatever was done.
+    #[arg(long, default_value_t = 60)]
+    seconds: u64,
+    /// The server's binary; otherwise `bagtrack` beside this program's folder.
+    #[arg(long)]
+    server: Option<PathBuf>,
+}
+
+fn main() -> Outcome<()> {
+    let options = Options::parse();
+    let preset = serde_json::from_value(serde_json::json!(options.preset))?;
+    let pictures = pictures::jpegs(options.zoom as usize)?;
+    let target = pictures::target(options.zoom as usize);
+    println!(
+        "frames of {} x {}, {} KiB each, preset {}",
+        pictures::WIDTH * options.zoom as usize,
+        pictures::HEIGHT * options.zoom as usize,
+        pictures.iter().map(|jpeg| jpeg.len()).sum::<usize>() / pictures.len() / 1024,
+        options.preset
+    );
+
+    let work = in_process(&pictures, target, preset, options.frames)?;
+    println!(
+        "decode + step in this process: {:.0} µs of processor time a frame",
+        work * 1e6
+    );
+
+    let server = Server::start(options.server.clone(), options.sessions)?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    let limit = Duration::from_secs(options.seconds);
+    let driver = drive::Driver::new(server.url(), pictures, target, &options.preset);
+    let measure = |name: &str, sessions: u32, rate: Option<f64>| -> Outcome<f64> {
+        let before = cpu_seconds(server.pid())?;
+        let done = runtime.block_on(driver.run(sessions, options.frames, rate, limit))?;
+        let cpu = (cpu_seconds(server.pid())? - before) / done.frames as f64;
+        println!(
+            "{name}: {} frames, {:.0} a second; server {:.0} µs of processor time a frame = {:.2} × (decode + step)",
+            done.frames,
+            done.per_second,
+            cpu * 1e6,
+            cpu / work
+        );
+        let quantile = |q| done.latencies.value_at_quantile(q) as f64 / 1e3;
+        println!(
+            "    latency p50 {:.1} ms, p99 {:.1} ms, p99.9 {:.1} ms, most {:.1} ms",
+            quantile(0.5),
+            quantile(0.99),
+            quantile(0.999),
+            done.latencies.max() as f64 / 1e3
+        );
+        Ok(done.per_second)
+    };
+    let one = measure("1 session, closed loop", 1, None)?;
+    let name = format!("{} sessions, closed loop", options.sessions);
+    let many = measure(&name, options.sessions, None)?;
+    println!("    throughput {:.2} × that of 1 session", many / one);
+    let rate = options.rate.unwrap_or(many / 2.0);
+    let name = format!(
+        "{} sessions, open loop, {rate:.0} due a second",
+        options.sessions
+    );
+    measure(&name, options.sessions, Some(rate))?;
+    println!("server: {} MiB resident", server.resident()? >> 20);
+    Ok(())
+}
+
+/// Seconds of processor time to decode and track a frame.
+fn in_process(
+    pictures: &[Vec<u8>],
+    target: bagtrack::tracker::Rect,
+    preset: bagtrack::tracker::Preset,
+    frames: u32,
+) -> Outcome<f64> {
+    let limits = Limits::default();
+    let first = ingest::decode(&pictures[0], &limits)?;
+    let mut tracker = Tracker::new(&first, target, preset.params())?;
+    let mut run = |count: u32| -> Outcome<()> {
+        for picture in pictures.iter().cycle().skip(1).take(count as usize) {
+            tracker.step(&ingest::decode(picture, &limits)?)?;
+        }
+        Ok(())
+    };
+    run(100)?;
+    let before = cpu_seconds(std::process::id())?;
+    run(frames)?;
+    Ok((cpu_seconds(std::process::id())? - before) / f64::from(frames))
+}
