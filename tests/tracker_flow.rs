@@ -192,3 +192,52 @@ fn every_parameter_out_of_range_is_named() {
         assert_eq!(preset.params().validate(), Ok(()));
     }
 }
+
+#[test]
+fn every_parameter_of_a_mend_out_of_range_is_named() {
+    type Change = fn(&mut Params);
+    let cases: [(&str, Change); 22] = [
+        ("background_samples", |p| p.background_samples = 257),
+        ("background_every", |p| p.background_every = 0),
+        ("background_ridge", |p| p.background_ridge = 0.0),
+        ("context", |p| p.context = 0.49),
+        ("gray_weight", |p| p.gray_weight = f64::NAN),
+        ("refined_share", |p| p.refined_share = 1.0),
+        ("refined_modes", |p| p.refined_modes = 0),
+        ("refined_std", |p| p.refined_std = f64::INFINITY),
+        ("refined_std_scale", |p| p.refined_std_scale = -0.1),
+        ("displacement_std", |p| p.displacement_std = -1.0),
+        ("scale_change_std", |p| p.scale_change_std = 11.0),
+        ("averaging_radius", |p| p.averaging_radius = f64::NAN),
+        ("pinned", |p| p.pinned = 17),
+        ("pinned", |p| p.pinned = p.bag_size),
+        ("pinned_weight", |p| p.pinned_weight = -1.0),
+        ("trusted_ratio", |p| p.trusted_ratio = f64::NAN),
+        ("discriminant_weight", |p| p.discriminant_weight = 101.0),
+        ("discriminant_damping", |p| p.discriminant_damping = 0.0),
+        // Each in its range, but not together: a frame would take seconds, a session a hundred megabytes.
+        ("particles", |p| (p.patch_width, p.patch_height) = (64, 64)),
+        ("bag_size", |p| {
+            (p.patch_width, p.patch_height) = (64, 64);
+            (p.particles, p.background_samples) = (26, 256);
+        }),
+        ("bag_size", |p| {
+            (p.patch_width, p.patch_height, p.particles) = (32, 32, 100);
+            (p.bag_size, p.basis_dim) = (32, 6);
+        }),
+        ("background_samples", |p| {
+            (p.particles, p.background_samples) = (1000, 256);
+        }),
+    ];
+    for (name, change) in cases {
+        let mut params = Preset::Robust.params();
+        change(&mut params);
+        match Tracker::new(&frame(0), target(0), params) {
+            Err(TrackerError::Params(error)) => {
+                assert_eq!(error.name, name);
+                assert!(error.to_string().contains(error.expected));
+            }
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+}

@@ -79,6 +79,15 @@ impl Bag {
         self.entries.push_back(latest);
     }
 
+    /// Takes the subspace of a look that the user pointed at. Where such looks are pinned it is the first of them from
+    /// now on; the oldest of those is an ordinary one then.
+    pub fn point(&mut self, latest: Entry, params: &Params) {
+        self.admit(latest, params);
+        if params.pinned > 0 {
+            self.entries.rotate_right(1);
+        }
+    }
+
     /// Makes all subspaces anew where there is a background: the metric may have changed.
     pub fn rebuild_if_needed(&mut self, metric: &Metric, params: &Params) {
         if params.background_samples == 0 {

@@ -179,6 +179,10 @@ impl Comparison {
                     *to = f64::from(*from);
                 }
             }
+            // Candidates are diagonalised side by side: what another frame left there would change the last bits.
+            for index in count..params.particles as usize {
+                evaluation.candidate_mut(index).fill(0.0);
+            }
             let mut history = state
                 .history
                 .iter()

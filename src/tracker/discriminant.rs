@@ -24,6 +24,9 @@ const STEPS: usize = 5;
 const FIRST_DAMPING: f64 = 0.1;
 const FIRST_STEPS: usize = 25;
 
+/// A squared gradient below this says nothing, and its products would underflow: 0 / 0 is no step.
+const NOTHING: f32 = 1e-30;
+
 /// The score's state; without vectors the discriminant is off.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Discriminant {
@@ -86,7 +89,7 @@ impl Discriminant {
         let mut direction = gradient.clone();
         let mut product = vec![0.0; len];
         let mut squared = matrix::dot(&gradient, &gradient);
-        let enough = squared * 1e-10;
+        let enough = (squared * 1e-10).max(NOTHING);
         for _ in 0..steps {
             if squared <= enough {
                 break;
@@ -160,6 +163,18 @@ mod tests {
                 (expected - f64::from(*found)).abs() < 1e-4,
                 "{expected} {found}"
             );
+        }
+    }
+
+    #[test]
+    fn vectors_whose_squares_underflow_leave_finite_weights() {
+        for tiny in [1e-18_f32, 1e-20, 1e-21, 1e-22, 1e-25, 1e-38, 1e-44] {
+            let mut discriminant = Discriminant::new(vec![0.0; 4]);
+            // Vectors this short are not brought to length 1.
+            let vectors = [tiny, 0.0, 0.0, 0.0, 0.0, tiny, 0.0, 0.0];
+            discriminant.fit(&vectors, &[1.0, 0.5], 1e-4, 25);
+            let finite = discriminant.weights.iter().all(|weight| weight.is_finite());
+            assert!(finite, "{tiny}: {:?}", discriminant.weights);
         }
     }
 }

@@ -82,7 +82,8 @@ impl State {
         self.bag
             .rebuild_if_needed(self.background.metric(), &self.params);
         self.history.clear();
-        self.bag.admit(self.entry_with(&features), &self.params);
+        self.trust = Trust::default();
+        self.bag.point(self.entry_with(&features), &self.params);
         self.remember(features);
         self.estimate = given(number, target);
     }

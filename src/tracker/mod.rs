@@ -192,7 +192,7 @@ impl Tracker {
         }
 
         // (B) What is seen there, and (D) how that compares with what is known.
-        let furthest = sought.furthest().max(state.learning_radius(number));
+        let furthest = sought.furthest() + state.learning_radius(number);
         room.view
             .open(frame, &state.answer, furthest, &state.reach, &state.params);
         room.extend(frame, 0, state);

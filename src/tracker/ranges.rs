@@ -22,6 +22,12 @@ pub struct ParamsError {
 /// Most numbers in the vectors of one frame's candidates: N · D.
 const MOST_CANDIDATE_VALUES: usize = 1_100_000;
 
+/// Most numbers that a session keeps: those of the full bag and of the background.
+const MOST_KEPT_VALUES: u64 = 1_000_000;
+/// Most products with the background in a frame: of its samples with all candidates, and with all looks in the bag when
+/// it is refreshed.
+const MOST_WHITENED_VALUES: u64 = 110_000_000;
+
 impl Params {
     /// Checks every parameter against its range. NaN and infinities are out of every range.
     ///
@@ -154,7 +160,38 @@ impl Params {
             self.pinned,
             0..=self.bag_size - 1,
             "less than bag_size",
-        )
+        )?;
+        self.validate_products()
+    }
+
+    /// Checks what sizes cost together. No product overflows once each size is in its range.
+    fn validate_products(&self) -> Result<(), ParamsError> {
+        let len = self.feature_len() as u64;
+        let [samples, bag, columns, patches, particles] = [
+            self.background_samples,
+            self.bag_size,
+            self.basis_dim + 1,
+            self.history + 1,
+            self.particles,
+        ]
+        .map(u64::from);
+        if (bag * columns + samples) * len > MOST_KEPT_VALUES {
+            return Err(ParamsError {
+                name: "bag_size",
+                value: f64::from(self.bag_size),
+                expected: "smaller for patches of this size: (bag_size times (basis_dim + 1) + background_samples) \
+                           times feature length is at most 1000000",
+            });
+        }
+        if samples * (particles + bag * patches) * len > MOST_WHITENED_VALUES {
+            return Err(ParamsError {
+                name: "background_samples",
+                value: f64::from(self.background_samples),
+                expected: "fewer for so much to compare: background_samples times (particles + bag_size times \
+                           (history + 1)) times feature length is at most 110000000",
+            });
+        }
+        Ok(())
     }
 }
 

@@ -55,7 +55,8 @@ impl Sought<'_> {
         let carried = self.carried();
         out.clear();
         out.push(self.reach.hold(self.last));
-        if self.has_shift() {
+        // A search of one particle has no room for another.
+        if self.has_shift() && self.params.particles > 1 {
             out.push(self.reach.hold(carried));
         }
         let count = self.params.first_particles().max(out.len());
@@ -107,7 +108,9 @@ impl Sought<'_> {
         let mut exponent = 0.0;
         if self.params.displacement_std > 0.0 {
             let nearest = squared(&self.last).min(squared(&self.carried()));
-            exponent += nearest / self.params.displacement_std.powi(2);
+            // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
+            let variance = self.params.displacement_std.powi(2);
+            exponent += nearest / variance.max(f64::MIN_POSITIVE);
         }
         if self.params.scale_change_std > 0.0 {
             let change = (particle.scale / self.last.scale).ln();
@@ -148,5 +151,48 @@ pub(super) fn average(
         }
     } else {
         center
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::Preset;
+
+    #[test]
+    fn a_prior_of_any_width_is_1_at_the_last_answer_and_falls() {
+        let reach = Reach {
+            frame_width: 100.0,
+            frame_height: 80.0,
+            box_width: 20.0,
+            box_height: 10.0,
+        };
+        let last = Particle {
+            x: 50.0,
+            y: 40.0,
+            scale: 1.0,
+        };
+        for std in [0.0, 5e-324, 1e-200, 1e-3, 12.0] {
+            let params = Params {
+                displacement_std: std,
+                scale_change_std: std.min(10.0),
+                ..Preset::Robust.params()
+            };
+            let sought = Sought {
+                last,
+                shift: (0.0, 0.0),
+                params: &params,
+                reach: &reach,
+            };
+            assert_eq!(sought.prior(&last), 1.0, "{std}");
+            let beside = Particle {
+                x: 53.0,
+                scale: 1.01,
+                ..last
+            };
+            let prior = sought.prior(&beside);
+            let falls = if std > 0.0 { prior < 1.0 } else { prior == 1.0 };
+            assert!(falls, "{std}: {prior}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each test binary uses its part.
 
-use bagtrack::tracker::{GrayFrame, Params, Preset, Rect};
+use bagtrack::tracker::{Features, GrayFrame, Params, Preset, Rect, Search};
 
 fn texture(x: usize, y: usize, seed: u32) -> u8 {
     let cell =
@@ -40,6 +40,49 @@ pub fn frame(t: usize) -> GrayFrame {
     GrayFrame::from_luma(width as u32, height as u32, luma).expect("a frame of this size")
 }
 
+/// Waves of several lengths that never repeat in sight: a background that a camera can be told by.
+fn hills(x: f64, y: f64) -> f64 {
+    let waves = (x * 0.13).sin() + (x * 0.041).cos() + (y * 0.11).sin() + (y * 0.053).cos();
+    60.0 + 14.0 * waves
+}
+
+/// Frame `t`, 200 x 160 pixels, and the target's box in it, of the same target over hills, seen by a camera that is
+/// turned by `camera` pixels: the whole picture moves.
+pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
+    let walk = target(t);
+    let (left, top) = (walk.x as usize + camera.0, walk.y as usize + camera.1);
+    let luma = (0..200 * 160_usize)
+        .map(|i| {
+            let (x, y) = (i % 200, i / 200);
+            if (left..left + 24).contains(&x) && (top..top + 20).contains(&y) {
+                128 + texture(x - left, y - top, 5) / 2
+            } else {
+                let (x, y) = (x as f64 - camera.0 as f64, y as f64 - camera.1 as f64);
+                let grain = texture((x + 90.0) as usize, (y + 90.0) as usize, 9) / 8;
+                hills(x, y) as u8 + grain
+            }
+        })
+        .collect();
+    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
+}
+
+/// Frame `t`, 200 x 160 pixels, with two unlike targets and their boxes: the first moves as ever, the second stands
+/// below it and swings a little.
+pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
+    let (frame, first) = panned(t, (0, 0));
+    let second = Rect::new(30.0 + bounce(t, 50), 105.0 + bounce(t, 25), 26.0, 26.0);
+    let (left, top) = (second.x as usize, second.y as usize);
+    let mut luma = frame.pixels().to_vec();
+    for y in 0..26 {
+        for x in 0..26 {
+            luma[(top + y) * 200 + left + x] = 20 + texture(x, y, 77) / 3;
+        }
+    }
+    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    (frame, first, second)
+}
+
 /// A frame of one gray value.
 pub fn flat(width: u32, height: u32, value: u8) -> GrayFrame {
     let pixels = vec![value; width as usize * height as usize];
@@ -52,4 +95,49 @@ pub fn params(seed: u64) -> Params {
         seed,
         ..Preset::Paper.params()
     }
+}
+
+/// The default parameters with another seed.
+pub fn robust(seed: u64) -> Params {
+    Params {
+        seed,
+        ..Preset::Robust.params()
+    }
+}
+
+type Change = fn(&mut Params);
+
+/// Each mend of the preset `robust`, switched off.
+const MENDS_OFF: [(&str, Change); 12] = [
+    ("no background", |p| p.background_samples = 0),
+    ("no discriminant", |p| p.discriminant_weight = 0.0),
+    ("resampled", |p| p.search = Search::Resampled),
+    ("gray", |p| p.features = Features::Gray),
+    ("candidate among the history", |p| p.candidate_alone = false),
+    ("no camera", |p| p.camera_shift = false),
+    ("no refinement", |p| p.refined_share = 0.0),
+    ("arg max", |p| p.averaging_radius = 0.0),
+    ("nothing pinned", |p| p.pinned = 0),
+    ("all trusted", |p| p.trusted_ratio = 0.0),
+    ("any length", |p| p.unit_length = false),
+    ("no prior", |p| {
+        p.displacement_std = 0.0;
+        p.scale_change_std = 0.0;
+    }),
+];
+
+/// Both presets, and `robust` with each mend switched off alone; the latter with few particles and samples, to be quick.
+pub fn variants(seed: u64) -> Vec<(&'static str, Params)> {
+    let mut variants = vec![("paper", params(seed)), ("robust", robust(seed))];
+    for (name, change) in MENDS_OFF {
+        let mut params = Params {
+            particles: 43,
+            background_samples: 13,
+            background_every: 3,
+            ..robust(seed)
+        };
+        change(&mut params);
+        variants.push((name, params));
+    }
+    variants
 }

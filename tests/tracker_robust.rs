@@ -1,0 +1,130 @@
+//! What the default parameters promise: the target is held, also when the camera swings, and after a correction.
+
+mod tracker_scene;
+
+use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
+use tracker_scene::{frame, panned, robust, target};
+
+/// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
+fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
+    let (first, given) = scene(0);
+    let mut tracker = Tracker::new(&first, given, robust(seed)).expect("a box inside the frame");
+    let overlaps = (1..=last).map(|t| {
+        let (frame, truth) = scene(t);
+        let answer = tracker.step(&frame).expect("frames of one size");
+        answer.target.overlap(&truth)
+    });
+    overlaps.sum::<f64>() / last as f64
+}
+
+#[test]
+fn the_default_is_robust() {
+    assert_eq!(Preset::default(), Preset::Robust);
+    assert_eq!(bagtrack::tracker::Params::default(), robust(0));
+}
+
+#[test]
+fn a_moving_target_is_held() {
+    for seed in 0..3 {
+        let overlap = mean_overlap(|t| (frame(t), target(t)), 79, seed);
+        println!("seed {seed}: overlap {overlap:.3}");
+        assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
+
+#[test]
+fn a_target_is_held_through_swings_of_the_camera() {
+    // Back and forth by 30 pixels in a single frame, along x, y and both: beyond three deviations of the search.
+    let camera = |t: usize| match t / 12 % 4 {
+        0 => (0, 0),
+        1 => (30, 0),
+        2 => (30, 30),
+        _ => (0, 30),
+    };
+    for seed in 0..3 {
+        let overlap = mean_overlap(|t| panned(t, camera(t)), 72, seed);
+        println!("seed {seed}: overlap {overlap:.3}");
+        assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
+
+#[test]
+fn without_its_camera_the_swings_lose_the_target() {
+    // So that the scene above tests what it says.
+    let params = bagtrack::tracker::Params {
+        camera_shift: false,
+        ..robust(0)
+    };
+    let (first, given) = panned(0, (0, 0));
+    let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");
+    for t in 1..40 {
+        let (frame, _) = panned(t, if t < 20 { (0, 0) } else { (40, 40) });
+        tracker.step(&frame).expect("frames of one size");
+    }
+    let (_, truth) = panned(39, (40, 40));
+    assert!(tracker.estimate().target.overlap(&truth) < 0.3);
+}
+
+#[test]
+fn a_replay_gives_the_same_bits_on_any_thread() {
+    let run = |seed| {
+        let mut tracker =
+            Tracker::new(&frame(0), target(0), robust(seed)).expect("a box inside the frame");
+        let answers: Vec<_> = (1..65)
+            .map(|t| match t {
+                33 => tracker.retarget(&frame(t), target(t)),
+                _ => tracker.step(&frame(t)),
+            })
+            .map(|answer| answer.expect("frames of one size"))
+            .collect();
+        (answers, tracker.snapshot())
+    };
+    let here = run(7);
+    let there = std::thread::spawn(move || run(7)).join();
+    assert_eq!(here, there.expect("no panic"));
+    assert_ne!(here.1, run(8).1);
+}
+
+#[test]
+fn the_same_target_is_followed_after_a_correction() {
+    for seed in 0..3 {
+        let start = Tracker::new(&frame(0), target(0), robust(seed));
+        let mut tracker = start.expect("a box inside the frame");
+        for t in 1..30 {
+            tracker.step(&frame(t)).expect("frames of one size");
+        }
+        // A cut: the target is elsewhere.
+        let corrected = tracker.retarget(&frame(110), target(110));
+        let corrected = corrected.expect("a box inside the frame");
+        assert_eq!((corrected.frame, corrected.target), (30, target(110)));
+        let overlaps = (111..151).map(|t| {
+            let answer = tracker.step(&frame(t)).expect("frames of one size");
+            answer.target.overlap(&target(t))
+        });
+        let overlap = overlaps.sum::<f64>() / 40.0;
+        println!("seed {seed}: overlap {overlap:.3}");
+        assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
+
+#[test]
+fn another_target_is_followed_after_a_correction_though_the_first_stays_in_sight() {
+    for seed in 0..3 {
+        let scene = tracker_scene::pair;
+        let (first, given, _) = scene(0);
+        let mut tracker = Tracker::new(&first, given, robust(seed)).expect("a box in the frame");
+        for t in 1..30 {
+            tracker.step(&scene(t).0).expect("frames of one size");
+        }
+        let (frame, _, other) = scene(30);
+        tracker.retarget(&frame, other).expect("a box in the frame");
+        let overlaps = (31..91).map(|t| {
+            let (frame, _, truth) = scene(t);
+            let answer = tracker.step(&frame).expect("frames of one size");
+            answer.target.overlap(&truth)
+        });
+        let overlap = overlaps.sum::<f64>() / 60.0;
+        println!("seed {seed}: overlap {overlap:.3}");
+        assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
