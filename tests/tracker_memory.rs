@@ -51,7 +51,10 @@ fn a_session_keeps_no_more_than_half_a_mebibyte_and_no_snapshot_asks_for_more() 
             );
             assert!(snapshot.len() <= LIMIT);
             assert!(kept <= LIMIT && kept_restored <= LIMIT);
-            assert!(kept > 3 * snapshot.len() / 4, "the count is of this tracker");
+            assert!(
+                kept > 3 * snapshot.len() / 4,
+                "the count is of this tracker"
+            );
         }
     }
 
