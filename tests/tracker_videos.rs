@@ -29,11 +29,8 @@ fn the_default_parameters_hold_the_targets_of_the_eight_videos() {
         eval::run(&sequence, &preset.params(), one, one).expect("a box in every first frame")
     });
     let runs: Vec<_> = runs.collect();
-    let mean = |figure: fn(&eval::Figures) -> f64| {
-        runs.iter().map(|run| figure(&run.figures)).sum::<f64>() / runs.len() as f64
-    };
-    let (error, overlap) = (mean(|of| of.center_error), mean(|of| of.overlap));
-    let report = Report::new(preset, 1, runs.clone()).expect("eight videos");
+    let report = Report::new(preset, &runs).expect("eight videos");
+    let (error, overlap) = (report.mean().center_error, report.mean().overlap);
     println!("{report}");
     assert!(error <= GREATEST_CENTER_ERROR, "centre error {error}");
     assert!(overlap >= LEAST_OVERLAP, "overlap {overlap}");
