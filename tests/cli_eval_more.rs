@@ -210,12 +210,16 @@ fn figures_are_drawn_with_a_curve_for_each_variant() {
     fs::create_dir(&elsewhere).expect("the folder is writable");
     let same_name = clip(&elsewhere, "a clip", &["--seed", "4"]);
     let out = parent.path().join("docs/figures");
+    let sweep = parent.path().join("sweep.txt");
+    let lines = "paper: preset=paper\nbases alone: preset=paper alpha=0\nmeans, α = 1: preset=paper alpha=1\n";
+    fs::write(&sweep, lines).expect("the folder is writable");
     let draw = || {
         succeeds(&[
             "eval",
             text(&dir),
             text(&same_name),
-            "--ablate",
+            "--sweep",
+            text(&sweep),
             "--preset",
             "paper",
             "--seeds",
@@ -249,14 +253,14 @@ fn figures_are_drawn_with_a_curve_for_each_variant() {
     let read = |name: &str| fs::read_to_string(out.join(name)).expect("it was written");
     let precision = read("precision.svg");
     assert!(precision.starts_with("<svg ") && precision.trim_end().ends_with("</svg>"));
-    for label in ["paper (", "α = 0: bases alone (", "α = 1: means alone ("] {
+    for label in ["paper (", "bases alone (", "means, α = 1 ("] {
         assert!(precision.contains(label), "{label}");
     }
     // A curve has a point for each radius from 0 to 50, axes and marks have two.
     let curves = precision
         .lines()
         .filter(|line| line.starts_with("<polyline") && line.matches(',').count() > 50);
-    assert_eq!(curves.count(), 4);
+    assert_eq!(curves.count(), 3);
     assert!(read("error-a_clip.svg").contains("a clip: centre error over time"));
     assert!(read("error-a_clip.svg").contains("<polygon"));
     // Drawn again over the same files, the same comes out.

@@ -10,9 +10,35 @@ type Row = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// The rows after that of the preset itself.
 const ROWS: &[Row] = &[
+    ("paper: every mend off", &[("preset", "paper")]),
     ("α = 0: bases alone", &[("alpha", "0")]),
     ("α = 0.5", &[("alpha", "0.5")]),
     ("α = 1: means alone", &[("alpha", "1")]),
+    (
+        "gray values instead of gradients",
+        &[
+            ("features", "gray"),
+            ("patch_width", "32"),
+            ("patch_height", "32"),
+        ],
+    ),
+    ("no gray values beside gradients", &[("gray_weight", "0")]),
+    ("the box alone, no rim", &[("context", "1")]),
+    ("vectors of any length", &[("unit_length", "false")]),
+    (
+        "candidates with their history",
+        &[("candidate_alone", "false")],
+    ),
+    ("no background metric", &[("background_samples", "0")]),
+    ("resampled particles", &[("search", "resampled")]),
+    ("one stage", &[("refined_share", "0")]),
+    ("no prior on the displacement", &[("displacement_std", "0")]),
+    ("no prior on the scale", &[("scale_change_std", "0")]),
+    ("no camera shift", &[("camera_shift", "false")]),
+    ("arg max, not averaged", &[("averaging_radius", "0")]),
+    ("no pinned subspace", &[("pinned", "0")]),
+    ("learns from every frame", &[("trusted_ratio", "0")]),
+    ("no discriminant", &[("discriminant_weight", "0")]),
 ];
 
 /// The variants of the ablation, the first of which is the preset as it is, under the name `base`.

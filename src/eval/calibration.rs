@@ -18,7 +18,9 @@
 //!   from some videos is worth on one that it has never seen; the score as it is served takes no part in it but by
 //!   its order. A video's own seeds are never split between fitting and judging.
 //!
-//! What could go wrong: with hits only or misses only there is no ROC curve, and with one video none to learn from.
+//! What could go wrong: calibration alone is no proof of a good score. A constant that is the share of hits is
+//! calibrated, and within a bin a video that is claimed too high makes up for one that is claimed too low; so the
+//! figures are to be read together with the area under the ROC curve. With hits only or misses only there is no ROC curve, and with one video none to learn from.
 //! Those figures are None then, never a number that means nothing.
 
 use super::isotonic::Isotonic;
