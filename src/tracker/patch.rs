@@ -179,6 +179,9 @@ impl Region {
     /// Makes the quads of the region, and room for a window at the end.
     #[inline(always)]
     fn fill(&self, image: &GrayFrame, quads: &mut Vec<u32>) {
+        // Room for all of the image at once, so that a region that grows allocates nothing.
+        let most = image.pixels().len() + WINDOW;
+        quads.reserve(most.saturating_sub(quads.len()));
         quads.resize(self.width * self.height + WINDOW, 0);
         let (width, left) = (image.width() as usize, self.left as usize);
         // The last column of the image has no right neighbour.

@@ -6,8 +6,7 @@
 //! affine subspace and its distances.
 //!
 //! The hazard is cancellation: candidate and history are nearly the same vector, and what matters is the
-//! difference. In single precision it would be gone. The product in double precision takes the same time here
-//! (both are bound by bringing the candidates in), so everything is in double precision.
+//! difference. In single precision it would be gone, so everything is in double precision.
 
 use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
 

@@ -119,7 +119,8 @@ impl Sought<'_> {
             exponent += (change / self.params.scale_change_std).powi(2);
         }
         if self.params.scale_std > 0.0 {
-            exponent += particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
+            exponent +=
+                particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
         }
         (-0.5 * exponent).exp()
     }
