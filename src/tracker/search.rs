@@ -69,7 +69,8 @@ impl Sought<'_> {
             let drawn = Particle {
                 x: from.x + self.widening * params.motion_std_x * normal(generator),
                 y: from.y + self.widening * params.motion_std_y * normal(generator),
-                scale: from.scale * (params.motion_std_scale * normal(generator)).exp(),
+                scale: from.scale
+                    * (self.widening * params.motion_std_scale * normal(generator)).exp(),
             };
             out.push(self.reach.hold(drawn));
         }
@@ -116,7 +117,7 @@ impl Sought<'_> {
         }
         if self.params.scale_change_std > 0.0 {
             let change = (particle.scale / self.last.scale).ln();
-            exponent += (change / self.params.scale_change_std).powi(2);
+            exponent += (change / self.widening / self.params.scale_change_std).powi(2);
         }
         if self.params.scale_std > 0.0 {
             exponent +=

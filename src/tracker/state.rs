@@ -113,7 +113,7 @@ impl State {
     }
 
     /// Whether the best particle is not the target. Once the target is out of sight the search covers much more, and
-    /// finds more that looks a little like it: so to be found again takes a better score, and a look that is trusted.
+    /// finds more that looks a little like it: so to be found again takes a better score, and a look that is recognised.
     pub fn is_out_of_sight(&self, evidence: &Evidence) -> bool {
         let Some(score) = evidence.discriminant else {
             return false;
@@ -122,7 +122,7 @@ impl State {
         if self.frames_lost == 0 {
             return score < below;
         }
-        score < below + FOUND_MARGIN || !self.trust.accepts(evidence.first, &self.params)
+        score < below + FOUND_MARGIN || !self.trust.recognizes(evidence.first, &self.params)
     }
 
     /// Makes `features` the newest of the history.

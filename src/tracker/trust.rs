@@ -35,9 +35,15 @@ impl Default for Trust {
 
 impl Trust {
     /// Whether `distance` from the first subspace is not far beyond what is usual.
-    pub fn accepts(&self, distance: f64, params: &Params) -> bool {
+    fn accepts(&self, distance: f64, params: &Params) -> bool {
         let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
         params.trusted_ratio <= 0.0 || distance < limit
+    }
+
+    /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target:
+    /// a wide search finds the likest of all things, so it must look at least as much like the first look as is usual.
+    pub fn recognizes(&self, distance: f64, params: &Params) -> bool {
+        params.trusted_ratio <= 0.0 || distance < self.usual.max(FIRST_USUAL)
     }
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.

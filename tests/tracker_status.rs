@@ -1,0 +1,75 @@
+//! The status of the default parameters on clips in which the target goes out of sight: `lost` while it is, never
+//! `tracking` on something else, and `tracking` again, by itself, some time after it came back.
+
+use bagtrack::sample::{Clip, Scene, Settings};
+use bagtrack::tracker::{Estimate, GrayFrame, Preset, Status, Tracker};
+
+/// Frames that the status may take to notice: a quarter of a second of a usual video.
+const NOTICED: u32 = 6;
+/// Frames at the end of a clip in which the target must have been found again.
+const END: u32 = 20;
+
+fn frame(clip: &Clip, index: u32) -> GrayFrame {
+    let picture = clip.draw(index);
+    let luma = picture.pixels().map(|pixel| {
+        let [red, green, blue] = pixel.0.map(f32::from);
+        (0.299 * red + 0.587 * green + 0.114 * blue).round() as u8
+    });
+    let luma = luma.collect();
+    GrayFrame::from_luma(picture.width(), picture.height(), luma).expect("a whole picture")
+}
+
+fn follow(clip: &Clip, seed: u64) -> Vec<Estimate> {
+    let params = bagtrack::tracker::Params {
+        seed,
+        ..Preset::default().params()
+    };
+    let mut tracker = Tracker::new(&frame(clip, 0), clip.target(0), params).expect("a box inside");
+    let further = (1..clip.frames()).map(|index| {
+        let answer = tracker.step(&frame(clip, index));
+        answer.expect("frames of one size")
+    });
+    further.collect()
+}
+
+fn statuses_are_true(scene: Scene) {
+    let clip = Clip::new(Settings {
+        scene,
+        ..Settings::default()
+    })
+    .expect("the settings are in order");
+    for seed in 0..3 {
+        let mut hidden = 0;
+        for answer in follow(&clip, seed) {
+            let index = u32::try_from(answer.frame).expect("a short clip");
+            let overlap = clip.target(index).overlap(&answer.target);
+            let status = answer.status;
+            hidden = if clip.visible(index) > 0.0 {
+                0
+            } else {
+                hidden + 1
+            };
+            if hidden > NOTICED {
+                assert_eq!(status, Status::Lost, "seed {seed}, frame {index}");
+                assert!(answer.score <= 0.1);
+            }
+            if status == Status::Tracking {
+                assert!(overlap > 0.3, "seed {seed}, frame {index}: {overlap}");
+            }
+            if index + END >= clip.frames() {
+                assert_eq!(status, Status::Tracking, "seed {seed}, frame {index}");
+                assert!(overlap > 0.6, "seed {seed}, frame {index}: {overlap}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_covered_target_is_lost_and_found_again() {
+    statuses_are_true(Scene::Covered);
+}
+
+#[test]
+fn a_target_that_leaves_is_lost_and_found_again() {
+    statuses_are_true(Scene::Leaves);
+}
