@@ -16,7 +16,13 @@ use std::process::ExitCode;
 
 /// Follows one object through frames: a service, and the same tracker on folders of frames.
 #[derive(Debug, Parser)]
-#[command(name = "bagtrack", version, about)]
+#[command(
+    name = "bagtrack",
+    version,
+    about,
+    // A setting before the command would be silently dropped otherwise.
+    args_conflicts_with_subcommands = true
+)]
 pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
