@@ -65,3 +65,11 @@ fn a_setting_out_of_its_range_is_named_in_one_line() {
         "bagtrack: --queue (BAGTRACK_QUEUE) must be at least 1\n"
     );
 }
+
+#[test]
+fn a_setting_before_the_command_is_refused_not_dropped() {
+    let output = bagtrack().args(["--queue", "5", "serve"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("'--queue <QUEUE>'"), "{error}");
+}
