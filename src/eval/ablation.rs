@@ -33,7 +33,12 @@ const ROWS: &[Row] = &[
     ("resampled particles", &[("search", "resampled")]),
     ("one stage", &[("refined_share", "0")]),
     ("no prior on the displacement", &[("displacement_std", "0")]),
-    ("no prior on the scale", &[("scale_change_std", "0")]),
+    (
+        "no prior on the change of scale",
+        &[("scale_change_std", "0")],
+    ),
+    ("no prior on the scale", &[("scale_std", "0")]),
+    ("never out of sight", &[("lost_below", "0")]),
     ("no camera shift", &[("camera_shift", "false")]),
     ("arg max, not averaged", &[("averaging_radius", "0")]),
     ("no pinned subspace", &[("pinned", "0")]),
