@@ -34,8 +34,8 @@ fn session(params: Params, steps: usize) -> Tracker {
 
 /// One test, since the allocator counts what all threads do.
 #[test]
-fn a_session_keeps_no_more_than_half_a_mebibyte_and_no_snapshot_asks_for_more() {
-    const LIMIT: usize = 512 * 1024;
+fn a_session_keeps_no_more_than_a_quarter_of_a_mebibyte_and_no_snapshot_asks_for_more() {
+    const LIMIT: usize = 256 * 1024;
     for params in [Preset::Paper.params(), robust(0)] {
         // The thread's room for calculations is no part of a session.
         drop(session(params.clone(), 2));

@@ -1,24 +1,25 @@
-//! The metric: what the surroundings of the target look like, and vectors whitened by it.
+//! The background: what the surroundings of the target look like, and the metric that they make.
 //!
 //! Compared as they are, two patches are alike where both show any edges at all. So vectors of areas beside the target
-//! (and of areas that miss it by a third) give a mean and a covariance C, and what is compared is
-//! x̂ = M (x - mean) with M = (I + C / ridge)^(-1/2), brought to length 1: directions in which the background varies
-//! count less, which is the metric of a linear discriminant analysis. C has the rank of its few samples, so
-//! M = I - B diag(g) Bᵀ with the principal directions B of the samples and g = 1 - (1 + eigenvalue / ridge)^(-1/2).
+//! (and of areas that miss it by a third) give a mean and a covariance C, and vectors are compared by
+//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean): directions in which the background varies count less, which is the metric of
+//! a linear discriminant analysis. Where candidates stand alone, inner products are enough ([`metric`](super::metric));
+//! otherwise vectors are whitened ([`whitening`](super::whitening)).
 //!
-//! Without samples M is the identity and the mean is zero.
+//! Without samples the metric is the plain one and the mean is zero.
 
 use std::collections::VecDeque;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use pulp::{Arch, Simd, WithSimd};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::Params;
 use super::look::Look;
-use super::matrix;
+use super::metric::{self, Metric};
 use super::motion::{Particle, Reach};
+use super::whitening::Whitening;
 
 /// Areas are off by more than this share of the box along x or y: nearer ones show mostly the target.
 const INNER: f64 = 0.3;
@@ -28,26 +29,43 @@ const OUTER: f64 = 1.5;
 const LEAST_SIDE: f64 = 16.0;
 /// The share of the samples that a refresh replaces.
 const RENEWED: f64 = 0.2;
-/// An eigenvalue below this share of the largest is rounding.
-const RANK_TOLERANCE: f64 = 1e-5;
 
-/// Vectors of areas beside the target, and the metric they make.
+/// Vectors of areas beside the target, and what follows from them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Background {
     /// Oldest first.
     samples: VecDeque<Look>,
     #[serde(skip)]
+    mean: Vec<f32>,
+    /// Where candidates stand alone.
+    #[serde(skip)]
     metric: Metric,
+    /// Where they do not.
+    #[serde(skip)]
+    whitening: Whitening,
 }
 
-/// A transformation of feature vectors; the identity where there is no background.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Metric {
-    mean: Vec<f32>,
-    /// B, one direction after the other.
-    directions: Vec<f32>,
-    /// g of each direction.
-    gains: Vec<f32>,
+/// Room for learning from samples.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    vectors: Vec<f32>,
+    metric: metric::Room,
+}
+
+/// [`Background::learn`], to be compiled for the instructions that this machine has.
+struct Learn<'a> {
+    background: &'a mut Background,
+    params: &'a Params,
+    room: &'a mut Room,
+}
+
+impl WithSimd for Learn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.background.learn_all(self.params, self.room);
+    }
 }
 
 impl Background {
@@ -64,41 +82,77 @@ impl Background {
     }
 
     /// Takes new samples, vectors of length D one after the other; the oldest leave.
-    pub fn renew(&mut self, vectors: &[f32], params: &Params) {
+    pub fn renew(&mut self, vectors: &[f32], params: &Params, room: &mut Room) {
         for vector in vectors.chunks_exact(params.feature_len()) {
-            if self.samples.len() >= params.background_samples as usize {
-                self.samples.pop_front();
-            }
-            self.samples.push_back(Look::new(vector));
+            let full = self.samples.len() >= params.background_samples as usize;
+            let oldest = if full { self.samples.pop_front() } else { None };
+            let mut look = oldest.unwrap_or_default();
+            look.keep(vector);
+            self.samples.push_back(look);
         }
-        self.learn(params);
+        self.learn(params, room);
     }
 
-    /// Makes the metric of the samples.
-    pub fn learn(&mut self, params: &Params) {
+    /// Learns what follows from the samples.
+    pub fn learn(&mut self, params: &Params, room: &mut Room) {
+        Arch::new().dispatch(Learn {
+            background: self,
+            params,
+            room,
+        });
+    }
+
+    #[inline(always)]
+    fn learn_all(&mut self, params: &Params, room: &mut Room) {
         let len = params.feature_len();
         let count = self.samples.len();
+        self.mean.clear();
         if count < 2 {
-            self.metric = Metric::default();
             return;
         }
-        let mut vectors = Vec::with_capacity(count * len);
-        self.samples
-            .iter()
-            .for_each(|look| look.append_to(&mut vectors));
-        let mut mean = vec![0.0; len];
-        for vector in vectors.chunks_exact(len) {
-            matrix::add(&mut mean, 1.0 / count as f32, vector);
+        self.mean.resize(len, 0.0);
+        for look in &self.samples {
+            look.add_to(&mut self.mean, 1.0 / count as f32);
         }
-        for vector in vectors.chunks_exact_mut(len) {
-            matrix::add(vector, -1.0, &mean);
+        room.vectors.clear();
+        self.append_samples(&mut room.vectors);
+        let ridge = params.background_ridge;
+        if params.candidate_alone {
+            self.metric
+                .become_of(&room.vectors, len, ridge, &mut room.metric);
+        } else {
+            self.whitening = Whitening::of(&self.mean, &room.vectors, ridge);
         }
-        self.metric = Metric::of(mean, &vectors, params.background_ridge);
     }
 
-    /// The metric of the present samples.
+    /// Appends the samples to `out`, with the mean taken off: none where there is no metric.
+    #[inline(always)]
+    pub fn append_samples(&self, out: &mut Vec<f32>) {
+        if self.mean.is_empty() {
+            return;
+        }
+        for look in &self.samples {
+            let first = out.len();
+            out.extend_from_slice(&self.mean);
+            let vector = &mut out[first..];
+            vector.iter_mut().for_each(|value| *value = -*value);
+            look.add_to(vector, 1.0);
+        }
+    }
+
+    /// The mean of the samples: empty where there is no metric.
+    pub fn mean(&self) -> &[f32] {
+        &self.mean
+    }
+
+    /// The metric, where candidates stand alone.
     pub fn metric(&self) -> &Metric {
         &self.metric
+    }
+
+    /// The whitening, where candidates do not stand alone.
+    pub fn whitening(&self) -> &Whitening {
+        &self.whitening
     }
 
     /// Whether the samples may be those of a tracker with `params`.
@@ -111,13 +165,14 @@ impl Background {
     }
 }
 
-/// Draws `count` areas beside the target, as far as they can be had inside the frame.
+/// Draws `count` areas beside the target into `out`, as far as they can be had inside the frame.
 pub(super) fn areas(
     target: &Particle,
     reach: &Reach,
     count: usize,
     generator: &mut ChaCha8Rng,
-) -> Vec<Particle> {
+    out: &mut Vec<Particle>,
+) {
     let width = (reach.box_width * target.scale).max(LEAST_SIDE);
     let height = (reach.box_height * target.scale).max(LEAST_SIDE);
     let draw = |generator: &mut ChaCha8Rng| loop {
@@ -143,7 +198,8 @@ pub(super) fn areas(
         }
         area
     };
-    (0..count).map(area).collect()
+    out.clear();
+    out.extend((0..count).map(area));
 }
 
 /// How far [`areas`] are from the target's centre at most, in working pixels.
@@ -152,142 +208,36 @@ pub(super) fn furthest(target: &Particle, reach: &Reach) -> f64 {
     OUTER * longer.max(LEAST_SIDE)
 }
 
-impl Metric {
-    /// The metric of centred `samples` with this mean; `ridge` is a multiple of the covariance's mean eigenvalue.
-    fn of(mean: Vec<f32>, samples: &[f32], ridge: f64) -> Self {
-        let len = mean.len();
-        let count = samples.len() / len;
-        let mut gram = Vec::new();
-        matrix::inner_products(samples, samples, len, &mut gram);
-        let gram = DMatrix::from_fn(count, count, |i, j| f64::from(gram[i * count + j]));
-        let ridge = ridge * gram.trace() / count as f64 / len as f64;
-        let eigen = SymmetricEigen::new(gram);
-        let largest = eigen.eigenvalues.max();
-        let mut metric = Self {
-            mean,
-            ..Self::default()
-        };
-        if largest.is_nan() || largest <= 0.0 {
-            return metric;
-        }
-        let mut coefficients = Vec::new();
-        for (index, &value) in eigen.eigenvalues.iter().enumerate() {
-            if value > largest * RANK_TOLERANCE {
-                let scale = 1.0 / value.sqrt();
-                let column = eigen.eigenvectors.column(index);
-                coefficients.extend(column.iter().map(|weight| (weight * scale) as f32));
-                let gain = 1.0 - (1.0 + value / count as f64 / ridge).powf(-0.5);
-                metric.gains.push(gain as f32);
-            }
-        }
-        metric.directions = vec![0.0; metric.gains.len() * len];
-        matrix::add_combinations(&mut metric.directions, 1.0, &coefficients, samples, len);
-        metric
-    }
-
-    /// The vector that all others are compared with: zero where there is no background.
-    pub fn mean(&self) -> &[f32] {
-        &self.mean
-    }
-
-    /// Turns feature vectors, of length `len` one after the other, into what is compared. `room` is for intermediate
-    /// results.
-    pub fn apply(&self, vectors: &mut [f32], len: usize, unit_length: bool, room: &mut Vec<f32>) {
-        if !self.mean.is_empty() {
-            for vector in vectors.chunks_exact_mut(len) {
-                matrix::add(vector, -1.0, &self.mean);
-            }
-            matrix::inner_products(vectors, &self.directions, len, room);
-            for row in room.chunks_exact_mut(self.gains.len().max(1)) {
-                for (product, gain) in row.iter_mut().zip(&self.gains) {
-                    *product *= gain;
-                }
-            }
-            matrix::add_combinations(vectors, -1.0, room, &self.directions, len);
-        }
-        if unit_length {
-            vectors.chunks_exact_mut(len).for_each(matrix::normalize);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tracker::Preset;
 
-    fn params() -> Params {
-        Params {
+    #[test]
+    fn new_samples_replace_the_oldest_and_the_mean_is_theirs() {
+        let params = Params {
             patch_width: 4,
             patch_height: 4,
             features: crate::tracker::Features::Gray,
-            background_samples: 9,
+            background_samples: 3,
             ..Preset::Robust.params()
-        }
-    }
-
-    fn vectors(count: usize, seed: usize) -> Vec<f32> {
-        let number =
-            |i: usize| ((i * i * 31 + i * 7919 + seed * 104_729) % 1000) as f32 / 500.0 - 1.0;
-        (0..count * 16).map(number).collect()
-    }
-
-    #[test]
-    fn whitening_is_the_inverse_root_of_the_covariance_and_the_ridge() {
-        let params = params();
-        let mut background = Background::default();
-        background.renew(&vectors(9, 1), &params);
-        let mut samples = Vec::new();
-        background
-            .samples
-            .iter()
-            .for_each(|look| look.append_to(&mut samples));
-        let samples = DMatrix::from_fn(16, 9, |i, j| f64::from(samples[j * 16 + i]));
-        let mean = samples.column_mean();
-        let centered = DMatrix::from_fn(16, 9, |i, j| samples[(i, j)] - mean[i]);
-        let covariance = &centered * centered.transpose() / 9.0;
-        let ridge = params.background_ridge * covariance.trace() / 16.0;
-        let eigen = SymmetricEigen::new(covariance / ridge + DMatrix::identity(16, 16));
-        let root = eigen.eigenvalues.map(|value| value.powf(-0.5));
-        let whitening =
-            &eigen.eigenvectors * DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose();
-
-        let given = vectors(3, 2);
-        let mut found = given.clone();
-        background
-            .metric
-            .apply(&mut found, 16, false, &mut Vec::new());
-        for (given, found) in given.chunks(16).zip(found.chunks(16)) {
-            let given = DMatrix::from_fn(16, 1, |i, _| f64::from(given[i]) - mean[i]);
-            let expected = &whitening * given;
-            for (expected, found) in expected.iter().zip(found) {
-                assert!(
-                    (expected - f64::from(*found)).abs() < 1e-4,
-                    "{expected} {found}"
-                );
+        };
+        let (mut background, mut room) = (Background::default(), Room::default());
+        for (first, last, mean) in [(0, 3, 1.0), (3, 4, 2.0), (4, 6, 4.0)] {
+            let vectors: Vec<f32> = (first..last).flat_map(|i| [i as f32; 16]).collect();
+            background.renew(&vectors, &params, &mut room);
+            assert_eq!(background.samples.len(), 3);
+            assert!(
+                background
+                    .mean()
+                    .iter()
+                    .all(|value| (value - mean).abs() < 1e-5)
+            );
+            let mut samples = Vec::new();
+            background.append_samples(&mut samples);
+            for (sample, off) in samples.chunks(16).zip([-1.0, 0.0, 1.0]) {
+                assert!(sample.iter().all(|value| (value - off).abs() < 1e-5));
             }
         }
-    }
-
-    #[test]
-    fn without_samples_nothing_changes_but_the_length() {
-        let mut found = vectors(2, 3);
-        Metric::default().apply(&mut found, 16, false, &mut Vec::new());
-        assert_eq!(found, vectors(2, 3));
-        Metric::default().apply(&mut found, 16, true, &mut Vec::new());
-        let length: f32 = found[..16].iter().map(|value| value * value).sum();
-        assert!((length - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn equal_samples_make_a_finite_metric() {
-        let params = params();
-        let mut background = Background::default();
-        background.renew(&[0.25; 9 * 16], &params);
-        let mut found = vectors(2, 3);
-        background
-            .metric
-            .apply(&mut found, 16, true, &mut Vec::new());
-        assert!(found.iter().all(|value| value.is_finite()));
     }
 }

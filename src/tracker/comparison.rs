@@ -5,8 +5,13 @@
 
 use std::cell::RefCell;
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::bag::Bag;
+use super::camera::Camera;
+use super::cells::Cells;
 use super::discriminant::Discriminant;
+use super::examples::Examples;
 use super::gradients::GradientSums;
 use super::motion::{Particle, Reach};
 use super::patch::PatchCutter;
@@ -14,7 +19,7 @@ use super::score::Evidence;
 use super::search::Sought;
 use super::solitary::Solitary;
 use super::state::State;
-use super::{Evaluation, Features, GrayFrame, Params, Rect, likelihood};
+use super::{Evaluation, Features, GrayFrame, Params, Rect, kernel, learning, likelihood, matrix};
 
 /// How much larger than the last answer the areas of a frame may be: scales change by a few hundredths a frame.
 const LARGER: f64 = 1.15;
@@ -24,6 +29,8 @@ const LARGER: f64 = 1.15;
 pub(super) struct View {
     cutter: PatchCutter,
     gradients: GradientSums,
+    cells: Cells,
+    exact: Vec<f64>,
 }
 
 impl View {
@@ -60,18 +67,20 @@ impl View {
         out.resize(before + particles.len() * len, 0.0);
         match params.features {
             Features::Gray => {
-                let mut exact = vec![0.0; particles.len() * len];
+                let mut exact = std::mem::take(&mut self.exact);
+                exact.resize(particles.len() * len, 0.0);
                 self.cut(frame, particles, reach, params, &mut exact);
                 for (value, exact) in out[before..].iter_mut().zip(&exact) {
                     *value = *exact as f32;
                 }
+                self.exact = exact;
             }
             Features::Gradients => {
-                let vectors = out[before..].chunks_exact_mut(len);
-                for (particle, vector) in particles.iter().zip(vectors) {
-                    let area = seen(particle, reach, params);
-                    self.gradients.features(&area, params, vector);
-                }
+                let areas = particles
+                    .iter()
+                    .map(|particle| seen(particle, reach, params));
+                self.cells
+                    .describe(&self.gradients, areas, params, &mut out[before..]);
             }
         }
     }
@@ -104,6 +113,39 @@ fn seen(particle: &Particle, reach: &Reach, params: &Params) -> Rect {
     )
 }
 
+/// P at most.
+const GREATEST_HISTORY: usize = 10;
+
+/// What is taken off all vectors: where candidates stand alone, the mean of the background.
+fn offset(state: &State) -> &[f32] {
+    if state.params.candidate_alone {
+        state.background.mean()
+    } else {
+        &[]
+    }
+}
+
+/// Takes the mean off vectors and appends their squared lengths; to be compiled for the instructions that this machine
+/// has.
+struct Center<'a> {
+    vectors: &'a mut [f32],
+    mean: &'a [f32],
+    len: usize,
+    squares: &'a mut Vec<f32>,
+}
+
+impl WithSimd for Center<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for vector in self.vectors.chunks_exact_mut(self.len) {
+            matrix::add(vector, -1.0, self.mean);
+            self.squares.push(matrix::dot(vector, vector));
+        }
+    }
+}
+
 /// Whether candidates go into the printed evaluation as they are cut: no other vector is made of them.
 fn is_printed(params: &Params) -> bool {
     params.features == Features::Gray
@@ -118,18 +160,29 @@ fn is_printed(params: &Params) -> bool {
 pub(super) struct Comparison {
     pub view: View,
     pub particles: Vec<Particle>,
-    /// What the discriminant sees at each particle.
-    pub prepared: Vec<f32>,
-    scores: Vec<f32>,
+    /// For sums of weights.
+    pub sums: Vec<f64>,
+    /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
     vectors: Vec<f32>,
-    room: Vec<f32>,
+    /// Where the first of them begins.
+    first: usize,
+    /// Their squared lengths.
+    squares: Vec<f32>,
+    /// What the discriminant sees of them.
+    pub examples: Examples,
     solitary: Solitary,
+    whitened: Vec<f32>,
+    products: Vec<f32>,
     evaluation: Option<(Params, Evaluation)>,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
     likelihoods: Vec<f64>,
     /// The weights of all particles; they sum to 1.
     pub weights: Vec<f64>,
+    /// For what is learned from a frame.
+    pub learning: learning::Room,
+    /// For the profiles of a frame.
+    pub camera: Camera,
 }
 
 thread_local! {
@@ -145,11 +198,14 @@ impl Comparison {
     /// Forgets the last frame and takes the bag of `state`.
     pub fn begin(&mut self, state: &State) {
         self.particles.clear();
-        self.prepared.clear();
-        self.scores.clear();
+        let most = state.params.particles as usize * state.params.feature_len();
+        self.first = kernel::align(&mut self.vectors, most);
+        self.squares.clear();
         self.distances.clear();
+        let mean = offset(state);
+        self.examples.begin(&state.discriminant, mean);
         if state.params.candidate_alone {
-            self.solitary.set_bag(&state.bag, &state.params);
+            self.solitary.set_state(state, self.examples.asks());
             return;
         }
         let seed = state.params.seed;
@@ -172,69 +228,100 @@ impl Comparison {
         }
     }
 
+    /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
+    pub fn vectors(&self) -> &[f32] {
+        &self.vectors[self.first..]
+    }
+
     /// Looks at the particles from `first` on, and computes their distances and scores.
     pub fn extend(&mut self, frame: &GrayFrame, first: usize, state: &State) {
-        let (params, len) = (&state.params, state.params.feature_len());
-        if let (true, Some((_, evaluation))) = (is_printed(params), &mut self.evaluation) {
-            let history: Vec<&[f32]> = state.history.iter().map(Vec::as_slice).collect();
-            let count = self.particles.len() - first;
-            let candidates = &mut evaluation.candidates_mut()[..count * len];
-            let particles = &self.particles[first..];
-            self.view
-                .cut(frame, particles, &state.reach, params, candidates);
-            evaluation.compute_distances(&history);
-            for index in 0..count {
-                self.distances
-                    .extend_from_slice(evaluation.distances(index));
+        let params = &state.params;
+        if is_printed(params) {
+            self.extend_printed(frame, first, state);
+            return;
+        }
+        let before = self.vectors.len();
+        let particles = &self.particles[first..];
+        self.view
+            .features(frame, particles, &state.reach, params, &mut self.vectors);
+        let vectors = &mut self.vectors[before..];
+        Arch::new().dispatch(Center {
+            vectors,
+            mean: offset(state),
+            len: params.feature_len(),
+            squares: &mut self.squares,
+        });
+        let vectors = &self.vectors[before..];
+        let squares = &self.squares[first..];
+        if params.candidate_alone {
+            self.solitary
+                .distances(vectors, squares, params, &mut self.distances);
+            if state.discriminant.is_on() {
+                let asked = self.solitary.asked(squares.len());
+                self.examples.examine(asked, squares);
             }
             return;
         }
-        self.vectors.clear();
-        self.view.features(
-            frame,
-            &self.particles[first..],
-            &state.reach,
-            params,
-            &mut self.vectors,
-        );
         if state.discriminant.is_on() {
-            let before = self.prepared.len();
-            self.prepared.extend_from_slice(&self.vectors);
-            let prepared = &mut self.prepared[before..];
-            state.discriminant.prepare(prepared);
-            let scores = prepared.chunks_exact(len);
-            self.scores
-                .extend(scores.map(|vector| state.discriminant.score(vector)));
+            self.examples.examine_alone(vectors);
         }
-        let metric = state.background.metric();
-        metric.apply(&mut self.vectors, len, params.unit_length, &mut self.room);
-        if params.candidate_alone {
-            self.solitary
-                .distances(&self.vectors, params, &mut self.distances);
-        } else if let Some((_, evaluation)) = &mut self.evaluation {
-            let count = self.vectors.len() / len;
-            for (index, vector) in self.vectors.chunks_exact(len).enumerate() {
-                let candidate = evaluation.candidate_mut(index);
-                for (to, from) in candidate.iter_mut().zip(vector) {
-                    *to = f64::from(*from);
-                }
+        self.extend_whitened(before, state);
+    }
+
+    /// Compares particles as the paper does, without any other vector than the one cut out.
+    fn extend_printed(&mut self, frame: &GrayFrame, first: usize, state: &State) {
+        let Some((params, evaluation)) = &mut self.evaluation else {
+            return;
+        };
+        let count = self.particles.len() - first;
+        let candidates = &mut evaluation.candidates_mut()[..count * params.feature_len()];
+        let particles = &self.particles[first..];
+        self.view
+            .cut(frame, particles, &state.reach, params, candidates);
+        let mut history = [&[][..]; GREATEST_HISTORY];
+        for (slice, vector) in history.iter_mut().zip(&state.history) {
+            *slice = vector;
+        }
+        evaluation.compute_distances(&history[..state.history.len()]);
+        for index in 0..count {
+            self.distances
+                .extend_from_slice(evaluation.distances(index));
+        }
+    }
+
+    /// Compares the vectors from `before` on, and the history, whitened.
+    fn extend_whitened(&mut self, before: usize, state: &State) {
+        let Some((_, evaluation)) = &mut self.evaluation else {
+            return;
+        };
+        let (params, len) = (&state.params, state.params.feature_len());
+        let whitening = state.background.whitening();
+        let unit_length = params.unit_length;
+        self.whitened.clear();
+        self.whitened.extend_from_slice(&self.vectors[before..]);
+        whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
+        let count = self.whitened.len() / len;
+        for (index, vector) in self.whitened.chunks_exact(len).enumerate() {
+            let candidate = evaluation.candidate_mut(index);
+            for (to, from) in candidate.iter_mut().zip(vector) {
+                *to = f64::from(*from);
             }
-            // Candidates are diagonalised side by side: what another frame left there would change the last bits.
-            for index in count..params.particles as usize {
-                evaluation.candidate_mut(index).fill(0.0);
-            }
-            let mut history = state
-                .history
-                .iter()
-                .flatten()
-                .copied()
-                .collect::<Vec<f32>>();
-            metric.apply(&mut history, len, params.unit_length, &mut self.room);
-            evaluation.compute_distances(&history.chunks_exact(len).collect::<Vec<_>>());
-            for index in 0..count {
-                self.distances
-                    .extend_from_slice(evaluation.distances(index));
-            }
+        }
+        // Candidates are diagonalised side by side: what another frame left there would change the last bits.
+        for index in count..params.particles as usize {
+            evaluation.candidate_mut(index).fill(0.0);
+        }
+        self.whitened.clear();
+        self.whitened.extend(state.history.iter().flatten());
+        whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
+        let mut history = [&[][..]; GREATEST_HISTORY];
+        for (slice, vector) in history.iter_mut().zip(self.whitened.chunks_exact(len)) {
+            *slice = vector;
+        }
+        evaluation.compute_distances(&history[..state.history.len()]);
+        for index in 0..count {
+            self.distances
+                .extend_from_slice(evaluation.distances(index));
         }
     }
 
@@ -256,12 +343,9 @@ impl Comparison {
         }
         if discriminant.is_on() {
             let factor = params.discriminant_weight;
-            let most = self
-                .scores
-                .iter()
-                .copied()
-                .fold(f32::NEG_INFINITY, f32::max);
-            for (weight, score) in self.weights.iter_mut().zip(&self.scores) {
+            let scores = self.examples.scores();
+            let most = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            for (weight, score) in self.weights.iter_mut().zip(scores) {
                 *weight *= (factor * f64::from(score - most)).exp();
             }
         }
@@ -283,7 +367,7 @@ impl Comparison {
         Evidence {
             first: distances[0],
             nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
-            discriminant: self.scores.get(index).copied(),
+            discriminant: self.examples.scores().get(index).copied(),
             scale: self.particles[index].scale,
         }
     }

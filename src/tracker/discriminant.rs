@@ -8,11 +8,12 @@
 //! w ← argmin  mean (w · uᵢ - yᵢ)² + damping · ‖w - w_before‖²
 //!
 //! so no example is kept, and one frame can change w only so far. A few steps of conjugate gradients do: the damping
-//! makes the problem well conditioned.
+//! makes the problem well conditioned. The unit vectors are never written out ([`examples`](super::examples)).
 
 use serde::{Deserialize, Serialize};
 
 use super::Params;
+use super::examples::Examples;
 use super::matrix;
 use super::motion::{Particle, Reach};
 
@@ -35,6 +36,16 @@ pub(super) struct Discriminant {
     weights: Vec<f32>,
 }
 
+/// Room for a fit.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    /// What the labels are, and then how far the scores are from them.
+    pub labels: Vec<f32>,
+    gradient: Vec<f32>,
+    direction: Vec<f32>,
+    product: Vec<f32>,
+}
+
 impl Discriminant {
     /// A discriminant that knows nothing, for feature vectors around `origin` (of length D).
     pub fn new(origin: Vec<f32>) -> Self {
@@ -49,62 +60,78 @@ impl Discriminant {
         !self.weights.is_empty()
     }
 
-    /// Turns feature vectors into the unit vectors u.
-    pub fn prepare(&self, vectors: &mut [f32]) {
-        for vector in vectors.chunks_exact_mut(self.origin.len().max(1)) {
-            matrix::add(vector, -1.0, &self.origin);
-            matrix::normalize(vector);
-        }
+    /// w.
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
     }
 
-    /// The score of a prepared vector: about 1 on the target and 0 beside it, but not bounded.
-    pub fn score(&self, vector: &[f32]) -> f32 {
-        matrix::dot(vector, &self.weights)
+    /// What is taken from all vectors.
+    pub fn origin(&self) -> &[f32] {
+        &self.origin
     }
 
     /// Learns from the first frame.
-    pub fn begin(&mut self, vectors: &[f32], labels: &[f32], params: &Params) {
+    pub fn begin(
+        &mut self,
+        examples: &Examples,
+        vectors: &[f32],
+        params: &Params,
+        room: &mut Room,
+    ) {
         let damping = params.discriminant_damping * FIRST_DAMPING;
-        self.fit(vectors, labels, damping, FIRST_STEPS);
+        self.fit(examples, vectors, damping, FIRST_STEPS, room);
     }
 
-    /// Learns from a further frame: the prepared vectors of its particles, and their labels.
-    pub fn learn(&mut self, vectors: &[f32], labels: &[f32], params: &Params) {
-        self.fit(vectors, labels, params.discriminant_damping, STEPS);
+    /// Learns from a further frame: the examples that its particles are, their vectors, and the labels in `room`.
+    pub fn learn(
+        &mut self,
+        examples: &Examples,
+        vectors: &[f32],
+        params: &Params,
+        room: &mut Room,
+    ) {
+        self.fit(examples, vectors, params.discriminant_damping, STEPS, room);
     }
 
-    fn fit(&mut self, vectors: &[f32], labels: &[f32], damping: f64, steps: usize) {
-        let len = self.weights.len();
-        let damping = damping as f32 * labels.len() as f32;
-        let rows = || vectors.chunks_exact(len);
-        let residuals: Vec<f32> = rows()
-            .zip(labels)
-            .map(|(vector, label)| label - self.score(vector))
-            .collect();
-        // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
-        let mut gradient = vec![0.0; len];
-        for (vector, residual) in rows().zip(&residuals) {
-            matrix::add(&mut gradient, *residual, vector);
+    fn fit(
+        &mut self,
+        examples: &Examples,
+        vectors: &[f32],
+        damping: f64,
+        steps: usize,
+        room: &mut Room,
+    ) {
+        let Room {
+            labels: residuals,
+            gradient,
+            direction,
+            product,
+        } = room;
+        let damping = damping as f32 * residuals.len() as f32;
+        for (residual, score) in residuals.iter_mut().zip(examples.scores()) {
+            *residual -= score;
         }
-        let mut direction = gradient.clone();
-        let mut product = vec![0.0; len];
-        let mut squared = matrix::dot(&gradient, &gradient);
+        // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
+        gradient.clear();
+        gradient.resize(self.weights.len(), 0.0);
+        examples.add_sum(vectors, residuals, gradient);
+        direction.clone_from(gradient);
+        product.resize(gradient.len(), 0.0);
+        let mut squared = matrix::dot(gradient, gradient);
         let enough = (squared * 1e-10).max(NOTHING);
         for _ in 0..steps {
             if squared <= enough {
                 break;
             }
             product.fill(0.0);
-            matrix::add(&mut product, damping, &direction);
-            for vector in rows() {
-                matrix::add(&mut product, matrix::dot(vector, &direction), vector);
-            }
-            let step = squared / matrix::dot(&direction, &product);
-            matrix::add(&mut self.weights, step, &direction);
-            matrix::add(&mut gradient, -step, &product);
+            matrix::add(product, damping, direction);
+            examples.add_products(vectors, direction, product);
+            let step = squared / matrix::dot(direction, product);
+            matrix::add(&mut self.weights, step, direction);
+            matrix::add(gradient, -step, product);
             let before = squared;
-            squared = matrix::dot(&gradient, &gradient);
-            for (direction, gradient) in direction.iter_mut().zip(&gradient) {
+            squared = matrix::dot(gradient, gradient);
+            for (direction, gradient) in direction.iter_mut().zip(gradient.iter()) {
                 *direction = gradient + squared / before * *direction;
             }
         }
@@ -142,27 +169,44 @@ mod tests {
 
     #[test]
     fn a_fit_is_the_solution_of_the_normal_equations() {
-        let (len, count) = (6, 15);
+        // More vectors than a group of them, and a length that is not a whole number of registers.
+        let (len, count) = (21, 35);
         let number = |i: usize| ((i * i * 37 + i * 7919) % 1000) as f32 / 500.0 - 1.0;
-        let mut discriminant = Discriminant::new(vec![0.1; len]);
+        let mut discriminant = Discriminant::new((0..len).map(|i| number(i + 77)).collect());
         discriminant.weights = (0..len).map(number).collect();
         let before = discriminant.weights.clone();
-        let mut vectors: Vec<f32> = (0..count * len).map(number).collect();
-        discriminant.prepare(&mut vectors);
+        let vectors: Vec<f32> = (0..count * len).map(number).collect();
         let labels: Vec<f32> = (0..count).map(|i| number(i + 500)).collect();
-        discriminant.fit(&vectors, &labels, 0.2, 50);
+        for mean in [0.0, 0.3] {
+            discriminant.weights.clone_from(&before);
+            let shifted: Vec<f32> = vectors.iter().map(|value| value - mean).collect();
+            let mut examples = Examples::default();
+            examples.begin(&discriminant, &vec![mean; len]);
+            examples.examine_alone(&shifted);
+            let mut room = Room {
+                labels: labels.clone(),
+                ..Room::default()
+            };
+            discriminant.fit(&examples, &shifted, 0.2, 60, &mut room);
 
-        let u = DMatrix::from_row_slice(count, len, &vectors).cast::<f64>();
-        let before = DVector::from_vec(before).cast::<f64>();
-        let residuals = DVector::from_vec(labels).cast::<f64>() - &u * &before;
-        let normal = u.transpose() * &u + DMatrix::identity(len, len) * (0.2 * count as f64);
-        let change = normal.lu().solve(&(u.transpose() * residuals));
-        let expected = before + change.expect("a damped matrix is regular");
-        for (expected, found) in expected.iter().zip(&discriminant.weights) {
-            assert!(
-                (expected - f64::from(*found)).abs() < 1e-4,
-                "{expected} {found}"
-            );
+            let mut u = DMatrix::from_row_slice(count, len, &vectors).cast::<f64>();
+            for mut row in u.row_iter_mut() {
+                for (value, origin) in row.iter_mut().zip(&discriminant.origin) {
+                    *value -= f64::from(*origin);
+                }
+                row.normalize_mut();
+            }
+            let before = DVector::from_vec(before.clone()).cast::<f64>();
+            let residuals = DVector::from_vec(labels.clone()).cast::<f64>() - &u * &before;
+            let normal = u.transpose() * &u + DMatrix::identity(len, len) * (0.2 * count as f64);
+            let change = normal.lu().solve(&(u.transpose() * residuals));
+            let expected = before + change.expect("a damped matrix is regular");
+            for (expected, found) in expected.iter().zip(&discriminant.weights) {
+                assert!(
+                    (expected - f64::from(*found)).abs() < 1e-4,
+                    "{expected} {found}"
+                );
+            }
         }
     }
 
@@ -170,9 +214,15 @@ mod tests {
     fn vectors_whose_squares_underflow_leave_finite_weights() {
         for tiny in [1e-18_f32, 1e-20, 1e-21, 1e-22, 1e-25, 1e-38, 1e-44] {
             let mut discriminant = Discriminant::new(vec![0.0; 4]);
-            // Vectors this short are not brought to length 1.
             let vectors = [tiny, 0.0, 0.0, 0.0, 0.0, tiny, 0.0, 0.0];
-            discriminant.fit(&vectors, &[1.0, 0.5], 1e-4, 25);
+            let mut examples = Examples::default();
+            examples.begin(&discriminant, &[]);
+            examples.examine_alone(&vectors);
+            let mut room = Room {
+                labels: vec![1.0, 0.5],
+                ..Room::default()
+            };
+            discriminant.fit(&examples, &vectors, 1e-4, 25, &mut room);
             let finite = discriminant.weights.iter().all(|weight| weight.is_finite());
             assert!(finite, "{tiny}: {:?}", discriminant.weights);
         }

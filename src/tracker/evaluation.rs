@@ -37,8 +37,8 @@ impl WithSimd for Compute<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.evaluation.compute_all(self.history);
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.evaluation.compute_all(simd, self.history);
     }
 }
 
@@ -117,8 +117,8 @@ impl Evaluation {
     }
 
     #[inline(always)]
-    fn compute_all(&mut self, history: &[&[f32]]) {
-        self.products.compute(history);
+    fn compute_all<S: Simd>(&mut self, simd: S, history: &[&[f32]]) {
+        self.products.compute(simd, history);
         self.bases.compute(&self.products);
         self.distances
             .compute(&self.products, &self.bases, self.candidates, &self.entries);

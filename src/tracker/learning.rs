@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::background::{self, Background};
-use super::bag::{Bag, Entry};
+use super::bag::{self, Bag};
 use super::camera::Camera;
 use super::comparison::Comparison;
 use super::discriminant::{self, Discriminant};
@@ -24,6 +24,16 @@ const FIRST_EXAMPLES: usize = 300;
 const FIRST_EXAMPLE_STDS: [f64; 3] = [0.1, 0.3, 0.8];
 /// The same for the logarithm of their scale, as a share of those.
 const FIRST_EXAMPLE_SCALES: f64 = 0.3;
+
+/// Room for learning.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    areas: Vec<Particle>,
+    features: Vec<f32>,
+    pub background: background::Room,
+    pub bag: bag::Room,
+    fit: discriminant::Room,
+}
 
 /// The answer to a frame whose box came from the user.
 fn given(frame: u64, target: Rect) -> Estimate {
@@ -41,11 +51,6 @@ impl State {
         let source = frame.source_size();
         let (reach, answer) = Self::aim(source, &target);
         let camera = params.camera_shift.then(|| Camera::new(frame));
-        let entry = Entry::new(
-            &vec![0.0; params.feature_len()],
-            &Default::default(),
-            &params,
-        );
         let mut state = Self {
             params,
             source,
@@ -55,7 +60,7 @@ impl State {
             particles: Vec::new(),
             weights: Vec::new(),
             history: VecDeque::new(),
-            bag: Bag::new(entry),
+            bag: Bag::default(),
             background: Background::default(),
             discriminant: Discriminant::default(),
             camera,
@@ -64,8 +69,11 @@ impl State {
             frames_lost: 0,
         };
         state.gather(answer);
-        let features = state.survey(frame, 0, room);
-        state.bag = Bag::new(state.entry_with(&features));
+        state.survey(frame, 0, room);
+        let Room { features, bag, .. } = &mut room.learning;
+        state
+            .bag
+            .admit(features, &state.background, &state.params, bag);
         state.remember(features);
         state
     }
@@ -80,18 +88,19 @@ impl State {
         if let Some(camera) = &mut self.camera {
             *camera = Camera::new(frame);
         }
-        let features = self.survey(frame, number, room);
-        self.bag
-            .rebuild_if_needed(self.background.metric(), &self.params);
+        self.survey(frame, number, room);
+        let Room { features, bag, .. } = &mut room.learning;
+        self.bag.renew(&self.background, &self.params, bag);
         self.history.clear();
         self.trust = Trust::default();
-        self.bag.point(self.entry_with(&features), &self.params);
+        self.bag
+            .point(features, &self.background, &self.params, bag);
         self.remember(features);
         self.estimate = given(number, target);
     }
 
-    /// Learns everything that a box given by the user says about the surroundings; returns the box's features.
-    fn survey(&mut self, frame: &GrayFrame, number: u64, room: &mut Comparison) -> Vec<f32> {
+    /// Learns everything that a box given by the user says about the surroundings, and looks at the box.
+    fn survey(&mut self, frame: &GrayFrame, number: u64, room: &mut Comparison) {
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
         room.view
             .open(frame, &self.answer, everywhere, &self.reach, &self.params);
@@ -101,7 +110,7 @@ impl State {
         if self.params.discriminant_weight > 0.0 {
             self.begin_discriminant(frame, &mut draws, room);
         }
-        self.features_of(frame, &[self.answer], room)
+        self.look_at_answer(frame, room);
     }
 
     /// How far from the answer frame `number` is looked at for the sake of learning, in working pixels.
@@ -125,34 +134,39 @@ impl State {
     /// Learns from frame `number`, in which the target was found at the answer.
     pub fn learn(&mut self, frame: &GrayFrame, number: u64, room: &mut Comparison) {
         if self.discriminant.is_on() {
-            let labels = labels(&room.particles, &self.answer, &self.reach);
+            let mut fit = std::mem::take(&mut room.learning.fit);
+            label_all(&room.particles, &self.answer, &self.reach, &mut fit.labels);
             self.discriminant
-                .learn(&room.prepared, &labels, &self.params);
+                .learn(&room.examples, room.vectors(), &self.params, &mut fit);
+            room.learning.fit = fit;
         }
-        let features = self.features_of(frame, &[self.answer], room);
         let wanted = Background::wanted(number, &self.params);
         if wanted > 0 {
             let mut draws = motion::generator(self.params.seed, number, Draws::Examples);
             self.sample_background(frame, wanted, &mut draws, room);
-            self.bag
-                .rebuild_if_needed(self.background.metric(), &self.params);
+            let bag = &mut room.learning.bag;
+            self.bag.renew(&self.background, &self.params, bag);
         }
+        self.look_at_answer(frame, room);
+        let Room { features, bag, .. } = &mut room.learning;
         if Bag::admits(number, &self.params) {
-            self.bag.admit(self.entry_with(&features), &self.params);
+            // V: the answer and the previous frames (equation 2).
+            for vector in &self.history {
+                features.extend_from_slice(vector);
+            }
+            self.bag
+                .admit(features, &self.background, &self.params, bag);
         }
         self.remember(features);
     }
 
-    fn features_of(
-        &self,
-        frame: &GrayFrame,
-        particles: &[Particle],
-        room: &mut Comparison,
-    ) -> Vec<f32> {
-        let mut features = Vec::new();
+    /// The feature vector of the answer, as the first in the room.
+    fn look_at_answer(&self, frame: &GrayFrame, room: &mut Comparison) {
+        let features = &mut room.learning.features;
+        features.clear();
+        let answer = [self.answer];
         room.view
-            .features(frame, particles, &self.reach, &self.params, &mut features);
-        features
+            .features(frame, &answer, &self.reach, &self.params, features);
     }
 
     fn sample_background(
@@ -165,9 +179,17 @@ impl State {
         if count == 0 {
             return;
         }
-        let areas = background::areas(&self.answer, &self.reach, count, draws);
-        let vectors = self.features_of(frame, &areas, room);
-        self.background.renew(&vectors, &self.params);
+        let Room {
+            areas,
+            features,
+            background,
+            ..
+        } = &mut room.learning;
+        background::areas(&self.answer, &self.reach, count, draws, areas);
+        features.clear();
+        room.view
+            .features(frame, areas, &self.reach, &self.params, features);
+        self.background.renew(features, &self.params, background);
     }
 
     fn begin_discriminant(
@@ -176,32 +198,45 @@ impl State {
         draws: &mut ChaCha8Rng,
         room: &mut Comparison,
     ) {
-        let particles = first_examples(&self.answer, &self.reach, draws);
-        let mut vectors = self.features_of(frame, &particles, room);
         if !self.discriminant.is_on() {
-            let len = self.params.feature_len();
-            let mean = self.background.metric().mean();
-            self.discriminant = Discriminant::new(if mean.is_empty() {
-                vec![0.0; len]
-            } else {
-                mean.to_vec()
-            });
+            let mut origin = self.background.mean().to_vec();
+            origin.resize(self.params.feature_len(), 0.0);
+            self.discriminant = Discriminant::new(origin);
         }
-        self.discriminant.prepare(&mut vectors);
-        let labels = labels(&particles, &self.answer, &self.reach);
-        self.discriminant.begin(&vectors, &labels, &self.params);
+        let Room {
+            areas,
+            features,
+            fit,
+            ..
+        } = &mut room.learning;
+        first_examples(&self.answer, &self.reach, draws, areas);
+        features.clear();
+        room.view
+            .features(frame, areas, &self.reach, &self.params, features);
+        room.examples.begin(&self.discriminant, &[]);
+        room.examples.examine_alone(features);
+        label_all(areas, &self.answer, &self.reach, &mut fit.labels);
+        self.discriminant
+            .begin(&room.examples, features, &self.params, fit);
     }
 }
 
-fn labels(particles: &[Particle], target: &Particle, reach: &Reach) -> Vec<f32> {
+fn label_all(particles: &[Particle], target: &Particle, reach: &Reach, out: &mut Vec<f32>) {
     let label = |particle| discriminant::label(particle, target, reach);
-    particles.iter().map(label).collect()
+    out.clear();
+    out.extend(particles.iter().map(label));
 }
 
 /// The target itself, and areas around it.
-fn first_examples(target: &Particle, reach: &Reach, draws: &mut ChaCha8Rng) -> Vec<Particle> {
+fn first_examples(
+    target: &Particle,
+    reach: &Reach,
+    draws: &mut ChaCha8Rng,
+    particles: &mut Vec<Particle>,
+) {
     let mut normal = || -> f64 { StandardNormal.sample(draws) };
-    let mut particles = vec![*target];
+    particles.clear();
+    particles.push(*target);
     for std in FIRST_EXAMPLE_STDS.iter().cycle().take(FIRST_EXAMPLES) {
         particles.push(reach.hold(Particle {
             x: target.x + std * reach.box_width * target.scale * normal(),
@@ -209,5 +244,4 @@ fn first_examples(target: &Particle, reach: &Reach, draws: &mut ChaCha8Rng) -> V
             scale: target.scale * (FIRST_EXAMPLE_SCALES * std * normal()).exp(),
         }));
     }
-    particles
 }

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A feature vector in a byte a value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Look {
     /// What one step of a value is worth.
     scale: f32,
@@ -14,28 +14,30 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// Keeps `features`.
-    pub fn new(features: &[f32]) -> Self {
+    /// Keeps `features` in place of what it kept.
+    pub fn keep(&mut self, features: &[f32]) {
         let greatest = features
             .iter()
             .fold(0.0_f32, |most, value| most.max(value.abs()));
-        let scale = greatest / 127.0;
-        let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
+        self.scale = greatest / 127.0;
+        let inverse = if self.scale > 0.0 {
+            1.0 / self.scale
+        } else {
+            0.0
+        };
         // A float that is too large for the type becomes its greatest value.
         let values = features.iter().map(|value| (value * inverse).round() as i8);
-        Self {
-            scale,
-            values: values.collect(),
-        }
+        self.values.clear();
+        self.values.extend(values);
     }
 
-    /// Appends the features to `out`.
-    pub fn append_to(&self, out: &mut Vec<f32>) {
-        out.extend(
-            self.values
-                .iter()
-                .map(|&value| f32::from(value) * self.scale),
-        );
+    /// Adds the features, times `factor`, to `target`.
+    #[inline(always)]
+    pub fn add_to(&self, target: &mut [f32], factor: f32) {
+        let factor = factor * self.scale;
+        for (target, &value) in target.iter_mut().zip(&self.values) {
+            *target += factor * f32::from(value);
+        }
     }
 
     /// Whether this may be a feature vector of length `len` with no value over `greatest`.
@@ -51,13 +53,16 @@ mod tests {
     #[test]
     fn a_look_comes_back_within_half_a_step() {
         let features: Vec<f32> = (0..100).map(|i| (i as f32 * 0.7).sin() * 0.3).collect();
-        let mut back = Vec::new();
-        Look::new(&features).append_to(&mut back);
+        let mut look = Look::default();
+        look.keep(&features);
+        let mut back = vec![0.0; 100];
+        look.add_to(&mut back, 1.0);
         for (value, back) in features.iter().zip(&back) {
             assert!((value - back).abs() <= 0.3 / 254.0 + 1e-6);
         }
-        let mut zeros = Vec::new();
-        Look::new(&[0.0; 3]).append_to(&mut zeros);
+        look.keep(&[0.0; 3]);
+        let mut zeros = vec![0.0; 3];
+        look.add_to(&mut zeros, 1.0);
         assert_eq!(zeros, [0.0; 3]);
     }
 }

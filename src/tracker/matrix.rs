@@ -1,53 +1,147 @@
-//! Products of matrices that are kept as slices, one vector after the other, by way of nalgebra's fast kernel.
+//! Combinations, inner products and lengths of vectors that are kept as slices, one after the other.
+//!
+//! All of it is inlined: it becomes vector instructions where what calls it is compiled for them.
 
-use nalgebra::{DMatrixView, DMatrixViewMut, Dyn, MatrixView};
+use pulp::{Arch, Simd, WithSimd};
 
-/// Below this number of rows or columns nalgebra 0.35 takes another way, which reads past the end of a matrix whose
-/// rows are contiguous.
-const LEAST_SIDE: usize = 8;
+/// Targets whose sums are in registers at a time, two registers of each.
+const TILE: usize = 4;
 
-/// `count` vectors of length `len` as the rows of a matrix.
-fn rows(vectors: &[f32], count: usize, len: usize) -> MatrixView<'_, f32, Dyn, Dyn, Dyn, Dyn> {
-    MatrixView::from_slice_with_strides_generic(vectors, Dyn(count), Dyn(len), Dyn(len), Dyn(1))
+/// [`add_combinations`], to be compiled for the instructions that this machine has.
+struct AddCombinations<'a> {
+    targets: &'a mut [f32],
+    factor: f32,
+    coefficients: &'a [f32],
+    vectors: &'a [f32],
+    len: usize,
 }
 
-/// The inner products of each of the vectors `a` with each of the vectors `b`, all of length `len`: for each `a` those
-/// with every `b`.
-pub(super) fn inner_products(a: &[f32], b: &[f32], len: usize, out: &mut Vec<f32>) {
-    let (count_a, count_b) = (a.len() / len, b.len() / len);
-    out.resize(count_a * count_b, 0.0);
-    if count_a.min(count_b).min(len) < LEAST_SIDE {
-        let pairs = a
-            .chunks_exact(len)
-            .flat_map(|a| b.chunks_exact(len).map(move |b| (a, b)));
-        for (out, (a, b)) in out.iter_mut().zip(pairs) {
-            *out = dot(a, b);
-        }
-        return;
+impl WithSimd for AddCombinations<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            targets,
+            factor,
+            coefficients,
+            vectors,
+            len,
+        } = self;
+        combine(simd, targets, factor, coefficients, vectors, len);
     }
-    let b = rows(b, count_b, len);
-    let a = DMatrixView::from_slice(a, len, count_a);
-    DMatrixViewMut::from_slice(out, count_b, count_a).gemm(1.0, &b, &a, 0.0);
 }
 
-/// Adds to each of `targets` the combination of the vectors `b` that its row of `coefficients` says, times `factor`.
+/// Adds to each of `targets` the combination of `vectors` that its row of `coefficients` says, times `factor`.
+/// All vectors are of length `len`.
 pub(super) fn add_combinations(
     targets: &mut [f32],
     factor: f32,
     coefficients: &[f32],
-    b: &[f32],
+    vectors: &[f32],
     len: usize,
 ) {
-    let (count, count_b) = (targets.len() / len, b.len() / len);
-    if count == 0 || count_b == 0 {
+    Arch::new().dispatch(AddCombinations {
+        targets,
+        factor,
+        coefficients,
+        vectors,
+        len,
+    });
+}
+
+/// As [`add_combinations`], within what is compiled for this machine's instructions.
+#[inline(always)]
+pub(super) fn combine<S: Simd>(
+    simd: S,
+    targets: &mut [f32],
+    factor: f32,
+    coefficients: &[f32],
+    vectors: &[f32],
+    len: usize,
+) {
+    let (count, terms) = (targets.len() / len, vectors.len() / len);
+    if terms == 0 {
         return;
     }
-    let b = DMatrixView::from_slice(b, len, count_b);
-    let coefficients = DMatrixView::from_slice(coefficients, count_b, count);
-    DMatrixViewMut::from_slice(targets, len, count).gemm(factor, &b, &coefficients, 1.0);
+    let columns = 2 * S::F32_LANES;
+    let whole = len - len % columns;
+    let scale = simd.splat_f32s(factor);
+    for column in (0..whole).step_by(columns) {
+        for first in (0..count).step_by(TILE) {
+            let mut rows = [&coefficients[..0]; TILE];
+            for (p, row) in rows.iter_mut().enumerate() {
+                // A tile at the end has the last target more than once.
+                *row = &coefficients[(first + p).min(count - 1) * terms..][..terms];
+            }
+            let sums = tile(simd, rows, &vectors[column..], len);
+            for (p, sums) in sums.iter().enumerate().take(count - first) {
+                let target = &mut targets[(first + p) * len + column..][..columns];
+                let (target, _) = S::as_mut_simd_f32s(target);
+                for (target, sum) in target.iter_mut().zip(sums) {
+                    *target = simd.mul_add_e_f32s(*sum, scale, *target);
+                }
+            }
+        }
+    }
+    if whole < len {
+        let rows = coefficients.chunks_exact(terms);
+        for (target, row) in targets.chunks_exact_mut(len).zip(rows) {
+            for (vector, &coefficient) in vectors.chunks_exact(len).zip(row) {
+                add(&mut target[whole..], factor * coefficient, &vector[whole..]);
+            }
+        }
+    }
+}
+
+/// The combinations that `rows` say of the first two registers of each of `vectors`.
+#[inline(always)]
+fn tile<S: Simd>(
+    simd: S,
+    rows: [&[f32]; TILE],
+    vectors: &[f32],
+    len: usize,
+) -> [[S::f32s; 2]; TILE] {
+    let mut sums = [[simd.splat_f32s(0.0); 2]; TILE];
+    for (k, _) in rows[0].iter().enumerate() {
+        let (vector, _) = S::as_simd_f32s(&vectors[k * len..][..2 * S::F32_LANES]);
+        for p in 0..TILE {
+            let coefficient = simd.splat_f32s(rows[p][k]);
+            sums[p][0] = simd.mul_add_e_f32s(coefficient, vector[0], sums[p][0]);
+            sums[p][1] = simd.mul_add_e_f32s(coefficient, vector[1], sums[p][1]);
+        }
+    }
+    sums
+}
+
+/// Adds the sum of `vectors`, each times its factor, to `sum`; all of one length.
+#[inline(always)]
+pub(super) fn add_all<S: Simd, const N: usize>(
+    simd: S,
+    sum: &mut [f32],
+    factors: [f32; N],
+    vectors: [&[f32]; N],
+) {
+    let (lanes, rest) = S::as_mut_simd_f32s(sum);
+    let (count, whole) = (lanes.len(), lanes.len() * S::F32_LANES);
+    let mut splats = [simd.splat_f32s(0.0); N];
+    let mut rows = [S::as_simd_f32s(vectors[0]).0; N];
+    for i in 0..N {
+        splats[i] = simd.splat_f32s(factors[i]);
+        rows[i] = &S::as_simd_f32s(vectors[i]).0[..count];
+        add(rest, factors[i], &vectors[i][whole..]);
+    }
+    for (k, sum) in lanes.iter_mut().enumerate() {
+        let mut total = *sum;
+        for i in 0..N {
+            total = simd.mul_add_e_f32s(splats[i], rows[i][k], total);
+        }
+        *sum = total;
+    }
 }
 
 /// The inner product, summed in sixteen parts so that the loop vectorises.
+#[inline(always)]
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut parts = [0.0_f32; 16];
     let (a_chunks, a_rest) = a.as_chunks::<16>();
@@ -62,6 +156,7 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
 }
 
 /// `target += factor * vector`.
+#[inline(always)]
 pub(super) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
     for (target, value) in target.iter_mut().zip(vector) {
         *target += factor * value;
@@ -69,6 +164,7 @@ pub(super) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
 }
 
 /// Brings a vector to length 1; a vector of zeros stays.
+#[inline(always)]
 pub(super) fn normalize(vector: &mut [f32]) {
     let length = dot(vector, vector).sqrt();
     if length > 1e-9 {
@@ -87,26 +183,22 @@ mod tests {
     }
 
     #[test]
-    fn products_are_those_of_loops() {
-        for (count_a, count_b, len) in [(1, 1, 5), (3, 2, 17), (40, 21, 64)] {
-            let (a, b) = (numbers(count_a * len, 1), numbers(count_b * len, 2));
-            let mut out = Vec::new();
-            inner_products(&a, &b, len, &mut out);
-            let mut sums = a.clone();
-            add_combinations(&mut sums, -0.5, &out, &b, len);
-            for i in 0..count_a {
-                for j in 0..count_b {
-                    let (a, b) = (&a[i * len..][..len], &b[j * len..][..len]);
-                    let plain: f32 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-                    assert!((out[i * count_b + j] - plain).abs() < 1e-4);
-                    assert!((dot(a, b) - plain).abs() < 1e-4);
-                }
+    fn combinations_and_products_are_those_of_loops() {
+        for (count, terms, len) in [(1, 1, 5), (3, 2, 32), (7, 9, 71), (40, 21, 64), (2, 0, 33)] {
+            let (given, vectors) = (numbers(count * len, 1), numbers(terms * len, 2));
+            let coefficients = numbers(count * terms, 3);
+            let mut sums = given.clone();
+            add_combinations(&mut sums, -0.5, &coefficients, &vectors, len);
+            for i in 0..count {
                 for d in 0..len {
-                    let combination = |j: usize| out[i * count_b + j] * b[j * len + d];
-                    let sum: f32 = (0..count_b).map(combination).sum();
-                    assert!((sums[i * len + d] - a[i * len + d] + 0.5 * sum).abs() < 1e-3);
+                    let term = |j: usize| coefficients[i * terms + j] * vectors[j * len + d];
+                    let sum: f32 = (0..terms).map(term).sum();
+                    assert!((sums[i * len + d] - given[i * len + d] + 0.5 * sum).abs() < 1e-4);
                 }
             }
+            let (a, b) = (numbers(len, 4), numbers(len, 5));
+            let plain: f32 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
+            assert!((dot(&a, &b) - plain).abs() < 1e-4);
         }
     }
 }

@@ -45,18 +45,23 @@ mod background;
 mod bag;
 mod camera;
 mod candidate;
+mod cells;
+mod combination;
 mod comparison;
 mod discriminant;
 mod distance;
 mod downscale;
 mod eigen;
 mod evaluation;
+mod examples;
 mod frame;
 mod gradients;
+mod kernel;
 mod learning;
 mod likelihood;
 mod look;
 mod matrix;
+mod metric;
 mod motion;
 mod params;
 mod patch;
@@ -71,6 +76,7 @@ mod solitary;
 mod state;
 mod subspace;
 mod trust;
+mod whitening;
 
 pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
@@ -181,7 +187,7 @@ impl Tracker {
         let camera = state.camera.as_mut();
         let sought = Sought {
             last: state.answer,
-            shift: camera.map_or((0.0, 0.0), |camera| camera.shift(frame)),
+            shift: camera.map_or((0.0, 0.0), |camera| camera.shift(frame, &mut room.camera)),
             widening,
             params: &state.params,
             reach: &state.reach,
@@ -190,7 +196,9 @@ impl Tracker {
         // (A) Where it may be.
         room.begin(state);
         match state.params.search {
-            Search::Resampled => motion::propose(state, &mut draws, &mut room.particles),
+            Search::Resampled => {
+                motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
+            }
             Search::Answer => sought.propose(&mut draws, &mut room.particles),
         }
 

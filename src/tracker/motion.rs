@@ -97,10 +97,15 @@ pub(super) fn generator(seed: u64, frame: u64, draws: Draws) -> ChaCha8Rng {
     generator
 }
 
-/// Draws the next particles of `state` into `out`: multinomial resampling by weight, then Brownian motion.
-pub(super) fn propose(state: &State, generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
+/// Draws the next particles of `state` into `out`: multinomial resampling by weight, then Brownian motion. `sums` is room.
+pub(super) fn propose(
+    state: &State,
+    generator: &mut ChaCha8Rng,
+    sums: &mut Vec<f64>,
+    out: &mut Vec<Particle>,
+) {
     let cloud = (&state.particles[..], &state.weights[..]);
-    resample(cloud, &state.params, &state.reach, generator, out);
+    resample(cloud, &state.params, &state.reach, generator, sums, out);
 }
 
 /// As [`propose`], of particles and their weights (which are at least 0 and sum to 1).
@@ -109,21 +114,20 @@ fn resample(
     params: &Params,
     reach: &Reach,
     generator: &mut ChaCha8Rng,
+    sums: &mut Vec<f64>,
     out: &mut Vec<Particle>,
 ) {
     let mut total = 0.0;
-    let cumulative: Vec<f64> = weights
-        .iter()
-        .map(|weight| {
-            total += weight;
-            total
-        })
-        .collect();
+    sums.clear();
+    sums.extend(weights.iter().map(|weight| {
+        total += weight;
+        total
+    }));
     out.clear();
     for _ in 0..params.first_particles() {
         let draw = generator.random::<f64>() * total;
         // Rounding can put the draw at the very end.
-        let chosen = cumulative
+        let chosen = sums
             .partition_point(|&sum| sum <= draw)
             .min(previous.len() - 1);
         let mut step = |std: f64| -> f64 {
@@ -165,7 +169,7 @@ mod tests {
         let previous = [particle(60.0), particle(160.0), particle(260.0)];
         let cloud = (&previous[..], &[0.7, 0.0, 0.3][..]);
         let mut draws = generator(params.seed, frame, Draws::Particles);
-        resample(cloud, params, &REACH, &mut draws, &mut out);
+        resample(cloud, params, &REACH, &mut draws, &mut Vec::new(), &mut out);
         out
     }
 

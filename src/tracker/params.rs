@@ -142,7 +142,7 @@ impl Params {
         let cells = self.patch_width as usize * self.patch_height as usize;
         match self.features {
             Features::Gray => cells,
-            Features::Gradients => cells * super::gradients::CHANNELS,
+            Features::Gradients => cells * super::cells::CHANNELS,
         }
     }
 
@@ -161,6 +161,11 @@ impl Params {
             Search::Resampled => self.particles as usize,
             Search::Answer => 0,
         }
+    }
+
+    /// Whether the vectors that a subspace of the bag was made of are kept with it.
+    pub(super) fn keeps_looks(&self) -> bool {
+        self.background_samples > 0 || self.candidate_alone
     }
 
     /// How many of the particles are drawn first; the others are drawn around the best of these.

@@ -8,14 +8,11 @@
 //! The hazard is cancellation: candidate and history are nearly the same vector, and what matters is the
 //! difference. In single precision it would be gone, so everything is in double precision.
 
-use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
+use pulp::Simd;
 
-use super::Params;
 use super::eigen::Spectrum;
 use super::subspace::{self, AffineSubspace};
-
-/// nalgebra hands a product to the fast kernel from six rows and columns on; zeros fill up.
-const LEAST_SIDE: usize = 8;
+use super::{Params, kernel};
 
 /// The inner products of (candidates, Q, the sum of H) with (Q, the sum of H, the bag).
 #[derive(Debug, Clone, Default)]
@@ -26,9 +23,12 @@ pub(super) struct Products {
     stride: usize,
     /// The candidates, then Q (P slots, zero where there is no direction), then the sum of H: one vector a row.
     left: Vec<f64>,
+    /// Where the first of them begins.
+    left_first: usize,
     /// Q, the sum of H, the means of the bag's entries, their first basis vectors, their second and so on: one vector a
     /// column.
     right: Vec<f64>,
+    right_first: usize,
     /// For each vector of `left` its products with those of `right`.
     out: Vec<f64>,
     /// The number of vectors of `right`.
@@ -47,69 +47,59 @@ impl Products {
         self.candidates = params.particles as usize;
         self.slots = params.history as usize;
         self.stride = params.basis_dim as usize + 1;
-        let rows = (self.candidates + self.slots + 1).max(LEAST_SIDE);
-        self.left.resize(rows * self.len, 0.0);
+        let rows = self.candidates + self.slots + 1;
+        self.left_first = kernel::align(&mut self.left, rows * self.len);
+        self.left.resize(self.left_first + rows * self.len, 0.0);
         self.norms.resize(self.candidates, 0.0);
         self.history_eigenvalues.resize(self.slots, 0.0);
     }
 
     /// The feature vector of candidate `index`, to be filled in.
     pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
-        &mut self.left[index * self.len..(index + 1) * self.len]
+        &mut self.left[self.left_first + index * self.len..][..self.len]
     }
 
     /// The feature vectors of all candidates, one after the other, to be filled in.
     pub fn candidates_mut(&mut self) -> &mut [f64] {
-        &mut self.left[..self.candidates * self.len]
+        &mut self.left[self.left_first..][..self.candidates * self.len]
     }
 
     /// The feature vector of candidate `index`.
     pub fn candidate(&self, index: usize) -> &[f64] {
-        &self.left[index * self.len..(index + 1) * self.len]
+        &self.left[self.left_first + index * self.len..][..self.len]
     }
 
     /// Takes the vectors of the bag's entries.
     pub fn set_bag<'a>(&mut self, entries: impl ExactSizeIterator<Item = &'a AffineSubspace>) {
         let first = self.slots + 1;
-        let columns = (first + entries.len() * self.stride).max(LEAST_SIDE);
-        self.right.clear();
-        self.right.resize(columns * self.len, 0.0);
+        let columns = first + entries.len() * self.stride;
+        self.right_first = kernel::align(&mut self.right, columns * self.len);
+        self.right
+            .resize(self.right_first + columns * self.len, 0.0);
         let (count, len) = (entries.len(), self.len);
+        let right = &mut self.right[self.right_first..];
         for (k, entry) in entries.enumerate() {
             let vectors = entry.mean.chunks_exact(len).chain(entry.basis());
             for (column, vector) in vectors.enumerate() {
-                let target = &mut self.right[(first + column * count + k) * len..][..len];
+                let target = &mut right[(first + column * count + k) * len..][..len];
                 for (target, &value) in target.iter_mut().zip(vector) {
                     *target = f64::from(value);
                 }
             }
         }
-        let rows = self.left.len() / self.len;
+        let rows = (self.left.len() - self.left_first) / self.len;
         self.width = columns;
         self.out.resize(columns * rows, 0.0);
     }
 
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
     #[inline(always)]
-    pub fn compute(&mut self, history: &[&[f32]]) {
+    pub fn compute<S: Simd>(&mut self, simd: S, history: &[&[f32]]) {
         self.factor(history);
         let (len, columns) = (self.len, self.width);
-        let rows = self.left.len() / len;
-        let left = DMatrixView::from_slice_with_strides_generic(
-            &self.left,
-            Dyn(len),
-            Dyn(rows),
-            Dyn(1),
-            Dyn(len),
-        );
-        let right = DMatrixView::from_slice_with_strides_generic(
-            &self.right,
-            Dyn(columns),
-            Dyn(len),
-            Dyn(len),
-            Dyn(1),
-        );
-        DMatrixViewMut::from_slice(&mut self.out, columns, rows).gemm(1.0, &right, &left, 0.0);
+        let left = &self.left[self.left_first..];
+        let right = &self.right[self.right_first..];
+        kernel::multiply(simd, left, right, len, columns, &mut self.out);
         for index in 0..self.candidates {
             self.norms[index] = norm_squared(self.candidate(index));
         }
@@ -119,7 +109,8 @@ impl Products {
     #[inline(always)]
     fn factor(&mut self, history: &[&[f32]]) {
         let (len, count) = (self.len, history.len());
-        let shared = &mut self.left[self.candidates * len..][..(self.slots + 1) * len];
+        let shared =
+            &mut self.left[self.left_first + self.candidates * len..][..(self.slots + 1) * len];
         shared.fill(0.0);
         let (directions, sum) = shared.split_at_mut(self.slots * len);
         for vector in history {
@@ -139,7 +130,7 @@ impl Products {
         }
         self.history_len = count;
         self.sum_norm = norm_squared(sum);
-        self.right[..(self.slots + 1) * len].copy_from_slice(shared);
+        self.right[self.right_first..][..(self.slots + 1) * len].copy_from_slice(shared);
     }
 
     /// The products of candidate `index`: with Q (P slots), with the sum of H, with the bag.

@@ -13,6 +13,8 @@ use super::{Params, Search};
 
 /// A shift below this, in working pixels, is within what a search covers anyway.
 const NOTABLE_SHIFT: f64 = 2.0;
+/// The greatest number of modes.
+const MOST_MODES: usize = 50;
 
 /// The search of one frame.
 #[derive(Debug, Clone, Copy)]
@@ -83,11 +85,12 @@ impl Sought<'_> {
         generator: &mut ChaCha8Rng,
         particles: &mut Vec<Particle>,
     ) {
-        let mut order: Vec<usize> = (0..particles.len()).collect();
-        order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
-        order.truncate(self.params.refined_modes as usize);
+        let mut modes = [0; MOST_MODES];
+        let count = (self.params.refined_modes as usize).min(particles.len());
+        let modes = &mut modes[..count];
+        best(weights, modes);
         let params = self.params;
-        for &mode in order.iter().cycle() {
+        for &mode in modes.iter().cycle() {
             if particles.len() >= params.particles as usize {
                 break;
             }
@@ -124,6 +127,16 @@ impl Sought<'_> {
                 particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
         }
         (-0.5 * exponent).exp()
+    }
+}
+
+/// The indices of the greatest weights, greatest first, of equals the first first.
+fn best(weights: &[f64], out: &mut [usize]) {
+    let precedes = |a: usize, b: usize| weights[b].total_cmp(&weights[a]).then(a.cmp(&b)).is_lt();
+    for place in 0..out.len() {
+        let left = (0..weights.len()).filter(|&i| place == 0 || precedes(out[place - 1], i));
+        let next = left.reduce(|best, i| if precedes(i, best) { i } else { best });
+        out[place] = next.expect("no more places than weights");
     }
 }
 
@@ -165,6 +178,18 @@ pub(super) fn average(
 mod tests {
     use super::*;
     use crate::tracker::Preset;
+
+    #[test]
+    fn the_best_are_those_of_a_sort() {
+        let weights: Vec<f64> = (0..60).map(|i| f64::from(i * 37 % 11)).collect();
+        let mut sorted: Vec<usize> = (0..60).collect();
+        sorted.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
+        for count in [0, 1, 5, 50, 60] {
+            let mut found = vec![0; count];
+            best(&weights, &mut found);
+            assert_eq!(found, sorted[..count]);
+        }
+    }
 
     #[test]
     fn a_prior_of_any_width_is_1_at_the_last_answer_and_falls() {

@@ -12,11 +12,11 @@ use super::bag::Bag;
 use super::frame::working_size;
 use super::motion::Particle;
 use super::state::{self, State};
-use super::{Params, TrackerError};
+use super::{Params, TrackerError, comparison};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -58,11 +58,24 @@ pub(super) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
     match postcard::take_from_bytes::<State>(body) {
         Ok((mut state, [])) => {
             check(&state)?;
-            state.background.learn(&state.params);
+            restore(&mut state);
             Ok(state)
         }
         _ => Err(damaged),
     }
+}
+
+/// Makes what a snapshot does not carry.
+fn restore(state: &mut State) {
+    comparison::with(|room| {
+        let learning = &mut room.learning;
+        state
+            .background
+            .learn(&state.params, &mut learning.background);
+        state
+            .bag
+            .restore(&state.background, &state.params, &mut learning.bag);
+    });
 }
 
 fn check(state: &State) -> Result<(), TrackerError> {
@@ -167,6 +180,11 @@ fn check_bag(bag: &Bag, params: &Params) -> bool {
             .iter()
             .all(|entry| entry.is_sound(params, GREATEST_FEATURE))
         && bag.subspaces().all(|entry| {
+            // Where candidates stand alone a subspace is what follows from its looks.
+            let len = if params.candidate_alone { 0 } else { len };
+            if len == 0 {
+                return entry.mean.is_empty() && entry.basis.is_empty();
+            }
             entry.mean.len() == len
                 && entry.basis.len().is_multiple_of(len)
                 && entry.dim() <= params.basis_dim as usize

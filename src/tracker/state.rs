@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::background::Background;
-use super::bag::{Bag, Entry};
+use super::bag::Bag;
 use super::camera::Camera;
 use super::discriminant::Discriminant;
 use super::frame::working_size;
@@ -90,15 +90,6 @@ impl State {
         self.weights = vec![1.0 / count.max(1) as f64; count];
     }
 
-    /// The subspace of `features` and those of the previous frames (equation 2).
-    pub fn entry_with(&self, features: &[f32]) -> Entry {
-        let mut vectors = features.to_vec();
-        self.history
-            .iter()
-            .for_each(|vector| vectors.extend_from_slice(vector));
-        Entry::new(&vectors, self.background.metric(), &self.params)
-    }
-
     /// How many times as wide as usual the next search is. The longer a target is out of sight, the further it may have
     /// come, until the search covers the frame.
     pub fn widening(&self) -> f64 {
@@ -125,10 +116,14 @@ impl State {
         score < below + FOUND_MARGIN || !self.trust.recognizes(evidence.first, &self.params)
     }
 
-    /// Makes `features` the newest of the history.
-    pub fn remember(&mut self, features: Vec<f32>) {
-        self.history.push_front(features);
-        self.history.truncate(self.params.history as usize);
+    /// Makes the first vector of `features` the newest of the history.
+    pub fn remember(&mut self, features: &[f32]) {
+        let full = self.history.len() >= self.params.history as usize;
+        let oldest = if full { self.history.pop_back() } else { None };
+        let mut newest = oldest.unwrap_or_default();
+        newest.clear();
+        newest.extend_from_slice(&features[..self.params.feature_len()]);
+        self.history.push_front(newest);
     }
 }
 

@@ -9,7 +9,7 @@ use super::eigen::Spectrum;
 pub const RANK_TOLERANCE: f64 = 1e-5;
 
 /// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AffineSubspace {
     pub(super) mean: Vec<f32>,
     /// The columns of U, one after the other.
@@ -24,10 +24,7 @@ impl AffineSubspace {
     /// # Panics
     /// If there are no vectors, or their lengths differ.
     pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
-        let mut subspace = Self {
-            mean: Vec::new(),
-            basis: Vec::new(),
-        };
+        let mut subspace = Self::default();
         subspace.become_of(vectors, basis_dim, &mut Spectrum::default());
         subspace
     }
@@ -66,12 +63,12 @@ impl AffineSubspace {
 
     /// The columns of U, each of length D.
     pub fn basis(&self) -> impl ExactSizeIterator<Item = &[f32]> {
-        self.basis.chunks_exact(self.mean.len())
+        self.basis.chunks_exact(self.mean.len().max(1))
     }
 
     /// The number of columns of U: n, or fewer.
     pub fn dim(&self) -> usize {
-        self.basis.len() / self.mean.len()
+        self.basis.len() / self.mean.len().max(1)
     }
 }
 

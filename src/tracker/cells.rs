@@ -1,0 +1,405 @@
+//! Histograms of gradient directions: the feature vector of an area, from the sums over its cells.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::gradients::{DIRECTIONS, GRAY, GradientSums, Place};
+use super::{Params, Rect};
+
+/// Values of a cell: the directions, then its gray value.
+pub(super) const CHANNELS: usize = DIRECTIONS + 1;
+
+/// The greatest normalised value of a direction, so that one strong edge does not outweigh all else.
+const GREATEST: f32 = 0.4;
+/// Gradients of flat cells are noise: this much, in gray levels a pixel, is added to what they are divided by.
+const FLAT: f32 = 2.0;
+/// The least standard deviation of gray values, in gray levels, that theirs are divided by.
+const LEAST_CONTRAST: f32 = 4.0;
+
+/// The share in each channel of the direction at 180 degrees: it is the one at 0.
+const TURNED: [f32; 16] = {
+    let mut shares = [0.0; 16];
+    shares[0] = 1.0;
+    shares
+};
+/// Cells of a row that are worked on together.
+const GROUP: usize = 8;
+
+/// Room for the cells of one area.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Cells {
+    columns: usize,
+    rows: usize,
+    /// Where the corners of the cells are among the columns of the sums.
+    places: Vec<Place>,
+    /// For each column of cells the sum at its right corner less that at its left one, in the last row of corners.
+    edges: Vec<[f32; 16]>,
+    /// The channels of each cell, row by row.
+    cells: Vec<[f32; 16]>,
+    /// The gray value of each cell.
+    grays: Vec<f32>,
+    /// The sum of the squares of each cell's directions, with a rim of zeros around: rows of `stride` values.
+    energies: Vec<f32>,
+    stride: usize,
+    /// For each column one over the number of cells beside it in a row, itself among them; the same for each row.
+    column_shares: Vec<f32>,
+    row_shares: Vec<f32>,
+    /// What the directions of each cell of a row are multiplied by.
+    scales: Vec<f32>,
+}
+
+/// [`Cells::describe`], to be compiled for the instructions that this machine has.
+struct Describe<'a, A> {
+    cells: &'a mut Cells,
+    sums: &'a GradientSums,
+    areas: A,
+    gray_weight: f32,
+    out: &'a mut [f32],
+}
+
+impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let len = self.cells.cells.len() * CHANNELS;
+        for (area, out) in self.areas.zip(self.out.chunks_exact_mut(len)) {
+            self.cells.sum_up(simd, self.sums, &area);
+            self.cells.normalize(&area, self.gray_weight, out);
+        }
+    }
+}
+
+impl Cells {
+    /// Writes the feature vectors of `areas` (working pixels, sides above 0, in the window that was summed up) to `out`,
+    /// each of length D: cell by cell, row by row, the nine directions and the gray value.
+    ///
+    /// Each cell's directions are divided by the root of the mean energy of the 3 x 3 cells around it and clipped.
+    /// Gray values have the area's mean taken off and are divided by its standard deviation.
+    pub fn describe(
+        &mut self,
+        sums: &GradientSums,
+        areas: impl Iterator<Item = Rect>,
+        params: &Params,
+        out: &mut [f32],
+    ) {
+        self.prepare(params.patch_width as usize, params.patch_height as usize);
+        Arch::new().dispatch(Describe {
+            cells: self,
+            sums,
+            areas,
+            gray_weight: params.gray_weight as f32,
+            out,
+        });
+    }
+
+    /// Makes room for so many columns and rows of cells.
+    fn prepare(&mut self, columns: usize, rows: usize) {
+        if (self.columns, self.rows) == (columns, rows) {
+            return;
+        }
+        (self.columns, self.rows) = (columns, rows);
+        self.places.resize(columns + 1, Place::default());
+        self.edges.resize(columns, [0.0; 16]);
+        self.cells.resize(columns * rows, [0.0; 16]);
+        self.grays.resize(columns * rows, 0.0);
+        let padded = columns.next_multiple_of(GROUP);
+        self.stride = padded + 2;
+        self.energies.clear();
+        self.energies.resize(self.stride * (rows + 2), 0.0);
+        let share = |i: usize, count: usize| {
+            let beside = (i + 2).min(count) - i.saturating_sub(1);
+            1.0 / beside as f32
+        };
+        self.column_shares.clear();
+        self.column_shares
+            .extend((0..columns).map(|i| share(i, columns)));
+        self.column_shares.resize(padded, 0.0);
+        self.row_shares.clear();
+        self.row_shares.extend((0..rows).map(|j| share(j, rows)));
+        self.scales.resize(padded, 0.0);
+    }
+
+    /// The cells of `area`, each the sum at its lower right corner, less those at the two beside it, and that at its
+    /// upper left one.
+    #[inline(always)]
+    fn sum_up<S: Simd>(&mut self, simd: S, sums: &GradientSums, area: &Rect) {
+        let (x, y) = (area.x as f32, area.y as f32);
+        let width = (area.width / self.columns as f64) as f32;
+        let height = (area.height / self.rows as f64) as f32;
+        for (i, place) in self.places.iter_mut().enumerate() {
+            *place = sums.column(x + i as f32 * width);
+        }
+        for j in 0..=self.rows {
+            let row = sums.row(y + j as f32 * height);
+            let mut left = row.at(simd, self.places[0]);
+            // The first row of corners makes no cells: what it makes of the last area's edges is written over.
+            let row_of_cells = j.saturating_sub(1);
+            let cells = &mut self.cells[row_of_cells * self.columns..][..self.columns];
+            let columns = self.edges.iter_mut().zip(&self.places[1..]);
+            for ((edge, &place), cell) in columns.zip(cells) {
+                let right = row.at(simd, place);
+                let (mut across, mut inside) = (right, *edge);
+                for lane in 0..16 {
+                    across[lane] -= left[lane];
+                    inside[lane] = across[lane] - inside[lane];
+                }
+                let turned = inside[DIRECTIONS];
+                for lane in 0..16 {
+                    inside[lane] += TURNED[lane] * turned;
+                }
+                (*cell, *edge) = (inside, across);
+                left = right;
+            }
+        }
+        for (j, cells) in self.cells.chunks_exact(self.columns).enumerate() {
+            let energies = &mut self.energies[(j + 1) * self.stride + 1..];
+            for (energy, cell) in energies.iter_mut().zip(cells) {
+                *energy = energy_of(cell);
+            }
+        }
+    }
+
+    /// The feature vector of the cells.
+    #[inline(always)]
+    fn normalize(&mut self, area: &Rect, gray_weight: f32, out: &mut [f32]) {
+        let count = self.cells.len() as f32;
+        let pixels = (area.width * area.height) as f32 / count;
+        for (gray, cell) in self.grays.iter_mut().zip(&self.cells) {
+            *gray = cell[GRAY];
+        }
+        let mean = sum(&self.grays, |gray| gray) / count;
+        let variance = sum(&self.grays, |gray| (gray - mean) * (gray - mean)) / count;
+        let gray_scale = gray_weight / variance.sqrt().max(LEAST_CONTRAST * pixels);
+        let floor = (FLAT * pixels) * (FLAT * pixels);
+        let rows = self.cells.chunks_exact(self.columns);
+        let rows = rows.zip(out.chunks_exact_mut(self.columns * CHANNELS));
+        for (j, (cells, out)) in rows.enumerate() {
+            let around = &self.energies[j * self.stride..][..3 * self.stride];
+            let shares = (self.row_shares[j], &self.column_shares[..]);
+            scale_row(around, self.stride, shares, floor, &mut self.scales);
+            let out = out.as_chunks_mut::<CHANNELS>().0;
+            for ((cell, scale), out) in cells.iter().zip(&self.scales).zip(out) {
+                let mut values = *cell;
+                for value in &mut values {
+                    let scaled = *value * scale;
+                    *value = if scaled < GREATEST { scaled } else { GREATEST };
+                }
+                out.copy_from_slice(&values[..CHANNELS]);
+                out[DIRECTIONS] = (cell[GRAY] - mean) * gray_scale;
+            }
+        }
+    }
+}
+
+/// What the directions of a row of cells are multiplied by: one over three times the root of the mean energy around,
+/// from three rows of energies of `stride` values each.
+#[inline(always)]
+fn scale_row(
+    around: &[f32],
+    stride: usize,
+    (row_share, column_shares): (f32, &[f32]),
+    floor: f32,
+    scales: &mut [f32],
+) {
+    let groups = scales.as_chunks_mut::<GROUP>().0;
+    let groups = groups.iter_mut().zip(column_shares.as_chunks::<GROUP>().0);
+    for (group, (scales, shares)) in groups.enumerate() {
+        let mut energy = [0.0; GROUP];
+        for row in 0..3 {
+            for column in 0..3 {
+                let part = &around[row * stride + group * GROUP + column..][..GROUP];
+                for lane in 0..GROUP {
+                    energy[lane] += part[lane];
+                }
+            }
+        }
+        for lane in 0..GROUP {
+            let mean = energy[lane] * row_share * shares[lane];
+            scales[lane] = 1.0 / (3.0 * (mean + floor).sqrt());
+        }
+    }
+}
+
+/// The sum of the squares of a cell's directions.
+#[inline(always)]
+fn energy_of(cell: &[f32; 16]) -> f32 {
+    let mut squares = [0.0; 8];
+    for lane in 0..8 {
+        squares[lane] = cell[lane] * cell[lane];
+    }
+    let mut pairs = [0.0; 4];
+    for lane in 0..4 {
+        pairs[lane] = squares[lane] + squares[lane + 4];
+    }
+    (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]) + cell[8] * cell[8]
+}
+
+/// The sum of a function of values, in eight parts so that the loop vectorises.
+#[inline(always)]
+fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+    let mut parts = [0.0_f32; 8];
+    let (chunks, rest) = values.as_chunks::<8>();
+    for chunk in chunks {
+        for lane in 0..8 {
+            parts[lane] += of(chunk[lane]);
+        }
+    }
+    let rest = rest.iter().map(|&value| of(value));
+    parts.iter().sum::<f32>() + rest.sum::<f32>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::{GrayFrame, Preset};
+
+    fn frame() -> GrayFrame {
+        let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
+        GrayFrame::from_luma(60, 50, luma.collect()).expect("a frame of this size")
+    }
+
+    /// Direction (in bins) and strength of the gradient of the pixel at (`x`, `y`).
+    fn gradient(frame: &GrayFrame, x: usize, y: usize) -> (f64, f64) {
+        let (width, height) = (frame.width() as usize, frame.height() as usize);
+        let pixel = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
+        let across = pixel((x + 1).min(width - 1), y) - pixel(x.saturating_sub(1), y);
+        let down = pixel(x, (y + 1).min(height - 1)) - pixel(x, y.saturating_sub(1));
+        let turn = down.atan2(across).rem_euclid(std::f64::consts::PI) / std::f64::consts::PI;
+        (
+            (turn * DIRECTIONS as f64).min(8.9999999),
+            across.hypot(down),
+        )
+    }
+
+    /// Sums over a cell by going through its pixels, each with the share of it that is inside.
+    fn cell(frame: &GrayFrame, area: &Rect) -> [f64; CHANNELS] {
+        let mut sums = [0.0; CHANNELS];
+        let width = frame.width() as usize;
+        for y in 0..frame.height() as usize {
+            for x in 0..width {
+                let (bin, strength) = gradient(frame, x, y);
+                let pixel = Rect::new(x as f64, y as f64, 1.0, 1.0);
+                let across = (area.x + area.width).min(pixel.x + 1.0) - area.x.max(pixel.x);
+                let down = (area.y + area.height).min(pixel.y + 1.0) - area.y.max(pixel.y);
+                let share = across.max(0.0) * down.max(0.0);
+                let (lower, part) = (bin as usize, bin.fract());
+                sums[lower] += share * strength * (1.0 - part);
+                sums[(lower + 1) % DIRECTIONS] += share * strength * part;
+                sums[DIRECTIONS] += share * f64::from(frame.pixels()[y * width + x]);
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn cells_are_sums_over_their_pixels() {
+        let frame = frame();
+        let (mut sums, mut cells) = (GradientSums::default(), Cells::default());
+        cells.prepare(4, 4);
+        for area in [
+            Rect::new(10.0, 8.0, 32.0, 24.0),
+            Rect::new(3.3, 4.7, 21.9, 17.1),
+            Rect::new(-9.5, 35.2, 40.0, 30.0),
+        ] {
+            sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0));
+            cells.sum_up(pulp::Scalar, &sums, &area);
+            for index in 0..16 {
+                let (width, height) = (area.width / 4.0, area.height / 4.0);
+                let x = area.x + (index % 4) as f64 * width;
+                let y = area.y + (index / 4) as f64 * height;
+                let expected = cell(&frame, &Rect::new(x, y, width, height));
+                let found = &cells.cells[index];
+                for (found, expected) in found.iter().zip(&expected[..DIRECTIONS]) {
+                    assert!(
+                        (f64::from(*found) - expected).abs() < 4.0,
+                        "{found} {expected}"
+                    );
+                }
+                assert!((f64::from(found[GRAY]) - expected[DIRECTIONS]).abs() < 2.0);
+            }
+        }
+    }
+
+    fn features(frame: &GrayFrame, area: Rect, params: &Params) -> Vec<f32> {
+        let mut sums = GradientSums::default();
+        let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
+        sums.compute(frame, &Rect::new(0.0, 0.0, width, height));
+        let mut out = vec![1.0; params.feature_len()];
+        Cells::default().describe(&sums, std::iter::once(area), params, &mut out);
+        out
+    }
+
+    #[test]
+    fn features_are_normalised_by_the_cells_around() {
+        let params = Params {
+            patch_width: 5,
+            patch_height: 4,
+            ..Preset::Robust.params()
+        };
+        let frame = frame();
+        let area = Rect::new(9.2, 6.1, 35.0, 30.0);
+        let found = features(&frame, area, &params);
+        let (width, height) = (area.width / 5.0, area.height / 4.0);
+        let place = |i: usize| {
+            Rect::new(
+                area.x + (i % 5) as f64 * width,
+                area.y + (i / 5) as f64 * height,
+                width,
+                height,
+            )
+        };
+        let cells: Vec<_> = (0..20).map(|i| cell(&frame, &place(i))).collect();
+        let energy =
+            |cell: &[f64; CHANNELS]| -> f64 { cell[..DIRECTIONS].iter().map(|v| v * v).sum() };
+        let mean = cells.iter().map(|cell| cell[DIRECTIONS]).sum::<f64>() / 20.0;
+        let variance = cells
+            .iter()
+            .map(|cell| (cell[DIRECTIONS] - mean).powi(2))
+            .sum::<f64>()
+            / 20.0;
+        for (index, values) in found.chunks_exact(CHANNELS).enumerate() {
+            let (i, j) = (index % 5, index / 5);
+            let beside = |at: usize| (at % 5).abs_diff(i) <= 1 && (at / 5).abs_diff(j) <= 1;
+            let around: Vec<f64> = (0..20)
+                .filter(|&at| beside(at))
+                .map(|at| energy(&cells[at]))
+                .collect();
+            let mean_energy = around.iter().sum::<f64>() / around.len() as f64;
+            let floor = (f64::from(FLAT) * width * height).powi(2);
+            let divisor = 3.0 * (mean_energy + floor).sqrt();
+            for (value, sum) in values.iter().zip(&cells[index][..DIRECTIONS]) {
+                let expected = (sum / divisor).min(f64::from(GREATEST));
+                assert!(
+                    (f64::from(*value) - expected).abs() < 2e-3,
+                    "{value} {expected}"
+                );
+            }
+            let gray = (cells[index][DIRECTIONS] - mean) * params.gray_weight / variance.sqrt();
+            assert!((f64::from(values[DIRECTIONS]) - gray).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn features_hardly_change_with_the_light_and_follow_their_area() {
+        let params = Preset::Robust.params();
+        let bright = frame();
+        let dim = bright.pixels().iter().map(|gray| gray / 2 + 10).collect();
+        let dim = GrayFrame::from_luma(60, 50, dim).expect("a frame of this size");
+        let area = Rect::new(12.0, 9.0, 30.0, 28.0);
+        let distance =
+            |a: &[f32], b: &[f32]| -> f32 { a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum() };
+        let here = features(&bright, area, &params);
+        let dimmed = distance(&here, &features(&dim, area, &params));
+        let moved = Rect { x: 17.0, ..area };
+        let moved = distance(&here, &features(&bright, moved, &params));
+        assert!(dimmed * 5.0 < moved, "{dimmed} {moved}");
+    }
+
+    #[test]
+    fn a_flat_area_has_features_of_zero() {
+        let flat = GrayFrame::from_luma(20, 20, vec![90; 400]).expect("a frame of this size");
+        let params = Preset::Robust.params();
+        let out = features(&flat, Rect::new(4.0, 4.0, 12.0, 12.0), &params);
+        assert!(out.iter().all(|value| value.abs() < 1e-3));
+    }
+}

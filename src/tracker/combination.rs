@@ -1,0 +1,160 @@
+//! An affine subspace as combinations of the looks that it is made of.
+//!
+//! The mean and the basis of equation 1 lie in the span of a few looks, and a candidate that stands alone is compared
+//! with them by inner products only. So neither is ever written out as whitened vectors: the background's metric gives the
+//! looks' Gram matrix, its eigenvectors the coefficients, and with the shadows of the combinations (see
+//! [`metric`](super::metric)) a change of the background costs small matrices.
+
+use super::background::Background;
+use super::eigen::Spectrum;
+use super::look::Look;
+use super::{Params, kernel, matrix, subspace};
+
+/// What is left of a squared length below this share of it is rounding.
+pub(super) const LEAST_LEFT: f32 = 1e-6;
+
+/// The mean, then the basis vectors, of an affine subspace.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Combination {
+    /// ‖μ‖².
+    norm: f64,
+    /// For the mean and for each basis vector, the coefficients of the looks.
+    coefficients: Vec<f32>,
+    /// For each of them its shadow.
+    shadows: Vec<f32>,
+    /// The number of basis vectors.
+    dim: usize,
+}
+
+/// Room for making combinations.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    /// The background's samples, with their mean taken off.
+    samples: Vec<f32>,
+    /// The looks, with that mean taken off.
+    vectors: Vec<f32>,
+    products: Vec<f32>,
+    shadows: Vec<f32>,
+    gram: Vec<f32>,
+    scales: Vec<f32>,
+    spectrum: Spectrum,
+}
+
+impl Room {
+    /// Takes the samples of `background`, which all combinations are made with from here on.
+    pub fn take(&mut self, background: &Background) {
+        self.samples.clear();
+        background.append_samples(&mut self.samples);
+    }
+}
+
+impl Combination {
+    /// Becomes the subspace of `looks` as the metric of `background`, the one that `room` has taken, sees them.
+    pub fn become_of(
+        &mut self,
+        looks: &[Look],
+        background: &Background,
+        params: &Params,
+        room: &mut Room,
+    ) {
+        let (len, count) = (params.feature_len(), looks.len());
+        let metric = background.metric();
+        let samples = metric.count();
+        room.vectors.clear();
+        room.vectors.resize(count * len, 0.0);
+        for (look, vector) in looks.iter().zip(room.vectors.chunks_exact_mut(len)) {
+            matrix::add(vector, -1.0, background.mean());
+            look.add_to(vector, 1.0);
+        }
+        room.products.resize(count * samples, 0.0);
+        kernel::inner_products(
+            &room.vectors,
+            &room.samples,
+            len,
+            samples,
+            &mut room.products,
+        );
+        room.shadows.resize(count * samples, 0.0);
+        room.gram.resize(count * count, 0.0);
+        kernel::inner_products(&room.vectors, &room.vectors, len, count, &mut room.gram);
+        let shadow = |i: usize| i * samples..(i + 1) * samples;
+        for i in 0..count {
+            metric.shadow(&room.products[shadow(i)], &mut room.shadows[shadow(i)]);
+        }
+        room.scales.clear();
+        for i in 0..count {
+            for j in 0..count {
+                let of_shadows = matrix::dot(&room.shadows[shadow(i)], &room.shadows[shadow(j)]);
+                let plain = room.gram[i * count + j];
+                let product = plain - of_shadows;
+                let is_left = i != j || product > plain * LEAST_LEFT;
+                room.gram[i * count + j] = if is_left { product } else { 0.0 };
+            }
+            let square = room.gram[i * count + i];
+            room.scales.push(match (params.unit_length, square > 0.0) {
+                (true, true) => 1.0 / square.sqrt(),
+                (true, false) => 0.0,
+                (false, _) => 1.0,
+            });
+        }
+        self.combine(count, params.basis_dim as usize, room);
+        self.shadows.clear();
+        for row in self.coefficients.chunks_exact(count) {
+            let first = self.shadows.len();
+            self.shadows.resize(first + samples, 0.0);
+            for (i, coefficient) in row.iter().enumerate() {
+                let target = &mut self.shadows[first..];
+                matrix::add(target, *coefficient, &room.shadows[shadow(i)]);
+            }
+        }
+    }
+
+    /// The coefficients, from the Gram matrix of `count` looks and the factors that bring them to their length.
+    fn combine(&mut self, count: usize, basis_dim: usize, room: &mut Room) {
+        let scale = |i: usize| f64::from(room.scales[i]);
+        let gram = |i: usize, j: usize| f64::from(room.gram[i * count + j]) * scale(i) * scale(j);
+        let share = 1.0 / count as f64;
+        let sum = (0..count * count).map(|at| gram(at / count, at % count));
+        self.norm = (sum.sum::<f64>() * share * share).max(0.0);
+        self.coefficients.clear();
+        self.coefficients
+            .extend((0..count).map(|i| (share * scale(i)) as f32));
+        room.spectrum.solve(count, gram);
+        self.dim = subspace::dominant(room.spectrum.values(), basis_dim);
+        for (place, value) in room.spectrum.values().take(self.dim).enumerate() {
+            let weight = |i: usize| room.spectrum.weight(place, i) / value.sqrt() * scale(i);
+            self.coefficients
+                .extend((0..count).map(|i| weight(i) as f32));
+        }
+    }
+
+    /// ‖μ‖² and the number of basis vectors.
+    pub fn size(&self) -> (f64, usize) {
+        (self.norm, self.dim)
+    }
+
+    /// The shadows of the mean and of the basis vectors.
+    pub fn shadows(&self) -> &[f32] {
+        &self.shadows
+    }
+
+    /// Appends the mean and the basis vectors, before the metric, to `out`. `looks` are those that this was made of.
+    #[inline(always)]
+    pub fn append_to(
+        &self,
+        looks: &[Look],
+        background: &Background,
+        len: usize,
+        out: &mut Vec<f32>,
+    ) {
+        for row in self.coefficients.chunks_exact(looks.len()) {
+            let first = out.len();
+            out.resize(first + len, 0.0);
+            let vector = &mut out[first..];
+            for (look, coefficient) in looks.iter().zip(row) {
+                look.add_to(vector, *coefficient);
+            }
+            matrix::add(vector, -row.iter().sum::<f32>(), background.mean());
+        }
+    }
+}
