@@ -301,7 +301,7 @@ mod tests {
             Rect::new(3.3, 4.7, 21.9, 17.1),
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
-            sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0));
+            sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
             cells.sum_up(pulp::Scalar, &sums, &area);
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
@@ -323,7 +323,7 @@ mod tests {
     fn features(frame: &GrayFrame, area: Rect, params: &Params) -> Vec<f32> {
         let mut sums = GradientSums::default();
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
-        sums.compute(frame, &Rect::new(0.0, 0.0, width, height));
+        sums.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
         let mut out = vec![1.0; params.feature_len()];
         Cells::default().describe(&sums, std::iter::once(area), params, &mut out);
         out

@@ -48,8 +48,12 @@ impl View {
             let (x, y) = area.center();
             let width = LARGER * area.width + 2.0 * furthest;
             let height = LARGER * area.height + 2.0 * furthest;
-            self.gradients
-                .compute(frame, &Rect::centered(x, y, width, height));
+            let cell = (
+                area.width / f64::from(params.patch_width),
+                area.height / f64::from(params.patch_height),
+            );
+            let window = Rect::centered(x, y, width, height);
+            self.gradients.compute(frame, &window, cell);
         }
     }
 

@@ -30,6 +30,10 @@ impl Lanes {
     pub const ZERO: Self = Self([0.0; 16]);
 }
 
+/// Cells of so many working pixels lose nothing when sums are interpolated over two pixels, and a large target takes a
+/// quarter of the room.
+const COARSE: f64 = 8.0;
+
 /// The direction of each channel, in bins; those without one are far from all.
 const CENTERS: [f32; 16] = {
     let mut centers = [1e9; 16];
@@ -53,9 +57,13 @@ const GRAY_SHARES: [f32; 16] = {
 pub(super) struct GradientSums {
     left: usize,
     top: usize,
-    width: usize,
-    height: usize,
-    /// `(height + 1) * (width + 1)`: the sum over all pixels of the window above and left of a corner. Room beyond.
+    right: usize,
+    bottom: usize,
+    /// Pixels from one corner to the next.
+    grain: usize,
+    columns: usize,
+    rows: usize,
+    /// `(rows + 1) * (columns + 1)`: the sum over all pixels of the window above and left of a corner. Room beyond.
     sums: Vec<Lanes>,
     row: GradientRow,
 }
@@ -96,81 +104,90 @@ impl Place {
 }
 
 impl GradientSums {
-    /// Sums up the channels over the part of `frame` that `window` (working pixels) touches.
-    pub fn compute(&mut self, frame: &GrayFrame, window: &Rect) {
+    /// Sums up the channels over the part of `frame` that `window` (working pixels) touches. Where a cell is at least
+    /// [`COARSE`] pixels wide and high, there is a corner at every second pixel only.
+    pub fn compute(&mut self, frame: &GrayFrame, window: &Rect, cell: (f64, f64)) {
         let (left, right) = span(window.x, window.width, frame.width() as usize);
         let (top, bottom) = span(window.y, window.height, frame.height() as usize);
         (self.left, self.top) = (left, top);
-        (self.width, self.height) = (right - left, bottom - top);
+        (self.right, self.bottom) = (right, bottom);
+        self.grain = if cell.0.min(cell.1) >= COARSE { 2 } else { 1 };
+        self.columns = (right - left).div_ceil(self.grain);
+        self.rows = (bottom - top).div_ceil(self.grain);
         Arch::new().dispatch(Compute { sums: self, frame });
     }
 
     #[inline(always)]
     fn compute_all<S: Simd>(&mut self, simd: S, frame: &GrayFrame) {
-        let stride = self.width + 1;
-        let corners = stride * (self.height + 1);
+        let stride = self.columns + 1;
+        let corners = stride * (self.rows + 1);
         if self.sums.len() < corners {
             self.sums.resize(corners, Lanes::ZERO);
         }
         self.sums[..stride].fill(Lanes::ZERO);
-        for y in 0..self.height {
-            let pixels = self.left..self.left + self.width;
-            let gray = &frame.pixels()[(self.top + y) * frame.width() as usize..][pixels.clone()];
-            self.row.compute(frame, pixels, self.top + y);
-            let (above, below) = self.sums.split_at_mut((y + 1) * stride);
-            let above = &above[y * stride + 1..];
-            let (first, below) = below[..stride]
-                .split_first_mut()
-                .expect("a row of sums has one more than the window's pixels");
-            *first = Lanes::ZERO;
-            let gradients = self.row.bins.iter().zip(&self.row.strengths);
-            sum_row(simd, gradients.zip(gray), above, below);
+        for y in 0..self.bottom - self.top {
+            let pixels = self.left..self.right;
+            let gradients = &mut self.row;
+            gradients.compute(frame, pixels, self.top + y, self.columns * self.grain);
+            let corner = y / self.grain + 1;
+            let (above, below) = self.sums.split_at_mut(corner * stride);
+            let (above, below) = (&above[(corner - 1) * stride..], &mut below[..stride]);
+            if y % self.grain == 0 {
+                below.copy_from_slice(above);
+            }
+            if self.grain == 1 {
+                sum_row::<S, 1>(simd, gradients, &mut below[1..]);
+            } else {
+                sum_row::<S, 2>(simd, gradients, &mut below[1..]);
+            }
         }
     }
 
     /// Where `x`, in working pixels, is among the columns of corners.
     #[inline(always)]
     pub fn column(&self, x: f32) -> Place {
-        Place::of(x - self.left as f32, self.width)
+        Place::of((x - self.left as f32) / self.grain as f32, self.columns)
     }
 
     /// The sums along a line at `y`, in working pixels.
     #[inline(always)]
     pub fn row(&self, y: f32) -> SumsRow<'_> {
-        let Place { corner, beyond } = Place::of(y - self.top as f32, self.height);
-        let stride = self.width + 1;
+        let place = Place::of((y - self.top as f32) / self.grain as f32, self.rows);
+        let stride = self.columns + 1;
         SumsRow {
-            upper: &self.sums[corner * stride..][..stride],
-            lower: &self.sums[(corner + 1) * stride..][..stride],
-            down: beyond,
+            upper: &self.sums[place.corner * stride..][..stride],
+            lower: &self.sums[(place.corner + 1) * stride..][..stride],
+            down: place.beyond,
         }
     }
 }
 
-/// The sums below a row of pixels, each with the bin and the strength of its gradient, and its gray value.
+/// Adds to `sums`, one for every `GRAIN` pixels, the channels of the row's pixels up to there.
 #[inline(always)]
-fn sum_row<'a, S: Simd>(
-    simd: S,
-    pixels: impl Iterator<Item = ((&'a f32, &'a f32), &'a u8)>,
-    above: &[Lanes],
-    below: &mut [Lanes],
-) {
+fn sum_row<S: Simd, const GRAIN: usize>(simd: S, row: &GradientRow, sums: &mut [Lanes]) {
     let (centers, _) = S::as_simd_f32s(&CENTERS);
     let (gray_shares, _) = S::as_simd_f32s(&GRAY_SHARES);
     let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
     // As many as a pixel's channels take; one is enough for the widest registers.
     let mut total = [zero; 16];
-    for (((bin, strength), gray), (above, below)) in pixels.zip(above.iter().zip(below)) {
-        let (bin, strength) = (simd.splat_f32s(*bin), simd.splat_f32s(*strength));
-        let gray = simd.splat_f32s(f32::from(*gray));
-        let (above, _) = S::as_simd_f32s(&above.0);
-        let (below, _) = S::as_mut_simd_f32s(&mut below.0);
+    let (bins, _) = row.bins.as_chunks::<GRAIN>();
+    let (strengths, _) = row.strengths.as_chunks::<GRAIN>();
+    let (grays, _) = row.gray[1..].as_chunks::<GRAIN>();
+    let pixels = bins.iter().zip(strengths).zip(grays);
+    for (((bins, strengths), grays), sum) in pixels.zip(sums) {
+        for i in 0..GRAIN {
+            let (bin, strength) = (simd.splat_f32s(bins[i]), simd.splat_f32s(strengths[i]));
+            let gray = simd.splat_f32s(grays[i]);
+            for register in 0..centers.len() {
+                let away = simd.abs_f32s(simd.sub_f32s(bin, centers[register]));
+                let share = simd.max_f32s(simd.sub_f32s(one, away), zero);
+                let sum = simd.mul_add_e_f32s(share, strength, total[register]);
+                total[register] = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
+            }
+        }
+        let (sum, _) = S::as_mut_simd_f32s(&mut sum.0);
         for register in 0..centers.len() {
-            let away = simd.abs_f32s(simd.sub_f32s(bin, centers[register]));
-            let share = simd.max_f32s(simd.sub_f32s(one, away), zero);
-            let sum = simd.mul_add_e_f32s(share, strength, total[register]);
-            total[register] = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
-            below[register] = simd.add_f32s(above[register], total[register]);
+            sum[register] = simd.add_f32s(sum[register], total[register]);
         }
     }
 }
@@ -229,9 +246,10 @@ struct GradientRow {
 }
 
 impl GradientRow {
-    /// The gradients, by central differences, of `pixels` in row `y`. The frame's edge goes on as it is.
+    /// The gradients, by central differences, of `pixels` in row `y`, and nothing after them up to `padded` pixels. The
+    /// frame's edge goes on as it is.
     #[inline(always)]
-    fn compute(&mut self, frame: &GrayFrame, pixels: Range<usize>, y: usize) {
+    fn compute(&mut self, frame: &GrayFrame, pixels: Range<usize>, y: usize, padded: usize) {
         let (width, height) = (frame.width() as usize, frame.height() as usize);
         let row = |y: usize| &frame.pixels()[y * width..][..width];
         let here = row(y);
@@ -256,6 +274,10 @@ impl GradientRow {
             *bin = angle(across, down) * (DIRECTIONS as f32 / std::f32::consts::PI);
             *strength = (across * across + down * down).sqrt();
         }
+        self.bins.resize(padded, 0.0);
+        self.strengths.resize(padded, 0.0);
+        self.gray.truncate(count + 1);
+        self.gray.resize(padded + 1, 0.0);
     }
 }
 
@@ -309,23 +331,35 @@ mod tests {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
         let frame = GrayFrame::from_luma(60, 50, luma.collect()).expect("a frame of this size");
         let mut sums = GradientSums::default();
-        for (left, top) in [(0, 0), (7, 12)] {
-            sums.compute(&frame, &Rect::new(left as f64, top as f64, 30.0, 25.0));
-            let mut expected = [0.0; 16];
-            for y in top..top + 20 {
-                let mut row = GradientRow::default();
-                row.compute(&frame, left..left + 17, y);
-                for (x, (bin, strength)) in row.bins.iter().zip(&row.strengths).enumerate() {
-                    let (lower, share) = (*bin as usize, bin.fract());
-                    expected[lower] += strength * (1.0 - share);
-                    expected[lower + 1] += strength * share;
-                    expected[GRAY] += f32::from(frame.pixels()[y * 60 + left + x]);
+        for (left, top, cell) in [(0, 0, 4.0), (7, 12, 4.0), (0, 0, 9.0), (7, 12, 9.0)] {
+            // An odd width and height.
+            let window = Rect::new(left as f64, top as f64, 31.0, 25.0);
+            sums.compute(&frame, &window, (cell, cell));
+            for (across, down) in [(18, 20), (31, 25)] {
+                let mut expected = [0.0; 16];
+                for y in top..top + down {
+                    let mut row = GradientRow::default();
+                    row.compute(&frame, left..left + across, y, across);
+                    for (x, (bin, strength)) in row.bins.iter().zip(&row.strengths).enumerate() {
+                        let (lower, share) = (*bin as usize, bin.fract());
+                        expected[lower] += strength * (1.0 - share);
+                        expected[lower + 1] += strength * share;
+                        expected[GRAY] += f32::from(frame.pixels()[y * 60 + left + x]);
+                    }
                 }
-            }
-            let row = sums.row(top as f32 + 20.0);
-            let found = row.at(pulp::Scalar, sums.column(left as f32 + 17.0));
-            for (found, expected) in found.iter().zip(&expected) {
-                assert!((found - expected).abs() < 1.0, "{found} {expected}");
+                let corner = |at: usize| {
+                    if cell < COARSE {
+                        at
+                    } else {
+                        at.next_multiple_of(2)
+                    }
+                };
+                let row = sums.row((top + corner(down)) as f32);
+                let column = sums.column((left + corner(across)) as f32);
+                let found = row.at(pulp::Scalar, column);
+                for (found, expected) in found.iter().zip(&expected) {
+                    assert!((found - expected).abs() < 1.0, "{found} {expected}");
+                }
             }
         }
     }
