@@ -2,6 +2,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use super::energies::Energies;
 use super::gradients::{DIRECTIONS, GRAY, GradientSums, Place};
 use super::{Params, Rect};
 
@@ -21,9 +22,6 @@ const TURNED: [f32; 16] = {
     shares[0] = 1.0;
     shares
 };
-/// Cells of a row that are worked on together.
-const GROUP: usize = 8;
-
 /// Room for the cells of one area.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
@@ -37,14 +35,7 @@ pub(super) struct Cells {
     cells: Vec<[f32; 16]>,
     /// The gray value of each cell.
     grays: Vec<f32>,
-    /// The sum of the squares of each cell's directions, with a rim of zeros around: rows of `stride` values.
-    energies: Vec<f32>,
-    stride: usize,
-    /// For each column one over the number of cells beside it in a row, itself among them; the same for each row.
-    column_shares: Vec<f32>,
-    row_shares: Vec<f32>,
-    /// What the directions of each cell of a row are multiplied by.
-    scales: Vec<f32>,
+    energies: Energies,
 }
 
 /// [`Cells::describe`], to be compiled for the instructions that this machine has.
@@ -102,21 +93,7 @@ impl Cells {
         self.edges.resize(columns, [0.0; 16]);
         self.cells.resize(columns * rows, [0.0; 16]);
         self.grays.resize(columns * rows, 0.0);
-        let padded = columns.next_multiple_of(GROUP);
-        self.stride = padded + 2;
-        self.energies.clear();
-        self.energies.resize(self.stride * (rows + 2), 0.0);
-        let share = |i: usize, count: usize| {
-            let beside = (i + 2).min(count) - i.saturating_sub(1);
-            1.0 / beside as f32
-        };
-        self.column_shares.clear();
-        self.column_shares
-            .extend((0..columns).map(|i| share(i, columns)));
-        self.column_shares.resize(padded, 0.0);
-        self.row_shares.clear();
-        self.row_shares.extend((0..rows).map(|j| share(j, rows)));
-        self.scales.resize(padded, 0.0);
+        self.energies.prepare(columns, rows);
     }
 
     /// The cells of `area`, each the sum at its lower right corner, less those at the two beside it, and that at its
@@ -152,10 +129,7 @@ impl Cells {
             }
         }
         for (j, cells) in self.cells.chunks_exact(self.columns).enumerate() {
-            let energies = &mut self.energies[(j + 1) * self.stride + 1..];
-            for (energy, cell) in energies.iter_mut().zip(cells) {
-                *energy = energy_of(cell);
-            }
+            self.energies.take(j, cells);
         }
     }
 
@@ -174,11 +148,9 @@ impl Cells {
         let rows = self.cells.chunks_exact(self.columns);
         let rows = rows.zip(out.chunks_exact_mut(self.columns * CHANNELS));
         for (j, (cells, out)) in rows.enumerate() {
-            let around = &self.energies[j * self.stride..][..3 * self.stride];
-            let shares = (self.row_shares[j], &self.column_shares[..]);
-            scale_row(around, self.stride, shares, floor, &mut self.scales);
+            let scales = self.energies.scales(j, floor);
             let out = out.as_chunks_mut::<CHANNELS>().0;
-            for ((cell, scale), out) in cells.iter().zip(&self.scales).zip(out) {
+            for ((cell, scale), out) in cells.iter().zip(scales).zip(out) {
                 let mut values = *cell;
                 for value in &mut values {
                     let scaled = *value * scale;
@@ -189,49 +161,6 @@ impl Cells {
             }
         }
     }
-}
-
-/// What the directions of a row of cells are multiplied by: one over three times the root of the mean energy around,
-/// from three rows of energies of `stride` values each.
-#[inline(always)]
-fn scale_row(
-    around: &[f32],
-    stride: usize,
-    (row_share, column_shares): (f32, &[f32]),
-    floor: f32,
-    scales: &mut [f32],
-) {
-    let groups = scales.as_chunks_mut::<GROUP>().0;
-    let groups = groups.iter_mut().zip(column_shares.as_chunks::<GROUP>().0);
-    for (group, (scales, shares)) in groups.enumerate() {
-        let mut energy = [0.0; GROUP];
-        for row in 0..3 {
-            for column in 0..3 {
-                let part = &around[row * stride + group * GROUP + column..][..GROUP];
-                for lane in 0..GROUP {
-                    energy[lane] += part[lane];
-                }
-            }
-        }
-        for lane in 0..GROUP {
-            let mean = energy[lane] * row_share * shares[lane];
-            scales[lane] = 1.0 / (3.0 * (mean + floor).sqrt());
-        }
-    }
-}
-
-/// The sum of the squares of a cell's directions.
-#[inline(always)]
-fn energy_of(cell: &[f32; 16]) -> f32 {
-    let mut squares = [0.0; 8];
-    for lane in 0..8 {
-        squares[lane] = cell[lane] * cell[lane];
-    }
-    let mut pairs = [0.0; 4];
-    for lane in 0..4 {
-        pairs[lane] = squares[lane] + squares[lane + 4];
-    }
-    (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]) + cell[8] * cell[8]
 }
 
 /// The sum of a function of values, in eight parts so that the loop vectorises.

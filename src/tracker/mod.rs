@@ -52,6 +52,7 @@ mod discriminant;
 mod distance;
 mod downscale;
 mod eigen;
+mod energies;
 mod evaluation;
 mod examples;
 mod frame;
