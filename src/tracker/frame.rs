@@ -5,6 +5,7 @@
 //! uploaded with, which is what boxes are given in.
 
 use super::downscale;
+use std::borrow::Cow;
 
 pub use super::rect::Rect;
 
@@ -45,26 +46,48 @@ impl GrayFrame {
     /// # Errors
     /// A side of 0, or a number of values that is not `width * height`.
     pub fn from_luma(width: u32, height: u32, luma: Vec<u8>) -> Result<Self, FrameError> {
-        let expected = u64::from(width) * u64::from(height);
-        if width == 0 || height == 0 || luma.len() as u64 != expected {
-            return Err(FrameError::Size {
-                width,
-                height,
-                pixels: luma.len(),
-            });
+        Self::of((width, height), (width, height), Cow::Owned(luma))
+    }
+
+    /// The same for a frame of `source` = width, height, of which a decoder gives a reduced picture, with `size` = width,
+    /// height, in `luma`. It may be as small as the working image.
+    ///
+    /// # Errors
+    /// As [`Self::from_luma`]; also a picture that is smaller than the working image, or larger than the frame.
+    pub fn from_reduced(
+        source: (u32, u32),
+        size: (u32, u32),
+        luma: &[u8],
+    ) -> Result<Self, FrameError> {
+        Self::of(source, size, Cow::Borrowed(luma))
+    }
+
+    fn of(source: (u32, u32), size: (u32, u32), luma: Cow<[u8]>) -> Result<Self, FrameError> {
+        let error = FrameError::Size {
+            width: source.0,
+            height: source.1,
+            pixels: luma.len(),
+        };
+        let expected = u64::from(size.0) * u64::from(size.1);
+        if source.0 == 0 || source.1 == 0 || luma.len() as u64 != expected {
+            return Err(error);
         }
-        let (working_width, working_height) = working_size(width, height);
-        let pixels = if (working_width, working_height) == (width, height) {
-            luma
+        let working = working_size(source.0, source.1);
+        let fits = |size, working, source| working <= size && size <= source;
+        if !fits(size.0, working.0, source.0) || !fits(size.1, working.1, source.1) {
+            return Err(error);
+        }
+        let pixels = if working == size {
+            luma.into_owned()
         } else {
-            downscale::area_average(&luma, (width, height), (working_width, working_height))
+            downscale::area_average(&luma, size, working)
         };
         Ok(Self {
-            width: working_width,
-            height: working_height,
+            width: working.0,
+            height: working.1,
             pixels,
-            source_width: width,
-            source_height: height,
+            source_width: source.0,
+            source_height: source.1,
         })
     }
 
@@ -90,7 +113,7 @@ impl GrayFrame {
 }
 
 /// The size of the working image of an upload of `width` x `height`, both above 0.
-pub(super) fn working_size(width: u32, height: u32) -> (u32, u32) {
+pub fn working_size(width: u32, height: u32) -> (u32, u32) {
     let longer = width.max(height);
     if longer <= WORKING_SIDE {
         return (width, height);

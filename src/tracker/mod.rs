@@ -73,7 +73,7 @@ mod subspace;
 mod trust;
 
 pub use evaluation::Evaluation;
-pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
+pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE, working_size};
 pub use params::{Features, Params, Search};
 pub use patch::patch;
 pub use presets::Preset;
