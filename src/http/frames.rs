@@ -163,6 +163,9 @@ fn advance(
     }
     let decoded: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
     let estimates = locked.state().step(&decoded);
+    decoded
+        .into_iter()
+        .for_each(|(_, frame)| ingest::recycle(frame));
     let refused = |(index, error)| Problem::tracker(error).of_frame(index, frames.len());
     Ok((estimates.map_err(refused)?, false))
 }

@@ -76,14 +76,20 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GrayFrame, IngestError> {
     let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
     guard::unless_it_panics(format, || {
         ROOM.with_borrow_mut(|room| {
+            let working = std::mem::take(&mut room.working);
             let picture = match format {
                 Format::Jpeg => jpeg::decode(bytes, limits, room)?,
                 Format::Png => raster::decode_png(bytes, limits)?,
                 Format::WebP => raster::decode_webp(bytes, limits)?,
             };
-            let frame = picture.into_frame();
+            let frame = picture.into_frame(working);
             room.trim();
             frame.map_err(|error| format.damaged(error.to_string()))
         })
     })
+}
+
+/// Takes the memory of a frame that is done with, for the next one that this thread decodes.
+pub fn recycle(frame: GrayFrame) {
+    ROOM.with_borrow_mut(|room| room.working = frame.into_pixels());
 }

@@ -15,6 +15,8 @@ pub(super) struct Room {
     pub(super) file: Vec<u8>,
     /// Decoded values; what is behind those of this frame is of another.
     pub(super) pixels: Vec<u8>,
+    /// Memory for a working image; empty while a frame has it.
+    pub(super) working: Vec<u8>,
 }
 
 impl Room {
@@ -41,8 +43,8 @@ pub(super) struct Picture<'a> {
 }
 
 impl Picture<'_> {
-    /// Turned upright, and down to the working size.
-    pub(super) fn into_frame(self) -> Result<GrayFrame, FrameError> {
+    /// Turned upright, and down to the working size, into the memory of `working`.
+    pub(super) fn into_frame(self, working: Vec<u8>) -> Result<GrayFrame, FrameError> {
         let Self {
             mut luma,
             mut size,
@@ -59,6 +61,6 @@ impl Picture<'_> {
                 source = (source.1, source.0);
             }
         }
-        GrayFrame::from_reduced(source, size, &luma)
+        GrayFrame::from_reduced(source, size, &luma, working)
     }
 }

@@ -7,7 +7,6 @@ use super::Limits;
 use super::jpeg::MAX_SCANS;
 use super::jpeg_markers::Markers;
 use crate::tracker::working_size;
-use std::cell::RefCell;
 use turbojpeg::{Decompressor, Image, PixelFormat, ScalingFactor};
 
 /// The reductions for which it has vector instructions, and none at all.
@@ -17,10 +16,6 @@ const REDUCTIONS: [ScalingFactor; 4] = [
     ScalingFactor::ONE_HALF,
     ScalingFactor::ONE,
 ];
-
-thread_local! {
-    static DECOMPRESSOR: RefCell<Option<Decompressor>> = const { RefCell::new(None) };
-}
 
 /// Decodes to the smallest picture that is not smaller than the working image. Gives its width and height; its values
 /// begin `pixels`. None where the default decoder is to decide.
@@ -34,34 +29,30 @@ pub(super) fn decode(
     if !markers.is_usual() || limits.check_memory(memory).is_err() {
         return None;
     }
-    DECOMPRESSOR.with_borrow_mut(|kept| {
-        let decompressor = match kept {
-            Some(decompressor) => decompressor,
-            None => kept.insert(new_decompressor()?),
-        };
-        let (width, height) = (markers.width as usize, markers.height as usize);
-        let reduction = reduction(markers.width, markers.height);
-        let (reduced_width, reduced_height) = (reduction.scale(width), reduction.scale(height));
-        decompressor.set_scaling_factor(reduction).ok()?;
-        let whole = &bytes[..markers.after_end()];
-        let header = decompressor.read_header(whole).ok()?;
-        if (header.width, header.height) != (width, height) {
-            return None;
-        }
-        let len = reduced_width * reduced_height;
-        if pixels.len() < len {
-            pixels.resize(len, 0);
-        }
-        let image = Image {
-            pixels: &mut pixels[..len],
-            width: reduced_width,
-            pitch: reduced_width,
-            height: reduced_height,
-            format: PixelFormat::GRAY,
-        };
-        decompressor.decompress(whole, image).ok()?;
-        Some((reduced_width as u32, reduced_height as u32))
-    })
+    // A new one each time: tables of one file would be there for the next that lacks its own.
+    let mut decompressor = new_decompressor()?;
+    let (width, height) = (markers.width as usize, markers.height as usize);
+    let reduction = reduction(markers.width, markers.height);
+    let (reduced_width, reduced_height) = (reduction.scale(width), reduction.scale(height));
+    decompressor.set_scaling_factor(reduction).ok()?;
+    let whole = &bytes[..markers.after_end()];
+    let header = decompressor.read_header(whole).ok()?;
+    if (header.width, header.height) != (width, height) {
+        return None;
+    }
+    let len = reduced_width * reduced_height;
+    if pixels.len() < len {
+        pixels.resize(len, 0);
+    }
+    let image = Image {
+        pixels: &mut pixels[..len],
+        width: reduced_width,
+        pitch: reduced_width,
+        height: reduced_height,
+        format: PixelFormat::GRAY,
+    };
+    decompressor.decompress(whole, image).ok()?;
+    Some((reduced_width as u32, reduced_height as u32))
 }
 
 fn new_decompressor() -> Option<Decompressor> {
@@ -131,6 +122,28 @@ mod tests {
         for kept in whole.len() / 4..whole.len() * 9 / 10 {
             let cut = [&whole[..kept], &[0xFF, 0xD9]].concat();
             assert_eq!(reduced(&cut, &mut pixels), None, "{kept} bytes kept");
+        }
+        assert_eq!(reduced(&whole, &mut pixels), Some((160, 128)));
+    }
+    /// Where the first segment of this marker begins, and where it ends.
+    fn segment(bytes: &[u8], marker: u8) -> std::ops::Range<usize> {
+        let pair = bytes.windows(2).position(|pair| pair == [0xFF, marker]);
+        let at = pair.expect("the file has one");
+        at..at + 2 + usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]))
+    }
+
+    #[test]
+    fn a_file_neither_spoils_the_next_one_nor_lends_it_its_tables() {
+        let whole = jpeg(160, 128);
+        let mut pixels = Vec::new();
+        let mut broken = whole.clone();
+        let huffman = segment(&whole, 0xC4);
+        broken[huffman.start + 5..huffman.end].fill(0xFE);
+        let mut bare = whole.clone();
+        bare.drain(segment(&whole, 0xDB));
+        for other in [broken, bare] {
+            assert_eq!(reduced(&whole, &mut pixels), Some((160, 128)));
+            assert_eq!(reduced(&other, &mut pixels), None);
         }
         assert_eq!(reduced(&whole, &mut pixels), Some((160, 128)));
     }
