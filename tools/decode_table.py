@@ -63,10 +63,10 @@ def opencv_ms(data, width):
 
 def program(features):
     """Builds the benchmark's tables; gives the program's path."""
-    command = ["cargo", "bench", "--no-run", "--bench", "tables", "--message-format", "json", *features]
+    command = ["cargo", "bench", "--quiet", "--no-run", "--bench", "tables", "--message-format", "json", *features]
     built = subprocess.run(command, cwd=PROJECT, check=True, stdout=subprocess.PIPE, text=True)
     messages = map(json.loads, built.stdout.splitlines())
-    return [message["executable"] for message in messages if message.get("executable")][-1]
+    return next(m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "tables")
 
 
 def bagtrack_ms(tables, file):
