@@ -6,6 +6,7 @@ use command::{bagtrack, clip, fails, folder, succeeds, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 fn json(args: &[&str]) -> Value {
     let mut all = vec!["eval", "--format", "json"];
@@ -274,4 +275,21 @@ fn figures_are_drawn_with_a_curve_for_each_variant() {
         text(&dir.join("img/0001.jpg")),
     ]);
     assert!(line.contains("0001.jpg"), "{line}");
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let parent = folder();
+    let clip = clip(parent.path(), "clip", &[]);
+    let mut eval = Command::new(env!("CARGO_BIN_EXE_bagtrack"))
+        .args(["eval", "--preset", "paper", text(&clip)])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("cargo has built the binary");
+    drop(eval.stdout.take());
+    let output = eval.wait_with_output().expect("it ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    assert_eq!(errors, "");
 }

@@ -6,7 +6,7 @@ use bagtrack::ingest::{Limits, decode};
 use bagtrack::tracker::GrayFrame;
 use image::{DynamicImage, ImageFormat};
 use jpeg_encoder::ColorType;
-use pictures::{BASELINE, color, encode, exif, gray, jpeg, jpeg_forms, jpeg_of};
+use pictures::{BASELINE, JpegForm, color, encode, exif, gray, jpeg, jpeg_forms, jpeg_of};
 
 // Small enough that the working image is the picture itself; no multiple of a block.
 const SIZE: (u32, u32) = (101, 75);
@@ -189,6 +189,25 @@ fn large_frames_know_their_size_before_downscaling() {
     let bytes = jpeg(&color(1000, 500), BASELINE, Some(6));
     let frame = frame(&bytes);
     assert_eq!(frame.source_size(), (500, 1000));
+}
+
+#[test]
+fn a_large_jpeg_becomes_the_average_of_its_luma() {
+    // No multiples of each other, of a block, or of the working image.
+    for size in [(1283, 727), (640, 480), (331, 1040)] {
+        let picture = color(size.0, size.1);
+        let exact = frame(&encode(&picture.clone().into(), ImageFormat::Png));
+        let expected =
+            image::GrayImage::from_raw(exact.width(), exact.height(), exact.pixels().to_vec())
+                .expect("a frame has all its pixels");
+        for scans in [None, Some(5)] {
+            let form = JpegForm { scans, ..BASELINE };
+            let frame = frame(&jpeg(&picture, form, None));
+            assert_eq!(frame.source_size(), size);
+            let (_, mean) = difference(&frame, &expected);
+            assert!(mean < 1.0, "{size:?}, scans {scans:?}: off by {mean}");
+        }
+    }
 }
 
 fn with_png_exif(png: &[u8], orientation: u8) -> Vec<u8> {

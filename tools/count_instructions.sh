@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Instructions of one step (preset paper) and of decoding one JPEG, counted by callgrind: a regression shows whatever else
+# Instructions of one step of each preset and of decoding one JPEG, counted by callgrind: a regression shows whatever else
 # the machine does. Needs cargo, valgrind and python3 with cv2 or a JPEG of your own:
 #
 #     tools/count_instructions.sh [FRAME.jpg]
@@ -25,6 +25,7 @@ tables=$(cargo bench --no-run --bench tables --message-format json 2>/dev/null |
     sed -n 's/.*"executable":"\([^"]*tables-[^"]*\)".*/\1/p' | tail -1)
 [ -x "$tables" ] || { echo "the bench program tables was not built" >&2; exit 1; }
 
+# Collected while `repeat` does this so many times.
 instructions() {
     valgrind --tool=callgrind --callgrind-out-file=/dev/null "$tables" repeat "$@" 2>&1 >/dev/null |
         sed -n 's/.*Collected : *\([0-9]*\).*/\1/p'
@@ -32,10 +33,14 @@ instructions() {
 
 few=20
 many=60
-for what in step decode; do
-    file=()
-    [ "$what" = step ] || file=("$jpeg")
-    low=$(instructions "$what" "$few" "${file[@]}")
-    high=$(instructions "$what" "$many" "${file[@]}")
-    echo "$what: $(((high - low) / (many - few))) instructions"
-done
+count() {
+    local name=$1 low high
+    shift
+    low=$(instructions "${@/COUNT/$few}")
+    high=$(instructions "${@/COUNT/$many}")
+    echo "$name: $(((high - low) / (many - few))) instructions"
+}
+
+count "step of paper" step paper COUNT
+count "step of robust" step robust COUNT
+count "decode" decode COUNT "$jpeg"

@@ -3,12 +3,14 @@
 
     tools/decode_table.py [VIDEO_FRAME.jpg]
 
-Needs cargo and python3 with cv2 (opencv-python). The frame, or else a drawn one, is scaled to four sizes and written
+Needs cargo and python3 with cv2 (opencv-python), and for the feature `turbo` a C compiler, cmake and nasm. The frame, or else a drawn one, is scaled to four sizes and written
 as JPEG of quality 85, 4:2:0. bagtrack decodes each to its working image (luma, strict, at most 320 pixels
-on the longer side); OpenCV decodes it with the greatest reduction (2, 4 or 8) that leaves at least the working
-image, and area-averages the rest. Printed: medians in milliseconds, one thread.
+on the longer side), without and with the feature `turbo`; OpenCV decodes it with the greatest reduction (2, 4 or 8) that leaves at least the working
+image, and area-averages the rest. Printed: medians in milliseconds, one thread; each file is decoded by all in turn,
+several times over, and a ratio is the median of those of the turns.
 """
 
+import json
 import pathlib
 import statistics
 import subprocess
@@ -22,6 +24,8 @@ import numpy
 SIZES = [(320, 240), (640, 480), (1280, 720), (1920, 1080)]
 WORKING_SIDE = 320
 ROUNDS = 40
+TURNS = 5
+PROJECT = pathlib.Path(__file__).resolve().parent.parent
 REDUCED = {
     1: cv2.IMREAD_GRAYSCALE,
     2: cv2.IMREAD_REDUCED_GRAYSCALE_2,
@@ -57,9 +61,23 @@ def opencv_ms(data, width):
     return statistics.median(times) * 1e3, factor
 
 
+def program(features):
+    """Builds the benchmark's tables; gives the program's path."""
+    command = ["cargo", "bench", "--quiet", "--no-run", "--bench", "tables", "--message-format", "json", *features]
+    built = subprocess.run(command, cwd=PROJECT, check=True, stdout=subprocess.PIPE, text=True)
+    messages = map(json.loads, built.stdout.splitlines())
+    return next(m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "tables")
+
+
+def bagtrack_ms(tables, file):
+    """Median milliseconds of decoding, and of a step."""
+    table = subprocess.run([tables, "decode", file], check=True, capture_output=True, text=True)
+    _, _, _, decode, step = table.stdout.splitlines()[1].split("\t")
+    return float(decode), float(step)
+
+
 def main():
     cv2.setNumThreads(1)
-    project = pathlib.Path(__file__).resolve().parent.parent
     picture = cv2.imread(sys.argv[1]) if len(sys.argv) > 1 else drawn()
     if picture is None:
         sys.exit(f"{sys.argv[1]} cannot be read")
@@ -71,18 +89,20 @@ def main():
             if not cv2.imwrite(str(file), scaled, [cv2.IMWRITE_JPEG_QUALITY, 85]):
                 sys.exit(f"{file} cannot be written")
             files.append(str(file))
-        command = ["cargo", "bench", "--quiet", "--bench", "tables", "--", "decode", *files]
-        table = subprocess.run(command, cwd=project, check=True, capture_output=True, text=True)
-        print("| frame | KiB | bagtrack ms | OpenCV ms (reduction) | ratio | step ms |")
-        print("|---|---|---|---|---|---|")
-        for line in table.stdout.splitlines()[1:]:
-            file, width, height, decode, step = line.split("\t")
+        programs = [program([]), program(["--features", "turbo"])]
+        print("| frame | KiB | OpenCV ms (reduction) | bagtrack ms | ratio | with `turbo` ms | ratio | step ms |")
+        print("|---|---|---|---|---|---|---|---|")
+        for (width, height), file in zip(SIZES, files):
             data = numpy.fromfile(file, numpy.uint8)
-            theirs, factor = opencv_ms(data, int(width))
-            ratio = float(decode) / theirs
+            turns = []
+            for _ in range(TURNS):
+                theirs, factor = opencv_ms(data, width)
+                (default, step), (turbo, _) = (bagtrack_ms(tables, file) for tables in programs)
+                turns.append((theirs, default, default / theirs, turbo, turbo / theirs, step))
+            theirs, default, ratio, turbo, turbo_ratio, step = (statistics.median(column) for column in zip(*turns))
             print(
-                f"| {width} × {height} | {len(data) // 1024} | {decode} | {theirs:.3f} (1/{factor}) "
-                f"| {ratio:.2f} | {step} |"
+                f"| {width} × {height} | {len(data) // 1024} | {theirs:.3f} (1/{factor}) | {default:.3f} | {ratio:.2f} "
+                f"| {turbo:.3f} | {turbo_ratio:.2f} | {step:.3f} |"
             )
 
 

@@ -4,7 +4,7 @@
 //! - `growth`: the time of a step against N, D, K, P and the frame's size;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers;
-//! - `repeat step COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
+//! - `repeat step PRESET COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
 
 #[path = "../scene/clock.rs"]
 mod clock;
@@ -46,13 +46,14 @@ fn main() {
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
-        ["repeat", "step", count] => repeat_step(number(count)),
+        ["repeat", "step", "paper", count] => repeat_step(Preset::Paper, number(count)),
+        ["repeat", "step", "robust", count] => repeat_step(Preset::Robust, number(count)),
         ["repeat", "decode", count, file] => decode::repeat(number(count), file),
         // `cargo bench` and `cargo test --benches` start it without a table.
         [] => ratios::print(),
         _ => {
             eprintln!(
-                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step COUNT | repeat decode COUNT FILE"
+                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
             );
             std::process::exit(2);
         }
@@ -66,8 +67,8 @@ fn number(argument: &str) -> usize {
     })
 }
 
-fn repeat_step(count: usize) {
-    let (mut tracker, frames) = warm(Preset::Paper.params());
+fn repeat_step(preset: Preset, count: usize) {
+    let (mut tracker, frames) = warm(preset.params());
     for t in 1..=count {
         tracker
             .step(&frames[t % scene::ROUND])

@@ -14,7 +14,7 @@ use tokio::time::{Instant, sleep_until};
 use crate::Outcome;
 
 /// A failure that can pass between tasks.
-type Failure = Box<dyn std::error::Error + Send + Sync>;
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// What a run came to.
 pub struct Done {
@@ -28,9 +28,12 @@ pub struct Done {
 
 /// Sends pictures to a server.
 pub struct Driver {
-    url: String,
-    create: String,
-    pictures: Vec<Bytes>,
+    /// The server.
+    pub url: String,
+    /// Where a session of the preset is opened with the first picture.
+    pub create: String,
+    /// What is sent, over and over.
+    pub pictures: Vec<Bytes>,
 }
 
 impl Driver {

@@ -1,15 +1,18 @@
 //! A load generator: `cargo build --release && cargo run --release --example load -- --help`.
 //!
 //! It starts a server of its own on a free loopback port and prints, from one run:
-//! - the processor time of decoding and tracking a frame in this process, one thread;
+//! - the processor time of decoding and tracking a frame in this process, one thread, before and after each measurement;
 //! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
 //! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
 //!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
 //! - the processor time of the server process for a frame against that of decoding and tracking.
 //!
+//! With `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
+//!
 //! Frames, sessions and time are bounded. Linux only: processor time is read from `/proc`.
 
 mod drive;
+mod memory;
 mod pictures;
 mod process;
 
@@ -17,7 +20,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::Tracker;
+use bagtrack::tracker::{Preset, Rect, Tracker};
 use clap::Parser;
 use process::{Server, cpu_seconds};
 
@@ -38,11 +41,14 @@ struct Options {
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     zoom: u32,
     /// Preset of the sessions: paper or robust.
-    #[arg(long, default_value = "paper")]
+    #[arg(long, default_value = "robust")]
     preset: String,
     /// Seconds after which a measurement ends whatever was done.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
+    /// Print the resident memory of the server with 1000, 2000, 5000 … of these sessions, and nothing else.
+    #[arg(long)]
+    memory: bool,
     /// The server's binary; otherwise `bagtrack` beside this program's folder.
     #[arg(long)]
     server: Option<PathBuf>,
@@ -50,7 +56,7 @@ struct Options {
 
 fn main() -> Outcome<()> {
     let options = Options::parse();
-    let preset = serde_json::from_value(serde_json::json!(options.preset))?;
+    let preset: Preset = serde_json::from_value(serde_json::json!(options.preset))?;
     let pictures = pictures::jpegs(options.zoom as usize)?;
     let target = pictures::target(options.zoom as usize);
     println!(
@@ -61,28 +67,34 @@ fn main() -> Outcome<()> {
         options.preset
     );
 
-    let work = in_process(&pictures, target, preset, options.frames)?;
-    println!(
-        "decode + step in this process: {:.0} µs of processor time a frame",
-        work * 1e6
-    );
-
     let server = Server::start(options.server.clone(), options.sessions)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
+    let driver = drive::Driver::new(server.url(), pictures.clone(), target, &options.preset);
+    if options.memory {
+        return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
+    }
+    let mut alone = InProcess::new(pictures, target, preset)?;
     let limit = Duration::from_secs(options.seconds);
-    let driver = drive::Driver::new(server.url(), pictures, target, &options.preset);
-    let measure = |name: &str, sessions: u32, rate: Option<f64>| -> Outcome<f64> {
+    let mut measure = |name: &str, sessions: u32, rate: Option<f64>| -> Outcome<f64> {
+        // On a machine that others use too, before and after may differ much.
+        let work_before = alone.seconds_a_frame(options.frames / 4)?;
         let before = cpu_seconds(server.pid())?;
         let done = runtime.block_on(driver.run(sessions, options.frames, rate, limit))?;
         let cpu = (cpu_seconds(server.pid())? - before) / done.frames as f64;
+        let work_after = alone.seconds_a_frame(options.frames / 4)?;
+        let work = (work_before + work_after) / 2.0;
         println!(
-            "{name}: {} frames, {:.0} a second; server {:.0} µs of processor time a frame = {:.2} × (decode + step)",
-            done.frames,
-            done.per_second,
+            "{name}: {} frames, {:.0} a second",
+            done.frames, done.per_second
+        );
+        println!(
+            "    server {:.0} µs of processor time a frame = {:.2} × (decode + step), which took {:.0} before and {:.0} after",
             cpu * 1e6,
-            cpu / work
+            cpu / work,
+            work_before * 1e6,
+            work_after * 1e6
         );
         let quantile = |q| done.latencies.value_at_quantile(q) as f64 / 1e3;
         println!(
@@ -108,24 +120,39 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Seconds of processor time to decode and track a frame.
-fn in_process(
-    pictures: &[Vec<u8>],
-    target: bagtrack::tracker::Rect,
-    preset: bagtrack::tracker::Preset,
-    frames: u32,
-) -> Outcome<f64> {
-    let limits = Limits::default();
-    let first = ingest::decode(&pictures[0], &limits)?;
-    let mut tracker = Tracker::new(&first, target, preset.params())?;
-    let mut run = |count: u32| -> Outcome<()> {
-        for picture in pictures.iter().cycle().skip(1).take(count as usize) {
-            tracker.step(&ingest::decode(picture, &limits)?)?;
+/// The work of a frame without a service.
+struct InProcess {
+    pictures: Vec<Vec<u8>>,
+    tracker: Tracker,
+    done: usize,
+}
+
+impl InProcess {
+    fn new(pictures: Vec<Vec<u8>>, target: Rect, preset: Preset) -> Outcome<Self> {
+        let first = ingest::decode(&pictures[0], &Limits::default())?;
+        let mut alone = Self {
+            tracker: Tracker::new(&first, target, preset.params())?,
+            pictures,
+            done: 0,
+        };
+        alone.run(100)?;
+        Ok(alone)
+    }
+
+    fn run(&mut self, frames: u32) -> Outcome<()> {
+        for _ in 0..frames {
+            self.done += 1;
+            let picture = &self.pictures[self.done % self.pictures.len()];
+            self.tracker
+                .step(&ingest::decode(picture, &Limits::default())?)?;
         }
         Ok(())
-    };
-    run(100)?;
-    let before = cpu_seconds(std::process::id())?;
-    run(frames)?;
-    Ok((cpu_seconds(std::process::id())? - before) / f64::from(frames))
+    }
+
+    /// Seconds of processor time to decode and track a frame.
+    fn seconds_a_frame(&mut self, frames: u32) -> Outcome<f64> {
+        let before = cpu_seconds(std::process::id())?;
+        self.run(frames)?;
+        Ok((cpu_seconds(std::process::id())? - before) / f64::from(frames))
+    }
 }

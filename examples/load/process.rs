@@ -43,6 +43,8 @@ impl Server {
         let mut child = Command::new(&binary)
             .args(["serve", "--listen", "127.0.0.1:0", "--max-sessions", &room])
             .args(["--queue", &room, "--max-connections", &room])
+            // No session ends while others are still being opened.
+            .args(["--session-idle", "1d"])
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()

@@ -1,7 +1,7 @@
 //! `bagtrack eval`.
 
 use super::params::ParamFlags;
-use super::progress;
+use super::{output, progress};
 use bagtrack::eval::plots::{self, Evaluated};
 use bagtrack::eval::{self, Comparison, Report, Sequence, SequenceRuns, Variant, ablation};
 use bagtrack::ingest::Limits;
@@ -138,10 +138,10 @@ fn print<R: serde::Serialize + std::fmt::Display>(
     report: &R,
     markdown: fn(&R) -> String,
 ) -> Result<(), Box<dyn Error>> {
-    match format {
-        Format::Table => print!("{report}"),
-        Format::Json => println!("{}", serde_json::to_string_pretty(report)?),
-        Format::Markdown => print!("{}", markdown(report)),
-    }
-    Ok(())
+    let text = match format {
+        Format::Table => report.to_string(),
+        Format::Json => serde_json::to_string_pretty(report)? + "\n",
+        Format::Markdown => markdown(report),
+    };
+    Ok(output::print(&text)?)
 }

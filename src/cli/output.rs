@@ -1,6 +1,7 @@
-//! Folders that a command writes.
+//! What a command writes: folders, and standard output.
 
 use std::fs;
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
 /// Makes `dir`, or takes it where it is empty: nothing that somebody keeps is ever written over.
@@ -14,4 +15,13 @@ pub fn new_folder(dir: &Path) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+/// Writes `text` to standard output. It is no error when the reader has seen enough, as in `bagtrack eval … | head`.
+pub fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
 }

@@ -70,8 +70,8 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     clip.write(&args.out, format, || bar.inc(1))?;
     bar.finish_and_clear();
     let first = clip.target(0);
-    println!(
-        "{} frames in {}; the target starts at --box {:.1},{:.1},{:.1},{:.1}",
+    let line = format!(
+        "{} frames in {}; the target starts at --box {:.1},{:.1},{:.1},{:.1}\n",
         args.frames,
         args.out.display(),
         first.x,
@@ -79,5 +79,5 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         first.width,
         first.height
     );
-    Ok(())
+    Ok(output::print(&line)?)
 }

@@ -3,7 +3,6 @@
 use bagtrack::http::{Application, Config};
 use std::error::Error;
 use std::io::IsTerminal;
-use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
 /// Flags of `serve`.
@@ -31,12 +30,11 @@ enum LogFormat {
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     start_log(&args.log, args.log_format)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(args.config.network_threads())
         .enable_all()
         .build()?;
-    let result = runtime.block_on(serve(args.config));
-    // Work that did not end in time must not hold up the exit.
-    runtime.shutdown_timeout(Duration::from_secs(1));
-    result
+    // Work that did not end in time does not hold up the exit: its threads end with the process.
+    runtime.block_on(serve(args.config))
 }
 
 async fn serve(config: Config) -> Result<(), Box<dyn Error>> {

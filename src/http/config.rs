@@ -190,8 +190,13 @@ impl Config {
 
     /// The number of workers, with its default.
     pub fn worker_count(&self) -> usize {
-        let cores = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         self.workers.unwrap_or_else(cores)
+    }
+
+    /// The number of threads that serve connections. Reading and answering a request takes a tenth of the time that its
+    /// frame takes a worker; and with fewer threads there are fewer to wake for it.
+    pub fn network_threads(&self) -> usize {
+        self.worker_count().div_ceil(8).clamp(1, cores())
     }
 
     /// What a frame may cost.
@@ -203,6 +208,10 @@ impl Config {
             max_memory: self.max_frame_memory,
         }
     }
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::openapi;
 use super::problem::Problem;
 use super::problem_kind::Kind;
 use super::state::AppState;
-use super::upload::{Form, Upload};
+use super::upload::{Form, Received, Upload};
 use super::work;
 use crate::sessions::{Fingerprint, SNAPSHOT_MAGIC, Session, State as SessionState};
 use crate::tracker::{Params, Tracker};
@@ -86,7 +86,8 @@ struct CreateForm {
     /// Seed of all random draws; a random one when left out.
     #[schema(nullable = false)]
     seed: Option<u64>,
-    /// A JSON object of parameters that are set otherwise than in the preset.
+    /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit together;
+    /// see the call.
     #[schema(example = "{\"seed\": 7}")]
     #[schema(nullable = false)]
     params: Option<String>,
@@ -108,7 +109,7 @@ struct CreateJson {
     /// Seed of all random draws; a random one when left out.
     #[schema(nullable = false)]
     seed: Option<u64>,
-    /// Parameters that are set otherwise than in the preset.
+    /// Parameters that are set otherwise than in the preset. Each has a range, and some have a limit together; see the call.
     #[schema(value_type = Option<Object>)]
     params: Option<()>,
 }
@@ -134,6 +135,12 @@ impl utoipa::IntoResponses for Problems {
 /// The first frame and the target's box start the tracker. A session snapshot in the place of the frame, with
 /// nothing else, restores that session under a new id; it goes on exactly where it stood.
 ///
+/// Every parameter has a range, and the sizes that multiply have limits together, so that no session is out of proportion in
+/// time or memory. With F numbers in a feature vector (patch_width × patch_height, and ten times that for `gradients`),
+/// these are at most: particles × F, 1,100,000; (bag_size × (basis_dim + 1) + background_samples) × F, 1,000,000;
+/// background_samples × (particles + bag_size × (history + 1)) × F, 110,000,000. And pinned is less than bag_size. A
+/// parameter out of these answers `invalid-parameter`, with the limit in its detail.
+///
 /// `curl --data-binary @first.jpg 'http://localhost:8080/sessions?box=10,20,30,40'`
 #[utoipa::path(
     post, path = "/sessions", tag = "sessions", operation_id = "createSession",
@@ -158,11 +165,9 @@ impl utoipa::IntoResponses for Problems {
     )
 )]
 pub async fn create(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
-    let fields = FORM.query(request.uri())?;
     let too_many = |_| Problem::too_many_sessions();
-    state.registry.check_room().map_err(too_many)?;
-    let queue = state.enter(request.headers())?;
-    let upload = FORM.read(&state, &queue, fields, request).await?;
+    let has_room = || state.registry.check_room().map_err(too_many);
+    let Received { queue, upload, .. } = FORM.receive(&state, request, has_room).await?;
     let started = match is_snapshot(&upload) {
         true => restore(&state, queue, upload).await?,
         false => start(&state, queue, upload).await?,

@@ -6,7 +6,7 @@ use super::problem::Problem;
 use super::problem_kind::Kind;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use super::upload::Form;
+use super::upload::{Form, Received};
 use super::work;
 use crate::ingest;
 use crate::sessions::{Fingerprint, Locked, Turn};
@@ -103,11 +103,11 @@ pub async fn post(
     path: SessionPath,
     request: Request,
 ) -> Result<Response, Problem> {
-    let fields = FORM.query(request.uri())?;
-    let session = path.find(&state)?;
-    let queue = state.enter(request.headers())?;
-    let place = session.enter().map_err(|_| Problem::session_busy())?;
-    let upload = FORM.read(&state, &queue, fields, request).await?;
+    let Received {
+        admitted: place,
+        queue,
+        upload,
+    } = FORM.receive(&state, request, || path.enter(&state)).await?;
     let number = upload.fields.number;
     let limits = state.config.frame_limits();
     let (estimates, replayed) = work::on_session(&state, place, queue, move |locked| {
@@ -163,6 +163,9 @@ fn advance(
     }
     let decoded: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
     let estimates = locked.state().step(&decoded);
+    decoded
+        .into_iter()
+        .for_each(|(_, frame)| ingest::recycle(frame));
     let refused = |(index, error)| Problem::tracker(error).of_frame(index, frames.len());
     Ok((estimates.map_err(refused)?, false))
 }

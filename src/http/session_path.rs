@@ -2,7 +2,7 @@
 
 use super::problem::Problem;
 use super::state::AppState;
-use crate::sessions::Session;
+use crate::sessions::{Place, Session};
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
 use std::sync::Arc;
@@ -28,5 +28,10 @@ impl SessionPath {
         let id = self.0.parse().ok();
         id.and_then(|id| state.registry.get(id))
             .ok_or_else(Problem::session_not_found)
+    }
+    /// A place at the session of this id.
+    pub fn enter(&self, state: &AppState) -> Result<Place, Problem> {
+        let session = self.find(state)?;
+        session.enter().map_err(|_| Problem::session_busy())
     }
 }

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::problem_kind::Kind;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use super::upload::Form;
+use super::upload::{Form, Received};
 use super::work;
 use crate::ingest;
 use crate::sessions::{Fingerprint, Locked, Turn};
@@ -98,11 +98,11 @@ pub async fn put(
     path: SessionPath,
     request: Request,
 ) -> Result<Response, Problem> {
-    let fields = FORM.query(request.uri())?;
-    let session = path.find(&state)?;
-    let queue = state.enter(request.headers())?;
-    let place = session.enter().map_err(|_| Problem::session_busy())?;
-    let upload = FORM.read(&state, &queue, fields, request).await?;
+    let Received {
+        admitted: place,
+        queue,
+        upload,
+    } = FORM.receive(&state, request, || path.enter(&state)).await?;
     let target = upload.fields.target.ok_or_else(Problem::missing_box)?;
     let number = upload.fields.number;
     let limits = state.config.frame_limits();

@@ -20,7 +20,7 @@ where
 {
     match timeout(state.config.work_timeout, state.admission.run(queue, work)).await {
         Ok(Ok(result)) => result,
-        Ok(Err(panicked)) => Err(Problem::internal(Arc::new(panicked))),
+        Ok(Err(lost)) => Err(Problem::internal(Arc::new(lost))),
         Err(_) => Err(Problem::work_timeout()),
     }
 }
@@ -43,7 +43,7 @@ where
             .map_err(|_| Problem::session_not_found())?;
         let work = move || work(&mut locked);
         let done = state.admission.run(queue, work).await;
-        done.map_err(|panicked| Problem::internal(Arc::new(panicked)))?
+        done.map_err(|lost| Problem::internal(Arc::new(lost)))?
     };
     timeout(state.config.work_timeout, waiting)
         .await

@@ -1,21 +1,30 @@
 //! The marker structure of a JPEG (ITU-T T.81, annex B), read before decoding: is the file whole, and what will
 //! decoding it cost? The decoder by itself does not say when only the end of the last scan is missing.
 
+use memchr::memchr;
+use std::ops::Range;
+
 /// One component of the frame header: its horizontal and vertical sampling factors.
 type Sampling = (u32, u32);
 
 /// More one-bits than the longest code (16) and the value behind it (16) can use up.
 const GUARD_BYTES: usize = 8;
 
+/// What an APP1 segment with an EXIF block begins with.
+const EXIF: &[u8] = b"Exif\0\0";
+
 /// What the markers tell.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Markers {
     pub(super) width: u32,
     pub(super) height: u32,
-    progressive: bool,
+    /// Which start-of-frame marker it has: the last half of its code.
+    process: u8,
     components: Vec<Sampling>,
     scans: usize,
     entropy_coded_bytes: u64,
+    /// Where the EXIF block is, from its TIFF header on.
+    exif: Option<Range<usize>>,
     /// Where the end-of-image marker is.
     end: usize,
 }
@@ -24,6 +33,7 @@ impl Markers {
     /// Reads from the start to the end-of-image marker.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, &'static str> {
         let mut frame = None;
+        let mut exif = None;
         let mut scans = 0;
         let mut entropy_coded_bytes = 0;
         let mut at = 2;
@@ -51,6 +61,9 @@ impl Markers {
                     }
                     frame = Some((marker, FrameHeader::read(segment)?));
                 }
+                0xE1 if segment.starts_with(EXIF) => {
+                    exif = Some(at - segment.len() + EXIF.len()..at);
+                }
                 0xDA => {
                     scans += 1;
                     let end = end_of_scan(bytes, at).ok_or("it is cut short")?;
@@ -64,10 +77,11 @@ impl Markers {
         Ok(Self {
             width: header.width,
             height: header.height,
-            progressive: marker == 0xC2,
+            process: marker & 15,
             components: header.components,
             scans,
             entropy_coded_bytes,
+            exif,
             end: at - 2,
         })
     }
@@ -78,7 +92,7 @@ impl Markers {
         if self.components[0] != largest || (is_cmyk && largest != (1, 1)) {
             return Some("its first channel is subsampled, which is not supported");
         }
-        if !self.progressive && self.scans > 1 && largest.1 > 1 {
+        if !self.is_progressive() && self.scans > 1 && largest.1 > 1 {
             return Some(
                 "its channels come one after the other with vertical subsampling, which is not supported; \
                  progressive and interleaved files are",
@@ -87,27 +101,50 @@ impl Markers {
         None
     }
 
+    /// Whether this is what nearly all files are: baseline, extended or progressive with Huffman codes, gray or of three
+    /// channels, in a layout that the default decoder takes.
+    #[cfg(feature = "turbo")]
+    pub(super) fn is_usual(&self) -> bool {
+        self.process <= 2
+            && matches!(self.components.len(), 1 | 3)
+            && self.unsupported(false).is_none()
+    }
+
+    /// Where the image ends, its end marker included.
+    #[cfg(feature = "turbo")]
+    pub(super) fn after_end(&self) -> usize {
+        self.end + 2
+    }
+
+    fn is_progressive(&self) -> bool {
+        self.process == 2
+    }
+
     /// Whether the decoder is right when it leaves colour out: not where colour has half the rows but all columns.
     pub(super) fn can_skip_color(&self) -> bool {
         matches!(self.largest_sampling(), (_, 1) | (2, 2))
     }
 
-    /// The image with one-bits before its end marker. The decoder reads zero-bits for ever once it has met the
+    /// The EXIF block of the image that these markers are of.
+    pub(super) fn exif<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        bytes.get(self.exif.clone()?)
+    }
+
+    /// Puts into `guarded` the image with one-bits before its end marker. The decoder reads zero-bits for ever once it has met the
     /// end marker, and makes gray blocks of them; a run of one-bits is the one code that no Huffman table has
     /// (T.81, annex C), so where blocks are missing it has to say so. A whole image is done before them; but not one whose
     /// channels come one after the other with restarts, where the decoder reads past the end of the last.
-    pub(super) fn with_guarded_end(&self, bytes: &[u8]) -> Vec<u8> {
-        let guard_bytes = if self.progressive || self.scans == 1 {
+    pub(super) fn with_guarded_end(&self, bytes: &[u8], guarded: &mut Vec<u8>) {
+        let guard_bytes = if self.is_progressive() || self.scans == 1 {
             GUARD_BYTES
         } else {
             0
         };
-        let mut guarded = Vec::with_capacity(self.end + 2 * GUARD_BYTES + 2);
+        guarded.clear();
         guarded.extend_from_slice(&bytes[..self.end]);
         // A byte of ones in entropy-coded data is written with a zero byte after it.
         guarded.extend([0xFF, 0x00].repeat(guard_bytes));
         guarded.extend([0xFF, 0xD9]);
-        guarded
     }
 
     /// Bytes that decoding allocates at most: the output (`output_channels` bytes a pixel) and, where the image
@@ -117,7 +154,7 @@ impl Markers {
         let (h_max, v_max) = self.largest_sampling();
         let output = pixels * output_channels;
         let row_buffers = 16 * u64::from(self.width + 64) * u64::from(v_max) * 8;
-        if !self.progressive && self.scans < 2 {
+        if !self.is_progressive() && self.scans < 2 {
             return output + row_buffers;
         }
         let unit_columns = u64::from(self.width.div_ceil(8 * h_max));
@@ -191,7 +228,7 @@ impl FrameHeader {
 /// The next marker's code, at or after `at`, and where its segment begins. Fill bytes are skipped.
 fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
     loop {
-        at += bytes.get(at..)?.iter().position(|&byte| byte == 0xFF)?;
+        at += memchr(0xFF, bytes.get(at..)?)?;
         at += bytes[at..].iter().position(|&byte| byte != 0xFF)?;
         if bytes[at] != 0 {
             return Some((bytes[at], at + 1));
@@ -202,7 +239,7 @@ fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
 /// Where entropy-coded data that begins at `at` ends: at the first marker that is not a restart.
 fn end_of_scan(bytes: &[u8], mut at: usize) -> Option<usize> {
     loop {
-        at += bytes.get(at..)?.iter().position(|&byte| byte == 0xFF)?;
+        at += memchr(0xFF, bytes.get(at..)?)?;
         match *bytes.get(at + 1)? {
             0x00 | 0xD0..=0xD7 => at += 2,
             0xFF => at += 1,

@@ -11,6 +11,9 @@
 //! - *Upright*: the EXIF orientation of a JPEG, PNG or WebP is applied, so boxes are in the pixels that a browser shows.
 //! - *Animations*: the first image.
 //!
+//! With the feature `turbo`, libjpeg-turbo decodes the usual JPEGs, already reduced where they are large. It only says yes:
+//! whatever it warns of, or does not take, is decided by the default decoder, so the same files are errors.
+//!
 //! ```
 //! use bagtrack::ingest::{decode, IngestError, Limits};
 //! let error = decode(b"GIF89a", &Limits::default()).unwrap_err();
@@ -24,13 +27,22 @@ mod jpeg_markers;
 mod limits;
 mod luma;
 mod orientation;
+mod picture;
 mod raster;
 mod sniff;
+#[cfg(feature = "turbo")]
+mod turbo;
 
 pub use limits::Limits;
 
 use crate::tracker::GrayFrame;
+use picture::Room;
 use sniff::Format;
+use std::cell::RefCell;
+
+thread_local! {
+    static ROOM: RefCell<Room> = RefCell::default();
+}
 
 /// Why bytes are not a frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -54,20 +66,30 @@ pub enum IngestError {
 
 /// Decodes one uploaded frame: sniff, limit, decode strictly, luma, EXIF orientation, downscale.
 ///
-/// Costs at most [`Limits::max_memory`] bytes beside the upload itself and the working image.
+/// Costs at most [`Limits::max_memory`] bytes beside the upload itself and the working image. A thread keeps some of that
+/// for its next frame, at most 32 MiB.
 ///
 /// # Errors
 /// See [`IngestError`].
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GrayFrame, IngestError> {
     limits.check_bytes(bytes.len())?;
     let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
-    let (luma, orientation) = guard::unless_it_panics(format, || match format {
-        Format::Jpeg => jpeg::decode(bytes, limits),
-        Format::Png => raster::decode_png(bytes, limits),
-        Format::WebP => raster::decode_webp(bytes, limits),
-    })?;
-    let upright = orientation::apply(luma, orientation);
-    let (width, height) = upright.dimensions();
-    GrayFrame::from_luma(width, height, upright.into_raw())
-        .map_err(|error| format.damaged(error.to_string()))
+    guard::unless_it_panics(format, || {
+        ROOM.with_borrow_mut(|room| {
+            let working = std::mem::take(&mut room.working);
+            let picture = match format {
+                Format::Jpeg => jpeg::decode(bytes, limits, room)?,
+                Format::Png => raster::decode_png(bytes, limits)?,
+                Format::WebP => raster::decode_webp(bytes, limits)?,
+            };
+            let frame = picture.into_frame(working);
+            room.trim();
+            frame.map_err(|error| format.damaged(error.to_string()))
+        })
+    })
+}
+
+/// Takes the memory of a frame that is done with, for the next one that this thread decodes.
+pub fn recycle(frame: GrayFrame) {
+    ROOM.with_borrow_mut(|room| room.working = frame.into_pixels());
 }

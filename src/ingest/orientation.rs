@@ -9,12 +9,22 @@ pub(super) fn of_exif(exif: Option<&[u8]>) -> Orientation {
         .unwrap_or(Orientation::NoTransforms)
 }
 
-/// Turns and mirrors the picture upright.
-pub(super) fn apply(luma: GrayImage, orientation: Orientation) -> GrayImage {
-    if orientation == Orientation::NoTransforms {
-        return luma;
-    }
-    let mut image = DynamicImage::ImageLuma8(luma);
+/// Whether width and height change places.
+pub(super) fn swaps_sides(orientation: Orientation) -> bool {
+    matches!(
+        orientation,
+        Orientation::Rotate90
+            | Orientation::Rotate270
+            | Orientation::Rotate90FlipH
+            | Orientation::Rotate270FlipH
+    )
+}
+
+/// Turns and mirrors the picture of this `size` upright; `size` becomes that of the upright one.
+pub(super) fn apply(luma: Vec<u8>, size: &mut (u32, u32), orientation: Orientation) -> Vec<u8> {
+    let stored = GrayImage::from_raw(size.0, size.1, luma).expect("a decoder gives every pixel");
+    let mut image = DynamicImage::ImageLuma8(stored);
     image.apply_orientation(orientation);
-    image.into_luma8()
+    *size = (image.width(), image.height());
+    image.into_luma8().into_raw()
 }

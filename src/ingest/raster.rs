@@ -2,18 +2,17 @@
 
 use super::containers::{check_png_whole, check_webp_whole};
 use super::luma::luma_of;
+use super::picture::Picture;
 use super::sniff::Format;
 use super::{IngestError, Limits};
 use image::codecs::png::PngDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
-use image::{DynamicImage, GrayImage, ImageDecoder, ImageError};
+use image::{DynamicImage, ImageDecoder, ImageError};
+use std::borrow::Cow;
 use std::io::Cursor;
 
-pub(super) fn decode_png(
-    bytes: &[u8],
-    limits: &Limits,
-) -> Result<(GrayImage, Orientation), IngestError> {
+pub(super) fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Picture<'static>, IngestError> {
     check_png_whole(bytes).map_err(|reason| Format::Png.damaged(reason))?;
     // Also bounds compressed side chunks (text, colour profiles), which are read with the header.
     let mut decoder_limits = image::Limits::no_limits();
@@ -23,10 +22,7 @@ pub(super) fn decode_png(
     decode(decoder, Format::Png, 0, limits)
 }
 
-pub(super) fn decode_webp(
-    bytes: &[u8],
-    limits: &Limits,
-) -> Result<(GrayImage, Orientation), IngestError> {
+pub(super) fn decode_webp(bytes: &[u8], limits: &Limits) -> Result<Picture<'static>, IngestError> {
     check_webp_whole(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
@@ -39,7 +35,7 @@ fn decode(
     format: Format,
     working_bytes_per_pixel: u64,
     limits: &Limits,
-) -> Result<(GrayImage, Orientation), IngestError> {
+) -> Result<Picture<'static>, IngestError> {
     let (width, height) = decoder.dimensions();
     limits.check_size(width, height)?;
     // The decoded picture, what the decoder needs beside it, and the luma.
@@ -47,7 +43,14 @@ fn decode(
     limits.check_memory(decoder.total_bytes() + (working_bytes_per_pixel + 1) * pixels)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let image = DynamicImage::from_decoder(decoder).map_err(|error| typed(format, error))?;
-    Ok((luma_of(image), orientation))
+    let luma = luma_of(image);
+    let size = luma.dimensions();
+    Ok(Picture {
+        luma: Cow::Owned(luma.into_raw()),
+        size,
+        source: size,
+        orientation,
+    })
 }
 
 fn typed(format: Format, error: ImageError) -> IngestError {

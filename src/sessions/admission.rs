@@ -5,8 +5,11 @@
 //! goes away does not stop work that has begun, so its permits stay taken until that work has ended, and
 //! the number of threads at work is never more than the number of workers.
 
+use super::workers::Workers;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 /// Bytes that one permit of the room for bodies stands for.
 const UNIT: usize = 1024;
@@ -16,10 +19,24 @@ const UNIT: usize = 1024;
 #[error("the queue is full")]
 pub struct QueueFull;
 
-/// The work panicked. The panic itself has been printed by the panic hook.
-#[derive(Debug, thiserror::Error)]
-#[error("the work panicked: {0}")]
-pub struct WorkPanicked(#[source] tokio::task::JoinError);
+/// The work panicked, or there was no thread for it. The panic itself has been printed by the panic hook.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WorkLost {
+    /// What the panic said, where it was a text.
+    #[error("the work panicked: {0}")]
+    Panicked(String),
+    /// The system gave no thread.
+    #[error("there is no thread for the work")]
+    NoThread,
+}
+
+impl WorkLost {
+    fn of(panic: &(dyn Any + Send)) -> Self {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+        Self::Panicked(text.unwrap_or("something that is no text").to_owned())
+    }
+}
 
 /// A place in the queue, given back when the last clone is dropped.
 #[derive(Debug, Clone)]
@@ -33,6 +50,7 @@ pub struct Admission {
     queue: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
     workers: Arc<Semaphore>,
+    threads: Arc<Workers>,
 }
 
 impl Admission {
@@ -43,6 +61,7 @@ impl Admission {
             queue: Arc::new(Semaphore::new(queue)),
             bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(UNIT))),
             workers: Arc::new(Semaphore::new(workers)),
+            threads: Arc::new(Workers::new(workers)),
         }
     }
 
@@ -62,12 +81,12 @@ impl Admission {
         }
     }
 
-    /// Waits for a worker, in order of arrival, and runs `work` on a blocking thread. Dropping the future
+    /// Waits for a worker, in order of arrival, and runs `work` on its thread. Dropping the future
     /// before a worker is free cancels the work; afterwards it runs to its end, holding its permits.
     ///
     /// # Errors
-    /// The work panicked.
-    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkPanicked>
+    /// The work panicked, or there was no thread for it.
+    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
     where
         T: Send + 'static,
         F: FnOnce() -> T + Send + 'static,
@@ -75,13 +94,19 @@ impl Admission {
         let acquired = self.workers.clone().acquire_owned().await;
         let worker = acquired.expect("the semaphore is never closed");
         let span = tracing::Span::current();
-        let work = move || {
-            let _permits = (queue, worker);
-            span.in_scope(work)
-        };
-        tokio::task::spawn_blocking(work)
-            .await
-            .map_err(WorkPanicked)
+        let (send, outcome) = oneshot::channel();
+        self.threads.start(Box::new(move || {
+            let permits = (queue, worker);
+            // `work` is used up by a panic, so nobody sees what it left half changed.
+            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
+            drop(permits);
+            // Nobody waits when the client has gone.
+            let _ = send.send(outcome);
+        }));
+        match outcome.await {
+            Ok(outcome) => outcome.map_err(|panic| WorkLost::of(panic.as_ref())),
+            Err(_) => Err(WorkLost::NoThread),
+        }
     }
 
     /// Places free in the queue.
@@ -152,8 +177,11 @@ mod tests {
         let admission = Admission::new(1, 5000, 1);
         let queue = admission.enter(5000).unwrap();
         let result = admission.run(queue, || panic!("a test panics")).await;
-        let panicked: Result<(), WorkPanicked> = result;
-        assert!(panicked.is_err());
+        let panicked: Result<(), WorkLost> = result;
+        assert_eq!(
+            panicked,
+            Err(WorkLost::Panicked("a test panics".to_owned()))
+        );
         assert_eq!((admission.queue_places(), admission.free_workers()), (1, 1));
     }
 }

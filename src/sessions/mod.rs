@@ -12,8 +12,9 @@ mod envelope;
 mod registry;
 mod replay;
 mod session;
+mod workers;
 
-pub use admission::{Admission, QueueFull, QueuePermit, WorkPanicked};
+pub use admission::{Admission, QueueFull, QueuePermit, WorkLost};
 pub use clock::Clock;
 pub use envelope::{EnvelopeError, MAGIC as SNAPSHOT_MAGIC};
 pub use registry::{Full, Registry};

@@ -58,12 +58,18 @@ fn shares(source: u32, target: u32) -> Vec<Share> {
 }
 
 /// The area average of `luma` (`source` = width, height, row order) on a grid of `target` = width, height, where
-/// no target side is above its source side.
-pub(super) fn area_average(luma: &[u8], source: (u32, u32), target: (u32, u32)) -> Vec<u8> {
+/// no target side is above its source side. It is put into `out`, which is empty.
+pub(super) fn area_average(
+    luma: &[u8],
+    source: (u32, u32),
+    target: (u32, u32),
+    out: Vec<u8>,
+) -> Vec<u8> {
     Arch::new().dispatch(Average {
         luma,
         source,
         target,
+        out,
     })
 }
 
@@ -72,6 +78,7 @@ struct Average<'a> {
     luma: &'a [u8],
     source: (u32, u32),
     target: (u32, u32),
+    out: Vec<u8>,
 }
 
 impl WithSimd for Average<'_> {
@@ -83,11 +90,12 @@ impl WithSimd for Average<'_> {
             luma,
             source,
             target,
+            mut out,
         } = self;
         let is_whole = source.0.is_multiple_of(target.0);
         let columns = cells(source.0, target.0);
         let rows = shares(source.1, target.1);
-        let mut out = Vec::with_capacity(target.0 as usize * target.1 as usize);
+        out.reserve_exact(target.0 as usize * target.1 as usize);
         // Rows first: that loop runs over every source pixel, and this way it is contiguous. 255 times the weights
         // of a column, which sum to the source height, stays far below 2^32 for any image that fits into memory.
         let mut sums = vec![0_u32; source.0 as usize];
@@ -206,7 +214,7 @@ mod tests {
             let luma: Vec<u8> = (0..source.0 * source.1)
                 .map(|i| (i * 89 % 256) as u8)
                 .collect();
-            let averages = area_average(&luma, source, target);
+            let averages = area_average(&luma, source, target, Vec::new());
             let expected = by_definition(&luma, source, target);
             assert_eq!(averages.len(), expected.len());
             for (&average, &expected) in averages.iter().zip(&expected) {
@@ -221,7 +229,7 @@ mod tests {
         for source in [(1921, 1079), (321, 1), (1, 5000), (640, 480)] {
             let luma = vec![255; source.0 as usize * source.1 as usize];
             let target = crate::tracker::frame::working_size(source.0, source.1);
-            let averages = area_average(&luma, source, target);
+            let averages = area_average(&luma, source, target, Vec::new());
             assert_eq!(averages.len(), target.0 as usize * target.1 as usize);
             assert!(averages.iter().all(|&value| value == 255));
         }

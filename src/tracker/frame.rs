@@ -45,27 +45,46 @@ impl GrayFrame {
     /// # Errors
     /// A side of 0, or a number of values that is not `width * height`.
     pub fn from_luma(width: u32, height: u32, luma: Vec<u8>) -> Result<Self, FrameError> {
-        let expected = u64::from(width) * u64::from(height);
-        if width == 0 || height == 0 || luma.len() as u64 != expected {
-            return Err(FrameError::Size {
-                width,
-                height,
-                pixels: luma.len(),
-            });
-        }
-        let (working_width, working_height) = working_size(width, height);
-        let pixels = if (working_width, working_height) == (width, height) {
+        let size = (width, height);
+        let working = checked_working_size(size, size, luma.len())?;
+        let pixels = if working == size {
             luma
         } else {
-            downscale::area_average(&luma, (width, height), (working_width, working_height))
+            downscale::area_average(&luma, size, working, Vec::new())
         };
-        Ok(Self {
-            width: working_width,
-            height: working_height,
+        Ok(Self::new(size, working, pixels))
+    }
+
+    /// The same for a frame of `source` = width, height, of which a decoder gives a reduced picture, with `size` = width,
+    /// height, in `luma`. It may be as small as the working image. `room` is memory for the working image, whatever it holds.
+    ///
+    /// # Errors
+    /// As [`Self::from_luma`]; also a picture that is smaller than the working image, or larger than the frame.
+    pub fn from_reduced(
+        source: (u32, u32),
+        size: (u32, u32),
+        luma: &[u8],
+        mut room: Vec<u8>,
+    ) -> Result<Self, FrameError> {
+        let working = checked_working_size(source, size, luma.len())?;
+        room.clear();
+        let pixels = if working == size {
+            room.extend_from_slice(luma);
+            room
+        } else {
+            downscale::area_average(luma, size, working, room)
+        };
+        Ok(Self::new(source, working, pixels))
+    }
+
+    fn new(source: (u32, u32), working: (u32, u32), pixels: Vec<u8>) -> Self {
+        Self {
+            width: working.0,
+            height: working.1,
             pixels,
-            source_width: width,
-            source_height: height,
-        })
+            source_width: source.0,
+            source_height: source.1,
+        }
     }
 
     /// Width of the working image.
@@ -83,14 +102,42 @@ impl GrayFrame {
         &self.pixels
     }
 
+    /// The luma values themselves, or the memory that they were in.
+    pub fn into_pixels(self) -> Vec<u8> {
+        self.pixels
+    }
+
     /// Width and height of the uploaded frame.
     pub fn source_size(&self) -> (u32, u32) {
         (self.source_width, self.source_height)
     }
 }
 
+/// The size of the working image of a frame of which there are `values` in a picture of this `size`.
+fn checked_working_size(
+    source: (u32, u32),
+    size: (u32, u32),
+    values: usize,
+) -> Result<(u32, u32), FrameError> {
+    let error = FrameError::Size {
+        width: source.0,
+        height: source.1,
+        pixels: values,
+    };
+    let expected = u64::from(size.0) * u64::from(size.1);
+    if source.0 == 0 || source.1 == 0 || values as u64 != expected {
+        return Err(error);
+    }
+    let working = working_size(source.0, source.1);
+    let fits = |working, size, source| working <= size && size <= source;
+    match fits(working.0, size.0, source.0) && fits(working.1, size.1, source.1) {
+        true => Ok(working),
+        false => Err(error),
+    }
+}
+
 /// The size of the working image of an upload of `width` x `height`, both above 0.
-pub(super) fn working_size(width: u32, height: u32) -> (u32, u32) {
+pub fn working_size(width: u32, height: u32) -> (u32, u32) {
     let longer = width.max(height);
     if longer <= WORKING_SIDE {
         return (width, height);

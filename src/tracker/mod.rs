@@ -80,7 +80,7 @@ mod trust;
 mod whitening;
 
 pub use evaluation::Evaluation;
-pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE};
+pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE, working_size};
 pub use params::{Features, Params, Search};
 pub use patch::patch;
 pub use presets::Preset;

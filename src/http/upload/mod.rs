@@ -44,6 +44,17 @@ pub struct Upload {
     pub is_snapshot: bool,
 }
 
+/// A request that is inside.
+#[derive(Debug)]
+pub struct Received<T> {
+    /// What it needs besides the queue.
+    pub admitted: T,
+    /// Its place in the queue.
+    pub queue: QueuePermit,
+    /// What came with it.
+    pub upload: Upload,
+}
+
 /// A form that takes nothing at all, for calls without a body.
 pub const NOTHING: Form = Form {
     settings: &[],
@@ -68,8 +79,27 @@ impl Form {
         Ok(fields)
     }
 
+    /// Takes a request in, and refuses it as early as it can be: first for its query, then for what `admit` says, then for a
+    /// full queue, and only then for its body.
+    pub async fn receive<T>(
+        &self,
+        state: &AppState,
+        request: Request,
+        admit: impl FnOnce() -> Result<T, Problem>,
+    ) -> Result<Received<T>, Problem> {
+        let fields = self.query(request.uri())?;
+        let admitted = admit()?;
+        let queue = state.enter(request.headers())?;
+        let upload = self.read(state, &queue, fields, request).await?;
+        Ok(Received {
+            admitted,
+            queue,
+            upload,
+        })
+    }
+
     /// Reads the body; `fields` are the settings of the query. `queue` lets long work be done elsewhere.
-    pub async fn read(
+    async fn read(
         &self,
         state: &AppState,
         queue: &QueuePermit,

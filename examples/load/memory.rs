@@ -1,0 +1,95 @@
+//! What live sessions cost the server: resident memory with more and more of them, all with full bags.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use bagtrack::tracker::Preset;
+use bytes::Bytes;
+use reqwest::Client;
+use tokio::task::JoinSet;
+
+use crate::Outcome;
+use crate::drive::{Driver, Failure};
+use crate::process::Server;
+
+/// Where memory is read; also at the end.
+const MARKS: [u32; 4] = [1000, 2000, 5000, 10_000];
+
+/// Requests at the same time.
+const CLIENTS: usize = 16;
+
+/// Opens `sessions` sessions, sends each enough frames to fill its bag, and prints the table.
+///
+/// The bag takes an entry from every frame (`update_every` = 1), not from every fifth: it is as large when it is full, a fifth
+/// of the frames fill it.
+pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u32) -> Outcome<()> {
+    let params = preset.params();
+    let fill = Arc::new(Fill {
+        http: Client::builder().pool_max_idle_per_host(CLIENTS).build()?,
+        create: format!("{}&params=%7B%22update_every%22%3A1%7D", driver.create),
+        url: driver.url.clone(),
+        pictures: driver.pictures.clone(),
+        // Twice as many as the bag and the history need: `robust` learns nothing from frames that it does not trust.
+        frames: 2 * (params.bag_size + params.history),
+    });
+    // What the first requests leave behind is no part of a session.
+    fill.one().await.map_err(|failure| failure.to_string())?;
+    let before = server.resident()?;
+    println!("server: {} MiB resident with one session", before >> 20);
+    println!("| live | resident MiB | KiB each |");
+    println!("|---|---|---|");
+    let mut live = 1;
+    for mark in MARKS
+        .into_iter()
+        .filter(|&mark| mark < sessions)
+        .chain([sessions])
+    {
+        let left = Arc::new(AtomicU32::new(mark - live));
+        let mut clients = JoinSet::new();
+        for _ in 0..CLIENTS {
+            let (fill, left) = (fill.clone(), left.clone());
+            clients.spawn(async move {
+                let take = |left: u32| left.checked_sub(1);
+                while left
+                    .fetch_update(Ordering::Relaxed, Ordering::Relaxed, take)
+                    .is_ok()
+                {
+                    fill.one().await?;
+                }
+                Ok::<(), Failure>(())
+            });
+        }
+        while let Some(client) = clients.join_next().await {
+            client?.map_err(|failure| failure.to_string())?;
+        }
+        live = mark;
+        let resident = server.resident()?;
+        let each = resident.saturating_sub(before) as f64 / 1024.0 / f64::from(live - 1);
+        println!("| {live} | {} | {each:.0} |", resident >> 20);
+    }
+    Ok(())
+}
+
+struct Fill {
+    http: Client,
+    create: String,
+    url: String,
+    pictures: Vec<Bytes>,
+    frames: u32,
+}
+
+impl Fill {
+    /// Opens a session and fills its bag.
+    async fn one(&self) -> Result<(), Failure> {
+        let created = self.http.post(&self.create).body(self.pictures[0].clone());
+        let created = created.send().await?.error_for_status()?;
+        let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
+        let id = session["id"].as_str().ok_or("a session without an id")?;
+        let post = format!("{}/sessions/{id}/frames", self.url);
+        for (_, picture) in (0..self.frames).zip(self.pictures.iter().cycle().skip(1)) {
+            let answer = self.http.post(&post).body(picture.clone()).send().await?;
+            answer.error_for_status()?.bytes().await?;
+        }
+        Ok(())
+    }
+}
