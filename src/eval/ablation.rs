@@ -38,6 +38,7 @@ const ROWS: &[Row] = &[
         &[("scale_change_std", "0")],
     ),
     ("no prior on the scale", &[("scale_std", "0")]),
+    ("no filter for the scale", &[("scale_rate", "0")]),
     ("never out of sight", &[("lost_below", "0")]),
     ("no camera shift", &[("camera_shift", "false")]),
     ("arg max, not averaged", &[("averaging_radius", "0")]),

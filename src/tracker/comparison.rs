@@ -19,6 +19,7 @@ use super::score::Evidence;
 use super::search::Sought;
 use super::solitary::Solitary;
 use super::state::State;
+use super::trust::Trust;
 use super::{Evaluation, Features, GrayFrame, Params, Rect, kernel, learning, likelihood, matrix};
 
 /// How much larger than the last answer the areas of a frame may be: scales change by a few hundredths a frame.
@@ -365,11 +366,12 @@ impl Comparison {
     }
 
     /// What particle `index` says about itself.
-    pub fn evidence(&self, index: usize) -> Evidence {
+    pub fn evidence(&self, index: usize, trust: &Trust) -> Evidence {
         let entries = self.distances.len() / self.particles.len();
         let distances = &self.distances[index * entries..][..entries];
         Evidence {
             first: distances[0],
+            lately: trust.usual,
             nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.examples.scores().get(index).copied(),
             scale: self.particles[index].scale,

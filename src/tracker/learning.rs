@@ -13,6 +13,7 @@ use super::camera::Camera;
 use super::comparison::Comparison;
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
+use super::scale::{self, ScaleFilter};
 use super::score::Usual;
 use super::state::State;
 use super::trust::Trust;
@@ -33,6 +34,7 @@ pub(super) struct Room {
     pub background: background::Room,
     pub bag: bag::Room,
     fit: discriminant::Room,
+    scale: scale::Room,
 }
 
 /// The answer to a frame whose box came from the user.
@@ -64,6 +66,7 @@ impl State {
             background: Background::default(),
             discriminant: Discriminant::default(),
             camera,
+            scale_filter: ScaleFilter::default(),
             trust: Trust::default(),
             usual: Usual::default(),
             frames_lost: 0,
@@ -110,6 +113,8 @@ impl State {
         if self.params.discriminant_weight > 0.0 {
             self.begin_discriminant(frame, &mut draws, room);
         }
+        self.scale_filter.forget();
+        self.learn_scale(frame, room);
         self.look_at_answer(frame, room);
     }
 
@@ -140,6 +145,7 @@ impl State {
                 .learn(&room.examples, room.vectors(), &self.params, &mut fit);
             room.learning.fit = fit;
         }
+        self.learn_scale(frame, room);
         let wanted = Background::wanted(number, &self.params);
         if wanted > 0 {
             let mut draws = motion::generator(self.params.seed, number, Draws::Examples);
@@ -158,6 +164,48 @@ impl State {
                 .admit(features, &self.background, &self.params, bag);
         }
         self.remember(features);
+    }
+
+    /// `found` with the scale that the filter measures there: against the last answer's, or `found`'s own without one.
+    pub fn measure_scale(
+        &self,
+        frame: &GrayFrame,
+        found: Particle,
+        room: &mut Comparison,
+    ) -> Particle {
+        if !self.scale_filter.has_learned() {
+            return found;
+        }
+        let center = Particle {
+            scale: self.answer.scale,
+            ..found
+        };
+        self.look_at_scales(frame, &center, room);
+        let change = self.scale_filter.find(&mut room.learning.scale).believed();
+        self.reach.hold(Particle {
+            scale: center.scale * change.exp(),
+            ..found
+        })
+    }
+
+    fn learn_scale(&mut self, frame: &GrayFrame, room: &mut Comparison) {
+        let rate = self.params.scale_rate;
+        if rate > 0.0 {
+            self.look_at_scales(frame, &self.answer, room);
+            self.scale_filter.learn(&mut room.learning.scale, rate);
+        }
+    }
+
+    /// Puts the pyramid around `center` into the room.
+    fn look_at_scales(&self, frame: &GrayFrame, center: &Particle, room: &mut Comparison) {
+        let scale::Room {
+            areas, features, ..
+        } = &mut room.learning.scale;
+        scale::areas(center, areas);
+        features.clear();
+        let params = scale::params(&self.params);
+        room.view
+            .features(frame, areas, &self.reach, &params, features);
     }
 
     /// The feature vector of the answer, as the first in the room.

@@ -70,6 +70,7 @@ mod presets;
 mod products;
 mod ranges;
 mod rect;
+mod scale;
 mod score;
 mod search;
 mod snapshot;
@@ -92,6 +93,7 @@ use serde::{Deserialize, Serialize};
 
 use comparison::Comparison;
 use motion::Draws;
+use score::Evidence;
 use search::Sought;
 use state::State;
 
@@ -215,7 +217,7 @@ impl Tracker {
             room.extend(frame, first, state);
             best = room.weigh(&sought, &state.bag, &state.discriminant);
         }
-        let evidence = room.evidence(best);
+        let evidence = room.evidence(best, &state.trust);
         let lost = state.is_out_of_sight(&evidence);
         let answer = if lost {
             state.frames_lost = state.frames_lost.saturating_add(1);
@@ -223,7 +225,12 @@ impl Tracker {
         } else {
             state.frames_lost = 0;
             let radius = state.params.averaging_radius;
-            search::average(&room.particles, &room.weights, best, radius)
+            let found = search::average(&room.particles, &room.weights, best, radius);
+            state.measure_scale(frame, found, room)
+        };
+        let evidence = Evidence {
+            scale: answer.scale,
+            ..evidence
         };
         let trusted = !lost && state.trust.judge(evidence.first, number, &state.params);
         let (score, status) = state.usual.judge(&evidence, lost, trusted);

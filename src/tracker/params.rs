@@ -100,6 +100,10 @@ pub struct Params {
     /// Standard deviation of the prior on the logarithm of the scale against the first box, 0 to 10: without a reason a
     /// box stays as large as it was. Off: 0.
     pub scale_std: f64,
+    /// The share of the newest frame in a filter that measures the scale along a pyramid of areas, 0 to 1: particles a
+    /// few hundredths larger or smaller look nearly alike, and a box then grows or shrinks with what is behind the
+    /// target. Off: 0.
+    pub scale_rate: f64,
     /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
     /// moves a target further than targets move. Off: false.
     pub camera_shift: bool,

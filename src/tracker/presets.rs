@@ -55,6 +55,7 @@ const PAPER: Params = Params {
     displacement_std: 0.0,
     scale_change_std: 0.0,
     scale_std: 0.0,
+    scale_rate: 0.0,
     camera_shift: false,
     averaging_radius: 0.0,
     pinned: 0,
@@ -94,6 +95,8 @@ const ROBUST: Params = Params {
     displacement_std: 12.0,
     scale_change_std: 0.04,
     scale_std: 0.5,
+    // A look of forty frames ago still counts a third.
+    scale_rate: 0.025,
     camera_shift: true,
     averaging_radius: 3.0,
     pinned: 1,

@@ -119,6 +119,7 @@ impl Params {
             "from 0 to 10",
         )?;
         real("scale_std", self.scale_std, 0.0..=10.0, "from 0 to 10")?;
+        real("scale_rate", self.scale_rate, 0.0..=1.0, "from 0 to 1")?;
         real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(
             "averaging_radius",

@@ -140,7 +140,7 @@ fn best(weights: &[f64], out: &mut [usize]) {
     }
 }
 
-/// The weighted mean of the particles within `radius` (working pixels) of the one at `best`.
+/// The weighted mean, of scales the geometric one, of the particles within `radius` (working pixels) of the one at `best`.
 pub(super) fn average(
     particles: &[Particle],
     weights: &[f64],
@@ -159,7 +159,7 @@ pub(super) fn average(
         if distance < radius {
             mean.x += weight * particle.x;
             mean.y += weight * particle.y;
-            mean.scale += weight * particle.scale;
+            mean.scale += weight * particle.scale.ln();
             total += weight;
         }
     }
@@ -167,7 +167,7 @@ pub(super) fn average(
         Particle {
             x: mean.x / total,
             y: mean.y / total,
-            scale: mean.scale / total,
+            scale: (mean.scale / total).exp(),
         }
     } else {
         center

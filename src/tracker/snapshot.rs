@@ -16,7 +16,7 @@ use super::{Params, TrackerError, comparison};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -155,6 +155,7 @@ fn check_mends(state: &State) -> bool {
     let (width, height) = working_size(state.source.0, state.source.1);
     state.background.is_sound(params, GREATEST_FEATURE)
         && state.discriminant.is_sound(params, GREATEST_FEATURE)
+        && state.scale_filter.is_sound(params, GREATEST_FEATURE)
         && state.camera.is_some() == params.camera_shift
         && state
             .camera

@@ -10,6 +10,7 @@ use super::camera::Camera;
 use super::discriminant::Discriminant;
 use super::frame::working_size;
 use super::motion::{Particle, Reach};
+use super::scale::ScaleFilter;
 use super::score::{Evidence, Usual};
 use super::trust::Trust;
 use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
@@ -21,7 +22,7 @@ pub const LEAST_BOX_SIDE: f64 = 4.0;
 const WIDENING: f64 = 0.5;
 
 /// How much better than what counts as lost a target must look that is found again.
-const FOUND_MARGIN: f64 = 0.25;
+const FOUND_MARGIN: f64 = 0.1;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +44,7 @@ pub(super) struct State {
     pub discriminant: Discriminant,
     /// Where a shift of the picture is looked for.
     pub camera: Option<Camera>,
+    pub scale_filter: ScaleFilter,
     pub trust: Trust,
     pub usual: Usual,
     /// For how many frames the target has been out of sight.
