@@ -14,7 +14,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
         1 => Just(5e-324),
         6 => 0.0_f64..1.0,
     ];
-    proptest::collection::vec(share, 27)
+    proptest::collection::vec(share, 28)
 }
 
 /// The parameters that `shares` make over the whole of the ranges, but for sizes: those stay small, to be quick.
@@ -62,6 +62,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         refined_std_scale: share(),
         displacement_std: 1000.0 * share(),
         scale_change_std: 10.0 * share(),
+        scale_rate: if on(3) { share() } else { 0.0 },
         averaging_radius: 100.0 * share(),
         pinned_weight: 100.0 * share(),
         trusted_ratio: 100.0 * (seed % 3) as f64 / 2.0,

@@ -3,7 +3,7 @@
 mod tracker_scene;
 
 use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
-use tracker_scene::{frame, panned, robust, target};
+use tracker_scene::{frame, panned, receding, robust, target};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
 fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
@@ -29,6 +29,22 @@ fn a_moving_target_is_held() {
         let overlap = mean_overlap(|t| (frame(t), target(t)), 79, seed);
         println!("seed {seed}: overlap {overlap:.3}");
         assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
+
+#[test]
+fn a_target_that_shrinks_while_its_background_grows_keeps_its_box() {
+    for seed in 0..3 {
+        let (first, given) = receding(0);
+        let mut tracker = Tracker::new(&first, given, robust(seed)).expect("a box inside");
+        for t in 1..=70 {
+            let (frame, truth) = receding(t);
+            let answer = tracker.step(&frame).expect("frames of one size").target;
+            let ratio = (answer.width / truth.width).ln();
+            assert!(ratio.abs() < 0.12, "seed {seed}, frame {t}: {ratio:+.3}");
+            let overlap = answer.overlap(&truth);
+            assert!(overlap > 0.75, "seed {seed}, frame {t}: {overlap:.3}");
+        }
     }
 }
 

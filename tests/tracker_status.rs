@@ -1,12 +1,13 @@
-//! The status of the default parameters on a clip in which the target goes behind a post: `lost` soon after it is, never
-//! `tracking` on something else, and `tracking` again, by itself, some time after it came back.
+//! The status of the default parameters on clips in which the target goes out of sight, behind a post or out of the
+//! frame: `lost` soon after it is, never `tracking` on something else, and `tracking` again, by itself, some time after
+//! it came back.
 
 use bagtrack::sample::{Clip, Scene, Settings};
 use bagtrack::tracker::{Estimate, GrayFrame, Preset, Status, Tracker};
 
 /// Frames that the status may take to notice: a quarter of a second of a usual video.
 const NOTICED: u32 = 6;
-/// Of the 20 frames in which the target is out of sight, how many must say so; the others are `uncertain`.
+/// Of the 20 or 25 frames in which the target is out of sight, how many must say so; the others are `uncertain`.
 const LEAST_LOST: u32 = 10;
 /// Frames at the end of a clip in which the target must have been found again.
 const END: u32 = 20;
@@ -36,12 +37,21 @@ fn follow(clip: &Clip, seed: u64) -> Vec<Estimate> {
 
 #[test]
 fn a_covered_target_is_lost_and_found_again() {
+    is_lost_and_found_again(Scene::Covered);
+}
+
+#[test]
+fn a_target_that_leaves_the_frame_is_lost_and_found_again() {
+    is_lost_and_found_again(Scene::Leaves);
+}
+
+fn is_lost_and_found_again(scene: Scene) {
     let clip = Clip::new(Settings {
-        scene: Scene::Covered,
+        scene,
         ..Settings::default()
     })
     .expect("the settings are in order");
-    for seed in 0..3 {
+    for seed in 0..6 {
         let (mut hidden, mut lost) = (0, 0);
         for answer in follow(&clip, seed) {
             let index = u32::try_from(answer.frame).expect("a short clip");

@@ -4,6 +4,7 @@
 //! next. Sessions are many and threads few, so each thread has one (see [`with`]) and sessions have none.
 
 use std::cell::RefCell;
+use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -20,7 +21,9 @@ use super::search::Sought;
 use super::solitary::Solitary;
 use super::state::State;
 use super::trust::Trust;
-use super::{Evaluation, Features, GrayFrame, Params, Rect, kernel, learning, likelihood, matrix};
+use super::{
+    Evaluation, Features, GrayFrame, Params, Rect, kernel, learning, likelihood, matrix, scale,
+};
 
 /// How much larger than the last answer the areas of a frame may be: scales change by a few hundredths a frame.
 const LARGER: f64 = 1.15;
@@ -47,8 +50,10 @@ impl View {
         if params.features == Features::Gradients {
             let area = seen(center, reach, params);
             let (x, y) = area.center();
-            let width = LARGER * area.width + 2.0 * furthest;
-            let height = LARGER * area.height + 2.0 * furthest;
+            // A pyramid is of the box alone, without its context.
+            let larger = LARGER.max(scale::largest() / params.context);
+            let width = larger * area.width + 2.0 * furthest;
+            let height = larger * area.height + 2.0 * furthest;
             let cell = (
                 area.width / f64::from(params.patch_width),
                 area.height / f64::from(params.patch_height),
@@ -199,16 +204,27 @@ pub(super) fn with<T>(work: impl FnOnce(&mut Comparison) -> T) -> T {
     COMPARISON.with_borrow_mut(work)
 }
 
+/// Empties `room` and makes it large enough for `most`.
+pub(super) fn empty<T>(room: &mut Vec<T>, most: usize) {
+    room.clear();
+    room.reserve(most);
+}
+
 impl Comparison {
-    /// Forgets the last frame and takes the bag of `state`.
-    pub fn begin(&mut self, state: &State) {
-        self.particles.clear();
-        let most = state.params.particles as usize * state.params.feature_len();
-        self.first = kernel::align(&mut self.vectors, most);
-        self.squares.clear();
-        self.distances.clear();
+    /// Forgets the last frame, takes the bag of `state`, and makes room for `most` particles, so that the first search for
+    /// a lost target finds it too.
+    pub fn begin(&mut self, state: &State, most: usize) {
+        let params = &state.params;
+        self.first = kernel::align(&mut self.vectors, most * params.feature_len());
+        let entries = params.bag_size as usize;
+        empty(&mut self.particles, most);
+        empty(&mut self.squares, most);
+        empty(&mut self.distances, most * entries);
+        empty(&mut self.likelihoods, most * entries);
+        empty(&mut self.weights, most);
         let mean = offset(state);
-        self.examples.begin(&state.discriminant, mean);
+        self.examples.begin(&state.discriminant, mean, most);
+        self.learning.begin(most);
         if state.params.candidate_alone {
             self.solitary.set_state(state, self.examples.asks());
             return;
@@ -240,13 +256,23 @@ impl Comparison {
 
     /// Looks at the particles from `first` on, and computes their distances and scores.
     pub fn extend(&mut self, frame: &GrayFrame, first: usize, state: &State) {
-        let params = &state.params;
-        if is_printed(params) {
+        if is_printed(&state.params) {
             self.extend_printed(frame, first, state);
             return;
         }
+        // The many of a wide search in batches as large as usual: those stay in the caches.
+        let batch = state.params.particles as usize;
+        for first in (first..self.particles.len()).step_by(batch) {
+            let end = self.particles.len().min(first + batch);
+            self.extend_batch(frame, first..end, state);
+        }
+    }
+
+    fn extend_batch(&mut self, frame: &GrayFrame, batch: Range<usize>, state: &State) {
+        let params = &state.params;
         let before = self.vectors.len();
-        let particles = &self.particles[first..];
+        let first = batch.start;
+        let particles = &self.particles[batch];
         self.view
             .features(frame, particles, &state.reach, params, &mut self.vectors);
         let vectors = &mut self.vectors[before..];

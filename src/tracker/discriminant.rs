@@ -181,7 +181,7 @@ mod tests {
             discriminant.weights.clone_from(&before);
             let shifted: Vec<f32> = vectors.iter().map(|value| value - mean).collect();
             let mut examples = Examples::default();
-            examples.begin(&discriminant, &vec![mean; len]);
+            examples.begin(&discriminant, &vec![mean; len], 0);
             examples.examine_alone(&shifted);
             let mut room = Room {
                 labels: labels.clone(),
@@ -216,7 +216,7 @@ mod tests {
             let mut discriminant = Discriminant::new(vec![0.0; 4]);
             let vectors = [tiny, 0.0, 0.0, 0.0, 0.0, tiny, 0.0, 0.0];
             let mut examples = Examples::default();
-            examples.begin(&discriminant, &[]);
+            examples.begin(&discriminant, &[], 0);
             examples.examine_alone(&vectors);
             let mut room = Room {
                 labels: vec![1.0, 0.5],

@@ -6,6 +6,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use super::comparison;
 use super::discriminant::Discriminant;
 use super::{kernel, matrix};
 
@@ -28,15 +29,15 @@ pub(super) struct Examples {
 
 impl Examples {
     /// Forgets the last examples and takes `discriminant`, for vectors that have `mean` (or, where that is empty,
-    /// nothing) taken off.
-    pub fn begin(&mut self, discriminant: &Discriminant, mean: &[f32]) {
+    /// nothing) taken off; with room for `most` examples.
+    pub fn begin(&mut self, discriminant: &Discriminant, mean: &[f32], most: usize) {
         self.weights.clear();
         self.weights.extend_from_slice(discriminant.weights());
         self.origin.clear();
         self.origin.extend_from_slice(discriminant.origin());
         matrix::add(&mut self.origin, -1.0, mean);
-        self.scales.clear();
-        self.scores.clear();
+        comparison::empty(&mut self.scales, most);
+        comparison::empty(&mut self.scores, most);
     }
 
     /// The vectors whose products are asked for: the weights and the origin.

@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::background::{self, Background};
 use super::bag::{self, Bag};
 use super::camera::Camera;
-use super::comparison::Comparison;
+use super::comparison::{self, Comparison};
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
 use super::scale::{self, ScaleFilter};
@@ -35,6 +35,13 @@ pub(super) struct Room {
     pub bag: bag::Room,
     fit: discriminant::Room,
     scale: scale::Room,
+}
+
+impl Room {
+    /// Makes room for what `most` particles teach.
+    pub fn begin(&mut self, most: usize) {
+        comparison::empty(&mut self.fit.labels, most);
+    }
 }
 
 /// The answer to a frame whose box came from the user.
@@ -261,7 +268,7 @@ impl State {
         features.clear();
         room.view
             .features(frame, areas, &self.reach, &self.params, features);
-        room.examples.begin(&self.discriminant, &[]);
+        room.examples.begin(&self.discriminant, &[], areas.len());
         room.examples.examine_alone(features);
         label_all(areas, &self.answer, &self.reach, &mut fit.labels);
         self.discriminant

@@ -197,7 +197,7 @@ impl Tracker {
         };
 
         // (A) Where it may be.
-        room.begin(state);
+        room.begin(state, sought.most());
         match state.params.search {
             Search::Resampled => {
                 motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
@@ -212,7 +212,7 @@ impl Tracker {
         room.extend(frame, 0, state);
         let mut best = room.weigh(&sought, &state.bag, &state.discriminant);
         let first = room.particles.len();
-        if first < state.params.particles as usize {
+        if first < sought.counts().0 {
             sought.refine(&room.weights, &mut draws, &mut room.particles);
             room.extend(frame, first, state);
             best = room.weigh(&sought, &state.bag, &state.discriminant);

@@ -13,6 +13,11 @@ use super::{Params, Search};
 
 /// A shift below this, in working pixels, is within what a search covers anyway.
 const NOTABLE_SHIFT: f64 = 2.0;
+
+/// A wider search has as many times the first particles, up to this: a target is seen from a third of its box away.
+const DENSEST: f64 = 4.0;
+/// A wider search has no more particles than this, the most that the parameters allow.
+const MOST_PARTICLES: usize = 1000;
 /// The greatest number of modes.
 const MOST_MODES: usize = 50;
 
@@ -54,6 +59,29 @@ impl Sought<'_> {
         3.3 * (draws + self.params.refined_std) + shift
     }
 
+    /// How many particles are drawn in all, and how many of these first. Where the target is out of sight there are more.
+    pub fn counts(&self) -> (usize, usize) {
+        let (all, first) = (
+            self.params.particles as usize,
+            self.params.first_particles(),
+        );
+        let more = (first as f64 * (self.widening.min(DENSEST) - 1.0)) as usize;
+        let more = more.min(self.most() - all);
+        (all + more, first + more)
+    }
+
+    /// How many particles are drawn in all where the search is widest.
+    pub fn most(&self) -> usize {
+        let all = self.params.particles as usize;
+        // The printed evaluation has room for N candidates.
+        if self.params.search == Search::Resampled || !self.params.candidate_alone {
+            return all;
+        }
+        let first = self.params.first_particles() as f64;
+        let wide = all + (first * (DENSEST - 1.0)) as usize;
+        wide.min(MOST_PARTICLES).max(all)
+    }
+
     /// Draws the first particles around the last answer into `out`.
     pub fn propose(&self, generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
         let carried = self.carried();
@@ -63,7 +91,7 @@ impl Sought<'_> {
         if self.has_shift() && self.params.particles > 1 {
             out.push(self.reach.hold(carried));
         }
-        let count = self.params.first_particles().max(out.len());
+        let count = self.counts().1.max(out.len());
         while out.len() < count {
             let moved = self.has_shift() && out.len().is_multiple_of(2);
             let from = if moved { carried } else { self.last };
@@ -89,9 +117,10 @@ impl Sought<'_> {
         let count = (self.params.refined_modes as usize).min(particles.len());
         let modes = &mut modes[..count];
         best(weights, modes);
+        let (all, _) = self.counts();
         let params = self.params;
         for &mode in modes.iter().cycle() {
-            if particles.len() >= params.particles as usize {
+            if particles.len() >= all {
                 break;
             }
             let from = particles[mode];

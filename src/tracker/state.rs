@@ -22,7 +22,7 @@ pub const LEAST_BOX_SIDE: f64 = 4.0;
 const WIDENING: f64 = 0.5;
 
 /// How much better than what counts as lost a target must look that is found again.
-const FOUND_MARGIN: f64 = 0.1;
+const FOUND_MARGIN: f64 = 0.2;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -18,7 +18,7 @@ const UNTIL_USUAL: u64 = 20;
 const FIRST_USUAL: f64 = 0.25;
 const ALWAYS_TRUSTED: f64 = 0.37;
 /// What is found again may be this many times as far from the first look as is usual: it comes back turned.
-const RECOGNIZED: f64 = 1.3;
+const RECOGNIZED: f64 = 1.15;
 /// The share of the newest frame in the running mean, when trusted and when not.
 const RENEWAL: f64 = 0.1;
 const RENEWAL_UNTRUSTED: f64 = 0.02;

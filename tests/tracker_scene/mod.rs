@@ -83,6 +83,46 @@ pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
     (frame, first, second)
 }
 
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: the target goes away, by 0.6 % a frame, while what is behind it
+/// comes nearer by as much, as a car does before a bridge.
+pub fn receding(t: usize) -> (GrayFrame, Rect) {
+    let scale = (-0.006 * t as f64).exp();
+    let (middle_x, middle_y) = (100.0, 80.0);
+    let blend = |x: f64, y: f64, seed: u32| {
+        let (column, row) = (x.floor(), y.floor());
+        let (right, down) = (x - column, y - row);
+        let at = |i: f64, j: f64| {
+            f64::from(texture(
+                (column + i + 500.0) as usize,
+                (row + j + 500.0) as usize,
+                seed,
+            ))
+        };
+        (1.0 - down) * ((1.0 - right) * at(0.0, 0.0) + right * at(1.0, 0.0))
+            + down * ((1.0 - right) * at(0.0, 1.0) + right * at(1.0, 1.0))
+    };
+    let luma = (0..200 * 160_usize)
+        .map(|i| {
+            let (x, y) = (
+                (i % 200) as f64 + 0.5 - middle_x,
+                (i / 200) as f64 + 0.5 - middle_y,
+            );
+            let (target_x, target_y) = (x / scale, y / scale);
+            let gray = if target_x.abs() < 30.0 && target_y.abs() < 24.0 {
+                60.0 + blend(target_x / 2.0, target_y / 2.0, 5) / 3.0
+            } else {
+                40.0 + blend(x * scale / 2.0, y * scale / 2.0, 9) / 3.0
+            };
+            gray as u8
+        })
+        .collect();
+    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    (
+        frame,
+        Rect::centered(middle_x, middle_y, 60.0 * scale, 48.0 * scale),
+    )
+}
+
 /// A frame of one gray value.
 pub fn flat(width: u32, height: u32, value: u8) -> GrayFrame {
     let pixels = vec![value; width as usize * height as usize];
@@ -108,7 +148,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each mend of the preset `robust`, switched off.
-const MENDS_OFF: [(&str, Change); 12] = [
+const MENDS_OFF: [(&str, Change); 13] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
@@ -117,6 +157,7 @@ const MENDS_OFF: [(&str, Change); 12] = [
     ("no camera", |p| p.camera_shift = false),
     ("no refinement", |p| p.refined_share = 0.0),
     ("arg max", |p| p.averaging_radius = 0.0),
+    ("no filter of the scale", |p| p.scale_rate = 0.0),
     ("nothing pinned", |p| p.pinned = 0),
     ("all trusted", |p| p.trusted_ratio = 0.0),
     ("any length", |p| p.unit_length = false),
