@@ -181,11 +181,17 @@ impl State {
         room: &mut Comparison,
     ) -> Particle {
         if !self.scale_filter.has_learned() {
-            return found;
+            // The mean place of areas of many scales may be too far out for the mean of these.
+            return self.reach.hold(found);
         }
-        let center = Particle {
-            scale: self.answer.scale,
-            ..found
+        // What was out of sight may have come nearer.
+        let center = if self.frames_lost > 0 {
+            found
+        } else {
+            Particle {
+                scale: self.answer.scale,
+                ..found
+            }
         };
         self.look_at_scales(frame, &center, room);
         let change = self.scale_filter.find(&mut room.learning.scale).believed();

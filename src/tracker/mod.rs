@@ -223,10 +223,11 @@ impl Tracker {
             state.frames_lost = state.frames_lost.saturating_add(1);
             state.reach.hold(sought.carried())
         } else {
-            state.frames_lost = 0;
             let radius = state.params.averaging_radius;
             let found = search::average(&room.particles, &room.weights, best, radius);
-            state.measure_scale(frame, found, room)
+            let found = state.measure_scale(frame, found, room);
+            state.frames_lost = 0;
+            found
         };
         let evidence = Evidence {
             scale: answer.scale,
