@@ -269,11 +269,11 @@ mod tests {
             let phase = (i * i * 37 + i * 11) as f64;
             (1.2 + (0.25 * at * (1.0 + (i % 7) as f64 * 0.3) + phase).sin()) as f32
         };
-        let mut room = Room::default();
-        room.features = (0..LEVELS)
-            .flat_map(|level| (0..LEN).map(move |i| value(level, i)))
-            .collect();
-        room
+        let features = (0..LEVELS).flat_map(|level| (0..LEN).map(move |i| value(level, i)));
+        Room {
+            features: features.collect(),
+            ..Room::default()
+        }
     }
 
     fn learned() -> ScaleFilter {
