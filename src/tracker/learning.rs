@@ -13,7 +13,8 @@ use super::camera::Camera;
 use super::comparison::{self, Comparison};
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
-use super::scale::{self, ScaleFilter};
+use super::pyramid;
+use super::scale::ScaleFilter;
 use super::score::Usual;
 use super::state::State;
 use super::trust::Trust;
@@ -34,7 +35,7 @@ pub(super) struct Room {
     pub background: background::Room,
     pub bag: bag::Room,
     fit: discriminant::Room,
-    scale: scale::Room,
+    scale: pyramid::Room,
 }
 
 impl Room {
@@ -211,12 +212,12 @@ impl State {
 
     /// Puts the pyramid around `center` into the room.
     fn look_at_scales(&self, frame: &GrayFrame, center: &Particle, room: &mut Comparison) {
-        let scale::Room {
+        let pyramid::Room {
             areas, features, ..
         } = &mut room.learning.scale;
-        scale::areas(center, areas);
+        pyramid::areas(center, areas);
         features.clear();
-        let params = scale::params(&self.params);
+        let params = pyramid::params(&self.params);
         room.view
             .features(frame, areas, &self.reach, &params, features);
     }

@@ -68,6 +68,7 @@ mod params;
 mod patch;
 mod presets;
 mod products;
+mod pyramid;
 mod ranges;
 mod rect;
 mod scale;
@@ -78,6 +79,7 @@ mod solitary;
 mod state;
 mod subspace;
 mod trust;
+mod view;
 mod whitening;
 
 pub use evaluation::Evaluation;

@@ -14,24 +14,11 @@
 //! The height of the response y tells how sure that is: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
 //! covered, turned or missed. There the scale stays, or it would wander off within a few frames.
 
-use std::f64::consts::TAU;
-
 use serde::{Deserialize, Serialize};
 
-use super::motion::Particle;
+use super::pyramid::{self, FREQUENCIES, LEVELS, MIDDLE, Room, STEP, WAVES};
 use super::{Params, matrix};
 
-/// Areas of a pyramid, and the logarithm of the ratio of two neighbours: together a quarter up and down, several times
-/// what a target changes between frames.
-const LEVELS: usize = 17;
-const STEP: f64 = 0.03;
-const MIDDLE: usize = LEVELS / 2;
-/// Frequencies of a real signal of that length.
-const FREQUENCIES: usize = LEVELS / 2 + 1;
-/// Cells along a side. With fewer, the insides of a target say too little.
-const CELLS: u32 = 8;
-/// Standard deviation of the wanted response, in levels.
-const BELL: f64 = 1.2;
 /// λ, against energies of about 1: it only keeps flat pyramids from dividing by nothing.
 const DAMPING: f32 = 0.01;
 /// The greatest change of the logarithm of the scale in a frame: what is seen further off is mostly a neighbour.
@@ -60,83 +47,6 @@ pub(super) struct Found {
     pub response: f64,
 }
 
-/// Room for pyramids; means nothing from one to the next.
-#[derive(Debug, Default)]
-pub(super) struct Room {
-    pub areas: Vec<Particle>,
-    /// The feature vectors of a pyramid, smallest area first.
-    pub features: Vec<f32>,
-    /// Their transform, laid out as the numerators.
-    spectrum: Vec<f32>,
-}
-
-/// What a pyramid is looked at with: the box alone, in cells of its own.
-pub(super) fn params(params: &Params) -> Params {
-    Params {
-        patch_width: CELLS,
-        patch_height: CELLS,
-        context: 1.0,
-        ..params.clone()
-    }
-}
-
-/// How much larger than its middle the largest area of a pyramid is.
-pub(super) fn largest() -> f64 {
-    (STEP * MIDDLE as f64).exp()
-}
-
-/// Writes the areas of the pyramid around `center` to `out`, smallest first.
-pub(super) fn areas(center: &Particle, out: &mut Vec<Particle>) {
-    out.clear();
-    out.extend((0..LEVELS).map(|level| Particle {
-        scale: center.scale * (STEP * (level as f64 - MIDDLE as f64)).exp(),
-        ..*center
-    }));
-}
-
-/// cos and -sin of the angle that frequency `frequency` turns up to `level`.
-fn turn(frequency: usize, level: usize) -> (f64, f64) {
-    let angle = TAU * (frequency * level % LEVELS) as f64 / LEVELS as f64;
-    (angle.cos(), -angle.sin())
-}
-
-/// G at `frequency`.
-fn wanted(frequency: usize) -> (f64, f64) {
-    let mut sum = (0.0, 0.0);
-    for level in 0..LEVELS {
-        let off = (level as f64 - MIDDLE as f64) / BELL;
-        let bell = (-0.5 * off * off).exp();
-        let (cos, sin) = turn(frequency, level);
-        sum.0 += bell * cos;
-        sum.1 += bell * sin;
-    }
-    sum
-}
-
-impl Room {
-    /// Brings the pyramid's vectors to length 1 and transforms them along the scale. Returns D.
-    fn transform(&mut self) -> usize {
-        let len = self.features.len() / LEVELS;
-        self.features
-            .chunks_exact_mut(len)
-            .for_each(matrix::normalize);
-        self.spectrum.clear();
-        self.spectrum.resize(FREQUENCIES * 2 * len, 0.0);
-        for (frequency, parts) in self.spectrum.chunks_exact_mut(2 * len).enumerate() {
-            let (real, imaginary) = parts.split_at_mut(len);
-            for (level, vector) in self.features.chunks_exact(len).enumerate() {
-                // The ends of a pyramid do not meet: Hann's window fades them out.
-                let along = TAU * (level + 1) as f64 / (LEVELS + 1) as f64;
-                let window = 0.5 - 0.5 * along.cos();
-                let (cos, sin) = turn(frequency, level);
-                matrix::add(real, (window * cos) as f32, vector);
-                matrix::add(imaginary, (window * sin) as f32, vector);
-            }
-        }
-        len
-    }
-}
-
 impl ScaleFilter {
     /// Whether there is something to find by.
     pub fn has_learned(&self) -> bool {
@@ -163,7 +73,7 @@ impl ScaleFilter {
             let (real, imaginary) = parts.split_at(len);
             let total = matrix::dot(real, real) + matrix::dot(imaginary, imaginary);
             *energy += rate * (total - *energy);
-            let (wanted_real, wanted_imaginary) = wanted(frequency);
+            let (wanted_real, wanted_imaginary) = WAVES.wanted[frequency];
             let (cos, sin) = (wanted_real as f32 * rate, wanted_imaginary as f32 * rate);
             numerator.iter_mut().for_each(|value| *value *= 1.0 - rate);
             let (to_real, to_imaginary) = numerator.split_at_mut(len);
@@ -220,7 +130,7 @@ impl ScaleFilter {
         }
         std::array::from_fn(|level| {
             let term = |(frequency, (real, imaginary)): (usize, &(f64, f64))| {
-                let (cos, sin) = turn(frequency, level);
+                let (cos, sin) = WAVES.turns[frequency][level];
                 // All frequencies but 0 stand for their mirror image, too.
                 let twice = if frequency == 0 { 1.0 } else { 2.0 };
                 twice * (real * cos + imaginary * sin)
@@ -232,7 +142,7 @@ impl ScaleFilter {
     /// Whether this may be the filter of a tracker with `params`.
     pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
         let (numbers, energies) = if params.scale_rate > 0.0 {
-            let len = self::params(params).feature_len();
+            let len = pyramid::params(params).feature_len();
             (FREQUENCIES * 2 * len, FREQUENCIES)
         } else {
             (0, 0)
@@ -258,7 +168,9 @@ impl Found {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pyramid::BELL;
     use super::*;
+    use std::f64::consts::TAU;
 
     const LEN: usize = 40;
 
