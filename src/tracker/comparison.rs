@@ -159,7 +159,8 @@ impl Comparison {
             return;
         }
         // The many of a wide search in batches as large as usual: those stay in the caches.
-        let batch = state.params.particles as usize;
+        let usual = state.params.first_particles();
+        let batch = usual.max(state.params.particles as usize - usual);
         for first in (first..self.particles.len()).step_by(batch) {
             let end = self.particles.len().min(first + batch);
             self.extend_batch(frame, first..end, state);
