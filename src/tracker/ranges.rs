@@ -19,6 +19,9 @@ pub struct ParamsError {
     pub expected: &'static str,
 }
 
+/// The greatest N.
+const MOST_PARTICLES: u32 = 1000;
+
 /// Most numbers in the vectors of one frame's candidates: N · D.
 const MOST_CANDIDATE_VALUES: usize = 1_100_000;
 
@@ -34,7 +37,12 @@ impl Params {
     /// # Errors
     /// The first parameter that is out of its range.
     pub fn validate(&self) -> Result<(), ParamsError> {
-        count("particles", self.particles, 1..=1000, "from 1 to 1000")?;
+        count(
+            "particles",
+            self.particles,
+            1..=MOST_PARTICLES,
+            "from 1 to 1000",
+        )?;
         count("patch_width", self.patch_width, 4..=64, "from 4 to 64")?;
         count("patch_height", self.patch_height, 4..=64, "from 4 to 64")?;
         count("basis_dim", self.basis_dim, 1..=6, "from 1 to 6")?;
@@ -165,6 +173,19 @@ impl Params {
             "less than bag_size",
         )?;
         self.validate_products()
+    }
+
+    /// The most particles with which these parameters, which are valid, would still be: no search may have more.
+    pub(super) fn most_particles(&self) -> usize {
+        let len = self.feature_len();
+        let samples = self.background_samples as usize;
+        let looks = self.bag_size as usize * (self.history as usize + 1);
+        let compared = (MOST_WHITENED_VALUES as usize)
+            .checked_div(samples * len)
+            .map_or(usize::MAX, |most| most - looks);
+        (MOST_PARTICLES as usize)
+            .min(MOST_CANDIDATE_VALUES / len)
+            .min(compared)
     }
 
     /// Checks what sizes cost together. No product overflows once each size is in its range.

@@ -16,8 +16,6 @@ const NOTABLE_SHIFT: f64 = 2.0;
 
 /// A wider search has as many times the first particles, up to this: a target is seen from a third of its box away.
 const DENSEST: f64 = 4.0;
-/// A wider search has no more particles than this, the most that the parameters allow.
-const MOST_PARTICLES: usize = 1000;
 /// The greatest number of modes.
 const MOST_MODES: usize = 50;
 
@@ -79,7 +77,7 @@ impl Sought<'_> {
         }
         let first = self.params.first_particles() as f64;
         let wide = all + (first * (DENSEST - 1.0)) as usize;
-        wide.min(MOST_PARTICLES).max(all)
+        wide.min(self.params.most_particles())
     }
 
     /// Draws the first particles around the last answer into `out`.
@@ -217,6 +215,56 @@ mod tests {
             let mut found = vec![0; count];
             best(&weights, &mut found);
             assert_eq!(found, sorted[..count]);
+        }
+    }
+
+    #[test]
+    fn the_widest_search_costs_no_more_than_parameters_may() {
+        let reach = Reach {
+            frame_width: 100.0,
+            frame_height: 80.0,
+            box_width: 20.0,
+            box_height: 10.0,
+        };
+        let most = |params: &Params| {
+            assert_eq!(params.validate(), Ok(()));
+            let sought = Sought {
+                last: Particle {
+                    x: 50.0,
+                    y: 40.0,
+                    scale: 1.0,
+                },
+                shift: (0.0, 0.0),
+                widening: DENSEST,
+                params,
+                reach: &reach,
+            };
+            assert_eq!(sought.counts().0, sought.most());
+            sought.most()
+        };
+        let robust = Preset::Robust.params();
+        assert_eq!(most(&robust), 500);
+        let large = |particles, side, background_samples| Params {
+            particles,
+            patch_width: side,
+            patch_height: side,
+            background_samples,
+            ..robust.clone()
+        };
+        // Limited by their number, by their values, and by their products with the background; at the limit already.
+        for (params, expected) in [
+            (large(600, 8, 64), 1000),
+            (large(200, 20, 32), 275),
+            (large(600, 8, 200), 809),
+            (large(47, 48, 0), 47),
+        ] {
+            let most = most(&params);
+            assert_eq!(most, expected);
+            let widest = Params {
+                particles: most as u32,
+                ..params.clone()
+            };
+            assert_eq!(widest.validate(), Ok(()));
         }
     }
 
