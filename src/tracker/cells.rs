@@ -3,8 +3,9 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::energies::Energies;
-use super::gradients::{DIRECTIONS, GRAY, GradientSums, Place};
-use super::{Params, Rect};
+use super::gradients::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, Place, registers};
+use super::kernel::Element;
+use super::{Params, Rect, sums};
 
 /// Values of a cell: the directions, then its gray value.
 pub(super) const CHANNELS: usize = DIRECTIONS + 1;
@@ -16,12 +17,23 @@ const FLAT: f32 = 2.0;
 /// The least standard deviation of gray values, in gray levels, that theirs are divided by.
 const LEAST_CONTRAST: f32 = 4.0;
 
-/// The share in each channel of the direction at 180 degrees: it is the one at 0.
-const TURNED: [f32; 16] = {
-    let mut shares = [0.0; 16];
-    shares[0] = 1.0;
+/// The share of each channel in a cell's energy.
+const ENERGY_SHARES: Lanes = {
+    let mut shares = Lanes::ZERO;
+    let mut lane = 0;
+    while lane < DIRECTIONS {
+        shares.0[lane] = 1.0;
+        lane += 1;
+    }
     shares
 };
+/// The greatest value of each channel.
+const LIMITS: Lanes = {
+    let mut limits = Lanes([GREATEST; LANES]);
+    limits.0[GRAY] = f32::INFINITY;
+    limits
+};
+
 /// Room for the cells of one area.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
@@ -30,11 +42,11 @@ pub(super) struct Cells {
     /// Where the corners of the cells are among the columns of the sums.
     places: Vec<Place>,
     /// For each column of cells the sum at its right corner less that at its left one, in the last row of corners.
-    edges: Vec<[f32; 16]>,
+    edges: Vec<Lanes>,
     /// The channels of each cell, row by row.
-    cells: Vec<[f32; 16]>,
-    /// The gray value of each cell.
-    grays: Vec<f32>,
+    cells: Vec<Lanes>,
+    /// The squares of each cell's directions, in one register of this machine.
+    squares: Vec<f32>,
     energies: Energies,
 }
 
@@ -54,10 +66,18 @@ impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
     fn with_simd<S: Simd>(self, simd: S) {
         let len = self.cells.cells.len() * CHANNELS;
         for (area, out) in self.areas.zip(self.out.chunks_exact_mut(len)) {
-            self.cells.sum_up(simd, self.sums, &area);
-            self.cells.normalize(&area, self.gray_weight, out);
+            let grays = self.cells.sum_up(simd, self.sums, &area);
+            self.cells
+                .normalize(simd, &area, grays, self.gray_weight, out);
         }
     }
+}
+
+/// The sum of the gray values of all cells, and that of their squares.
+#[derive(Debug, Clone, Copy)]
+struct Grays {
+    sum: f32,
+    squares: f32,
 }
 
 impl Cells {
@@ -90,91 +110,137 @@ impl Cells {
         }
         (self.columns, self.rows) = (columns, rows);
         self.places.resize(columns + 1, Place::default());
-        self.edges.resize(columns, [0.0; 16]);
-        self.cells.resize(columns * rows, [0.0; 16]);
-        self.grays.resize(columns * rows, 0.0);
+        self.edges.resize(columns, Lanes::ZERO);
+        self.cells.resize(columns * rows, Lanes::ZERO);
+        // Whole groups of registers, whatever their length.
+        let groups = (columns * rows).next_multiple_of(LANES);
+        self.squares.clear();
+        self.squares.resize(groups * LANES, 0.0);
         self.energies.prepare(columns, rows);
     }
 
     /// The cells of `area`, each the sum at its lower right corner, less those at the two beside it, and that at its
-    /// upper left one.
+    /// upper left one; and their energies.
     #[inline(always)]
-    fn sum_up<S: Simd>(&mut self, simd: S, sums: &GradientSums, area: &Rect) {
+    fn sum_up<S: Simd>(&mut self, simd: S, sums: &GradientSums, area: &Rect) -> Grays {
         let (x, y) = (area.x as f32, area.y as f32);
         let width = (area.width / self.columns as f64) as f32;
         let height = (area.height / self.rows as f64) as f32;
         for (i, place) in self.places.iter_mut().enumerate() {
             *place = sums.column(x + i as f32 * width);
         }
-        for j in 0..=self.rows {
-            let row = sums.row(y + j as f32 * height);
+        let energy_shares = ENERGY_SHARES;
+        let energy_shares = energy_shares.load::<S>();
+        let zero = simd.splat_f32s(0.0);
+        let (mut total, mut squares) = ([zero; LANES], [zero; LANES]);
+        // The first row of corners makes no cells.
+        let row = sums.row(y);
+        let mut left = row.at(simd, self.places[0]);
+        for (edge, &place) in self.edges.iter_mut().zip(&self.places[1..]) {
+            let right = row.at(simd, place);
+            for (register, edge) in edge.load_mut::<S>().iter_mut().enumerate() {
+                *edge = simd.sub_f32s(right[register], left[register]);
+            }
+            left = right;
+        }
+        let registers_of_squares = S::as_mut_simd_f32s(&mut self.squares).0;
+        let rows = self.cells.chunks_exact_mut(self.columns);
+        let rows = rows.zip(registers_of_squares.chunks_mut(self.columns));
+        for (j, (cells, energies)) in rows.enumerate() {
+            let row = sums.row(y + (j + 1) as f32 * height);
             let mut left = row.at(simd, self.places[0]);
-            // The first row of corners makes no cells: what it makes of the last area's edges is written over.
-            let row_of_cells = j.saturating_sub(1);
-            let cells = &mut self.cells[row_of_cells * self.columns..][..self.columns];
             let columns = self.edges.iter_mut().zip(&self.places[1..]);
-            for ((edge, &place), cell) in columns.zip(cells) {
+            for (((edge, &place), cell), out) in columns.zip(cells).zip(energies) {
                 let right = row.at(simd, place);
-                let (mut across, mut inside) = (right, *edge);
-                for lane in 0..16 {
-                    across[lane] -= left[lane];
-                    inside[lane] = across[lane] - inside[lane];
+                let (edge, cell) = (edge.load_mut::<S>(), cell.load_mut::<S>());
+                let mut energy = zero;
+                for register in 0..registers::<S>() {
+                    let across = simd.sub_f32s(right[register], left[register]);
+                    let inside = simd.sub_f32s(across, edge[register]);
+                    (edge[register], cell[register]) = (across, inside);
+                    let square = simd.mul_f32s(inside, inside);
+                    total[register] = simd.add_f32s(total[register], inside);
+                    squares[register] = simd.add_f32s(squares[register], square);
+                    energy = simd.mul_add_e_f32s(square, energy_shares[register], energy);
                 }
-                let turned = inside[DIRECTIONS];
-                for lane in 0..16 {
-                    inside[lane] += TURNED[lane] * turned;
-                }
-                (*cell, *edge) = (inside, across);
+                *out = energy;
                 left = right;
             }
         }
-        for (j, cells) in self.cells.chunks_exact(self.columns).enumerate() {
-            self.energies.take(j, cells);
+        self.sum_squares(simd);
+        let gray = |sums: [S::f32s; LANES]| {
+            let mut lanes = Lanes::ZERO;
+            lanes
+                .load_mut::<S>()
+                .copy_from_slice(&sums[..registers::<S>()]);
+            lanes.0[GRAY]
+        };
+        Grays {
+            sum: gray(total),
+            squares: gray(squares),
+        }
+    }
+
+    /// The energies, from the squares of the directions.
+    #[inline(always)]
+    fn sum_squares<S: Simd>(&mut self, simd: S) {
+        let squares = S::as_simd_f32s(&self.squares).0.as_chunks().0;
+        let energies = self.energies.values_mut().as_chunks_mut().0;
+        let together = sums::can_sum::<S, f32>(simd);
+        for (squares, energies) in squares.iter().zip(energies) {
+            *energies = if together {
+                f32::sum_each(simd, *squares)
+            } else {
+                squares.map(|squares| simd.reduce_sum_f32s(squares))
+            };
         }
     }
 
     /// The feature vector of the cells.
     #[inline(always)]
-    fn normalize(&mut self, area: &Rect, gray_weight: f32, out: &mut [f32]) {
+    fn normalize<S: Simd>(
+        &mut self,
+        simd: S,
+        area: &Rect,
+        grays: Grays,
+        gray_weight: f32,
+        out: &mut [f32],
+    ) {
         let count = self.cells.len() as f32;
         let pixels = (area.width * area.height) as f32 / count;
-        for (gray, cell) in self.grays.iter_mut().zip(&self.cells) {
-            *gray = cell[GRAY];
-        }
-        let mean = sum(&self.grays, |gray| gray) / count;
-        let variance = sum(&self.grays, |gray| (gray - mean) * (gray - mean)) / count;
+        let mean = grays.sum / count;
+        let variance = (grays.squares / count - mean * mean).max(0.0);
         let gray_scale = gray_weight / variance.sqrt().max(LEAST_CONTRAST * pixels);
         let floor = (FLAT * pixels) * (FLAT * pixels);
-        let rows = self.cells.chunks_exact(self.columns);
-        let rows = rows.zip(out.chunks_exact_mut(self.columns * CHANNELS));
-        for (j, (cells, out)) in rows.enumerate() {
-            let scales = self.energies.scales(j, floor);
-            let out = out.as_chunks_mut::<CHANNELS>().0;
-            for ((cell, scale), out) in cells.iter().zip(scales).zip(out) {
-                let mut values = *cell;
-                for value in &mut values {
-                    let scaled = *value * scale;
-                    *value = if scaled < GREATEST { scaled } else { GREATEST };
+        // A value is min(cell * factor + offset, limit).
+        let (mut gray_factors, mut offsets) = (Lanes::ZERO, Lanes::ZERO);
+        (gray_factors.0[GRAY], offsets.0[GRAY]) = (gray_scale, -mean * gray_scale);
+        let (gray_factors, offsets) = (gray_factors.load::<S>(), offsets.load::<S>());
+        let (directions, limits) = (ENERGY_SHARES, LIMITS);
+        let (directions, limits) = (directions.load::<S>(), limits.load::<S>());
+        let scales = self.energies.scales(floor);
+        let mut first = 0;
+        for (cells, scales) in self.cells.chunks_exact(self.columns).zip(scales) {
+            for (cell, &scale) in cells.iter().zip(scales) {
+                let (scale, cell) = (simd.splat_f32s(scale), cell.load::<S>());
+                let mut values = Lanes::ZERO;
+                for (register, value) in values.load_mut::<S>().iter_mut().enumerate() {
+                    let factor =
+                        simd.mul_add_e_f32s(directions[register], scale, gray_factors[register]);
+                    let scaled = simd.mul_add_e_f32s(cell[register], factor, offsets[register]);
+                    *value = simd.min_f32s(scaled, limits[register]);
                 }
-                out.copy_from_slice(&values[..CHANNELS]);
-                out[DIRECTIONS] = (cell[GRAY] - mean) * gray_scale;
+                // What is beyond the channels is written over by the next cell.
+                let out = &mut out[first..];
+                if let Some(out) = out.first_chunk_mut::<LANES>() {
+                    *out = values.0;
+                } else {
+                    out.copy_from_slice(&values.0[..CHANNELS]);
+                }
+                first += CHANNELS;
             }
         }
     }
-}
-
-/// The sum of a function of values, in eight parts so that the loop vectorises.
-#[inline(always)]
-fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let mut parts = [0.0_f32; 8];
-    let (chunks, rest) = values.as_chunks::<8>();
-    for chunk in chunks {
-        for lane in 0..8 {
-            parts[lane] += of(chunk[lane]);
-        }
-    }
-    let rest = rest.iter().map(|&value| of(value));
-    parts.iter().sum::<f32>() + rest.sum::<f32>()
 }
 
 #[cfg(test)]
@@ -237,7 +303,7 @@ mod tests {
                 let x = area.x + (index % 4) as f64 * width;
                 let y = area.y + (index / 4) as f64 * height;
                 let expected = cell(&frame, &Rect::new(x, y, width, height));
-                let found = &cells.cells[index];
+                let found = &cells.cells[index].0;
                 for (found, expected) in found.iter().zip(&expected[..DIRECTIONS]) {
                     assert!(
                         (f64::from(*found) - expected).abs() < 4.0,

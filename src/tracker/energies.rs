@@ -3,7 +3,7 @@
 //! The energy of a cell is the sum of the squares of its directions. Each cell is brought to a scale by the root of the
 //! mean energy of the 3 x 3 cells around it, so that contrast is taken out where it is.
 
-use super::gradients::DIRECTIONS;
+use super::gradients::LANES;
 
 /// Cells of a row that are worked on together.
 const GROUP: usize = 8;
@@ -11,23 +11,31 @@ const GROUP: usize = 8;
 /// The energies of the cells of one area.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Energies {
-    /// Row by row, with a rim of zeros around: rows of `stride` values.
+    columns: usize,
+    /// Row by row, with room for whole registers.
     values: Vec<f32>,
-    stride: usize,
+    /// The sums of each cell and those above and below it, row by row: a zero, those of the cells of a row, and zeros up
+    /// to a whole number of groups and one more.
+    columns_of_three: Vec<f32>,
     /// For each column one over the number of cells beside it in a row, itself among them; the same for each row.
     column_shares: Vec<f32>,
     row_shares: Vec<f32>,
-    /// What the directions of each cell of a row are multiplied by.
+    /// What the directions of each cell are multiplied by: rows of whole groups.
     scales: Vec<f32>,
 }
 
 impl Energies {
     /// Makes room for so many columns and rows of cells.
     pub fn prepare(&mut self, columns: usize, rows: usize) {
+        self.columns = columns;
         let padded = columns.next_multiple_of(GROUP);
-        self.stride = padded + 2;
-        self.values.clear();
-        self.values.resize(self.stride * (rows + 2), 0.0);
+        let zeros = |values: &mut Vec<f32>, count: usize| {
+            values.clear();
+            values.resize(count, 0.0);
+        };
+        zeros(&mut self.values, (columns * rows).next_multiple_of(LANES));
+        zeros(&mut self.columns_of_three, (padded + 2) * rows);
+        zeros(&mut self.scales, padded * rows);
         let share = |i: usize, count: usize| {
             let beside = (i + 2).min(count) - i.saturating_sub(1);
             1.0 / beside as f32
@@ -38,58 +46,73 @@ impl Energies {
         self.column_shares.resize(padded, 0.0);
         self.row_shares.clear();
         self.row_shares.extend((0..rows).map(|j| share(j, rows)));
-        self.scales.resize(padded, 0.0);
     }
 
-    /// Takes the cells of row `row`.
+    /// The energies, row by row, to be written; and some more.
     #[inline(always)]
-    pub fn take(&mut self, row: usize, cells: &[[f32; 16]]) {
-        let values = &mut self.values[(row + 1) * self.stride + 1..];
-        for (value, cell) in values.iter_mut().zip(cells) {
-            *value = energy(cell);
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+
+    /// What the directions of each cell are multiplied by, a row after the other: one over three times the root of the
+    /// mean energy around, `floor` added to it.
+    #[inline(always)]
+    pub fn scales(&mut self, floor: f32) -> impl Iterator<Item = &[f32]> {
+        let (columns, last) = (self.columns, self.row_shares.len() - 1);
+        let padded = self.column_shares.len();
+        // Each step for all rows before the next, so that nothing is read just after it was written in another width.
+        let sums = self.columns_of_three.chunks_exact_mut(padded + 2);
+        for (row, sums) in sums.enumerate() {
+            // A row at the edge has itself in place of what is beyond, times nothing.
+            let (above, below) = (row.saturating_sub(1), (row + 1).min(last));
+            let (has_above, has_below) = (share_of(above < row), share_of(below > row));
+            let values = |row: usize| self.values[row * columns..][..columns].as_chunks::<GROUP>();
+            let (above, here, below) = (values(above), values(row), values(below));
+            let (sums, rest) = sums[1..=columns].as_chunks_mut::<GROUP>();
+            for (((above, here), below), sums) in above.0.iter().zip(here.0).zip(below.0).zip(sums)
+            {
+                let mut sum = *here;
+                for lane in 0..GROUP {
+                    sum[lane] += has_above * above[lane] + has_below * below[lane];
+                }
+                *sums = sum;
+            }
+            for (((above, here), below), sum) in above.1.iter().zip(here.1).zip(below.1).zip(rest) {
+                *sum = here + has_above * above + has_below * below;
+            }
         }
-    }
-
-    /// What the directions of each cell of row `row` are multiplied by: one over three times the root of the mean energy
-    /// around, `floor` added to it.
-    #[inline(always)]
-    pub fn scales(&mut self, row: usize, floor: f32) -> &[f32] {
-        let around = &self.values[row * self.stride..][..3 * self.stride];
-        let row_share = self.row_shares[row];
-        let groups = self.scales.as_chunks_mut::<GROUP>().0;
-        let shares = self.column_shares.as_chunks::<GROUP>().0;
-        for (group, (scales, shares)) in groups.iter_mut().zip(shares).enumerate() {
-            let mut energy = [0.0; GROUP];
-            for row in 0..3 {
-                for column in 0..3 {
-                    let part = &around[row * self.stride + group * GROUP + column..][..GROUP];
+        let rows = self.scales.chunks_exact_mut(padded).zip(&self.row_shares);
+        let sums = self.columns_of_three.chunks_exact(padded + 2);
+        for ((scales, &row_share), sums) in rows.zip(sums) {
+            let groups = scales.as_chunks_mut::<GROUP>().0;
+            let shares = self.column_shares.as_chunks::<GROUP>().0;
+            for (group, (scales, shares)) in groups.iter_mut().zip(shares).enumerate() {
+                let mut mean = [0.0; GROUP];
+                for shift in 0..3 {
+                    let part = &sums[group * GROUP + shift..][..GROUP];
                     for lane in 0..GROUP {
-                        energy[lane] += part[lane];
+                        mean[lane] += part[lane];
                     }
                 }
-            }
-            for lane in 0..GROUP {
-                let mean = energy[lane] * row_share * shares[lane];
-                scales[lane] = 1.0 / (3.0 * (mean + floor).sqrt());
+                for lane in 0..GROUP {
+                    mean[lane] = mean[lane] * row_share * shares[lane] + floor;
+                }
+                for mean in &mut mean {
+                    *mean = 1.0 / (3.0 * mean.sqrt());
+                }
+                *scales = mean;
             }
         }
-        &self.scales
+        self.scales
+            .chunks_exact(padded)
+            .map(move |row| &row[..columns])
     }
 }
 
-/// The sum of the squares of a cell's directions.
+/// 1 or 0.
 #[inline(always)]
-fn energy(cell: &[f32; 16]) -> f32 {
-    let mut squares = [0.0; 8];
-    for lane in 0..8 {
-        squares[lane] = cell[lane] * cell[lane];
-    }
-    let mut pairs = [0.0; 4];
-    for lane in 0..4 {
-        pairs[lane] = squares[lane] + squares[lane + 4];
-    }
-    let last = cell[DIRECTIONS - 1];
-    (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]) + last * last
+fn share_of(counts: bool) -> f32 {
+    if counts { 1.0 } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -99,28 +122,23 @@ mod tests {
     #[test]
     fn scales_are_those_of_the_mean_energy_around() {
         for (columns, rows) in [(4, 4), (8, 8), (5, 7), (17, 4)] {
-            let value = |i: usize, lane: usize| ((i * 37 + lane * 11) % 23) as f32 - 7.0;
-            let mut cells = vec![[0.0; 16]; columns * rows];
-            for (i, cell) in cells.iter_mut().enumerate() {
-                for (lane, channel) in cell.iter_mut().enumerate() {
-                    *channel = value(i, lane);
-                }
-            }
+            let energy = |i: usize| (i * 37 % 23) as f32;
             let mut energies = Energies::default();
             energies.prepare(columns, rows);
-            for (j, cells) in cells.chunks_exact(columns).enumerate() {
-                energies.take(j, cells);
+            for (i, value) in energies.values_mut()[..columns * rows]
+                .iter_mut()
+                .enumerate()
+            {
+                *value = energy(i);
             }
-            for j in 0..rows {
-                let found = energies.scales(j, 5.0)[..columns].to_vec();
+            for (j, found) in energies.scales(5.0).enumerate() {
+                assert_eq!(found.len(), columns);
                 for (i, found) in found.iter().enumerate() {
                     let beside = |at: &usize| {
                         (at % columns).abs_diff(i) <= 1 && (at / columns).abs_diff(j) <= 1
                     };
                     let around: Vec<usize> = (0..columns * rows).filter(beside).collect();
-                    let squares =
-                        |at: usize| (0..DIRECTIONS).map(move |lane| value(at, lane).powi(2));
-                    let sum: f32 = around.iter().flat_map(|&at| squares(at)).sum();
+                    let sum: f32 = around.iter().map(|&at| energy(at)).sum();
                     let expected = 1.0 / (3.0 * (sum / around.len() as f32 + 5.0).sqrt());
                     assert!(
                         (found - expected).abs() < 1e-5 * expected,

@@ -17,38 +17,82 @@ use super::{GrayFrame, Rect};
 
 /// Directions, from 0 to 180 degrees.
 pub(super) const DIRECTIONS: usize = 9;
-/// The channel of the gray values. Before it is the direction at 180 degrees, which is that at 0 as well.
-pub(super) const GRAY: usize = DIRECTIONS + 1;
+/// The channel of the gray values, after the directions.
+pub(super) const GRAY: usize = DIRECTIONS;
+/// The channels of a pixel or a cell, with those after [`GRAY`], which are zero.
+pub(super) const LANES: usize = 16;
 
-/// The channels of a pixel or a cell; those after [`GRAY`] are zero.
+/// The channels of a pixel or a cell, in a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(super) struct Lanes(pub [f32; 16]);
+pub(super) struct Lanes(pub [f32; LANES]);
+
+/// The same in vector registers: as many of these as they take are used ([`registers`]).
+pub(super) type Registers<S> = [<S as Simd>::f32s; LANES];
+
+/// How many registers the channels take.
+#[inline(always)]
+pub(super) fn registers<S: Simd>() -> usize {
+    LANES / S::F32_LANES
+}
 
 impl Lanes {
     /// Nothing in any channel.
-    pub const ZERO: Self = Self([0.0; 16]);
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// The channels as registers.
+    #[inline(always)]
+    pub fn load<S: Simd>(&self) -> &[S::f32s] {
+        S::as_simd_f32s(&self.0).0
+    }
+
+    /// The channels as registers, to be written.
+    #[inline(always)]
+    pub fn load_mut<S: Simd>(&mut self) -> &mut [S::f32s] {
+        S::as_mut_simd_f32s(&mut self.0).0
+    }
 }
 
 /// Cells of so many working pixels lose nothing when sums are interpolated over two pixels, and a large target takes a
 /// quarter of the room.
 const COARSE: f64 = 8.0;
 
-/// The direction of each channel, in bins; those without one are far from all.
-const CENTERS: [f32; 16] = {
-    let mut centers = [1e9; 16];
-    let mut lane = 0;
-    while lane <= DIRECTIONS {
-        centers[lane] = lane as f32;
+/// The share of a direction `b` (in bins) that is each channel's is max(0, slope |b - center| + top): a hat around the
+/// channel's own direction, and for the first one, which is that at 180 degrees as well, what is far from the middle.
+const CENTERS: Lanes = {
+    let mut centers = Lanes::ZERO;
+    let mut lane = 1;
+    while lane < DIRECTIONS {
+        centers.0[lane] = lane as f32;
         lane += 1;
     }
+    centers.0[0] = DIRECTIONS as f32 / 2.0;
     centers
 };
-
+const SLOPES: Lanes = {
+    let mut slopes = Lanes::ZERO;
+    let mut lane = 1;
+    while lane < DIRECTIONS {
+        slopes.0[lane] = -1.0;
+        lane += 1;
+    }
+    slopes.0[0] = 1.0;
+    slopes
+};
+const TOPS: Lanes = {
+    let mut tops = Lanes::ZERO;
+    let mut lane = 1;
+    while lane < DIRECTIONS {
+        tops.0[lane] = 1.0;
+        lane += 1;
+    }
+    tops.0[0] = 1.0 - DIRECTIONS as f32 / 2.0;
+    tops
+};
 /// The share of the gray value in each channel.
-const GRAY_SHARES: [f32; 16] = {
-    let mut shares = [0.0; 16];
-    shares[GRAY] = 1.0;
+const GRAY_SHARES: Lanes = {
+    let mut shares = Lanes::ZERO;
+    shares.0[GRAY] = 1.0;
     shares
 };
 
@@ -125,20 +169,23 @@ impl GradientSums {
             self.sums.resize(corners, Lanes::ZERO);
         }
         self.sums[..stride].fill(Lanes::ZERO);
-        for y in 0..self.bottom - self.top {
-            let pixels = self.left..self.right;
-            let gradients = &mut self.row;
-            gradients.compute(frame, pixels, self.top + y, self.columns * self.grain);
-            let corner = y / self.grain + 1;
-            let (above, below) = self.sums.split_at_mut(corner * stride);
-            let (above, below) = (&above[(corner - 1) * stride..], &mut below[..stride]);
-            if y % self.grain == 0 {
-                below.copy_from_slice(above);
-            }
-            if self.grain == 1 {
-                sum_row::<S, 1>(simd, gradients, &mut below[1..]);
-            } else {
-                sum_row::<S, 2>(simd, gradients, &mut below[1..]);
+        for row in 0..self.rows {
+            let (above, below) = self.sums.split_at_mut((row + 1) * stride);
+            let (above, below) = (&above[row * stride..], &mut below[..stride]);
+            below[0] = Lanes::ZERO;
+            for step in 0..self.grain {
+                let y = self.top + row * self.grain + step;
+                if y >= self.bottom {
+                    break;
+                }
+                let gradients = &mut self.row;
+                let pixels = self.left..self.right;
+                gradients.compute(frame, pixels, y, self.columns * self.grain);
+                match (self.grain, step) {
+                    (1, _) => sum_row::<S, 1, true>(simd, gradients, above, below),
+                    (_, 0) => sum_row::<S, 2, true>(simd, gradients, above, below),
+                    _ => sum_row::<S, 2, false>(simd, gradients, above, below),
+                }
             }
         }
     }
@@ -162,32 +209,46 @@ impl GradientSums {
     }
 }
 
-/// Adds to `sums`, one for every `GRAIN` pixels, the channels of the row's pixels up to there.
+/// The sums at the corners below a row of pixels, one for every `GRAIN` pixels: those of the row's pixels up to there
+/// are added to the sums above (`IS_FIRST`), or to what is below already.
 #[inline(always)]
-fn sum_row<S: Simd, const GRAIN: usize>(simd: S, row: &GradientRow, sums: &mut [Lanes]) {
-    let (centers, _) = S::as_simd_f32s(&CENTERS);
-    let (gray_shares, _) = S::as_simd_f32s(&GRAY_SHARES);
-    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-    // As many as a pixel's channels take; one is enough for the widest registers.
-    let mut total = [zero; 16];
+fn sum_row<S: Simd, const GRAIN: usize, const IS_FIRST: bool>(
+    simd: S,
+    row: &GradientRow,
+    above: &[Lanes],
+    below: &mut [Lanes],
+) {
+    let (centers, slopes, tops) = (CENTERS, SLOPES, TOPS);
+    let (centers, slopes, tops) = (centers.load::<S>(), slopes.load::<S>(), tops.load::<S>());
+    let gray_shares = GRAY_SHARES;
+    let gray_shares = gray_shares.load::<S>();
+    let zero = simd.splat_f32s(0.0);
+    let mut total = [zero; LANES];
     let (bins, _) = row.bins.as_chunks::<GRAIN>();
     let (strengths, _) = row.strengths.as_chunks::<GRAIN>();
     let (grays, _) = row.gray[1..].as_chunks::<GRAIN>();
     let pixels = bins.iter().zip(strengths).zip(grays);
-    for (((bins, strengths), grays), sum) in pixels.zip(sums) {
-        for i in 0..GRAIN {
-            let (bin, strength) = (simd.splat_f32s(bins[i]), simd.splat_f32s(strengths[i]));
-            let gray = simd.splat_f32s(grays[i]);
-            for register in 0..centers.len() {
+    let corners = above[1..].iter().zip(&mut below[1..]);
+    for (((bins, strengths), grays), (above, below)) in pixels.zip(corners) {
+        let (above, below) = (above.load::<S>(), below.load_mut::<S>());
+        for register in 0..registers::<S>() {
+            // Apart from the sum so far, of which each pixel waits for the last one.
+            let mut sum = zero;
+            for i in 0..GRAIN {
+                let bin = simd.splat_f32s(bins[i]);
                 let away = simd.abs_f32s(simd.sub_f32s(bin, centers[register]));
-                let share = simd.max_f32s(simd.sub_f32s(one, away), zero);
-                let sum = simd.mul_add_e_f32s(share, strength, total[register]);
-                total[register] = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
+                let share = simd.mul_add_e_f32s(slopes[register], away, tops[register]);
+                let (strength, gray) = (simd.splat_f32s(strengths[i]), simd.splat_f32s(grays[i]));
+                sum = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
+                sum = simd.mul_add_e_f32s(simd.max_f32s(share, zero), strength, sum);
             }
-        }
-        let (sum, _) = S::as_mut_simd_f32s(&mut sum.0);
-        for register in 0..centers.len() {
-            sum[register] = simd.add_f32s(sum[register], total[register]);
+            total[register] = simd.add_f32s(total[register], sum);
+            let before = if IS_FIRST {
+                above[register]
+            } else {
+                below[register]
+            };
+            below[register] = simd.add_f32s(before, total[register]);
         }
     }
 }
@@ -203,27 +264,26 @@ pub(super) struct SumsRow<'a> {
 impl SumsRow<'_> {
     /// The sum at a point of the line, interpolated between the four corners around it.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, column: Place) -> [f32; 16] {
-        let upper = &self.upper[column.corner..][..2];
-        let lower = &self.lower[column.corner..][..2];
+    pub fn at<S: Simd>(&self, simd: S, column: Place) -> Registers<S> {
+        let [upper_left, upper_right] = &self.upper[column.corner..].as_chunks::<2>().0[0];
+        let [lower_left, lower_right] = &self.lower[column.corner..].as_chunks::<2>().0[0];
         let (right, down) = (simd.splat_f32s(column.beyond), simd.splat_f32s(self.down));
         let between = |from: S::f32s, to: S::f32s, share: S::f32s| {
             simd.mul_add_e_f32s(simd.sub_f32s(to, from), share, from)
         };
-        let mut sum = [0.0; 16];
-        let corners = S::as_simd_f32s(&upper[0].0)
-            .0
-            .iter()
-            .zip(S::as_simd_f32s(&upper[1].0).0);
-        let others = S::as_simd_f32s(&lower[0].0)
-            .0
-            .iter()
-            .zip(S::as_simd_f32s(&lower[1].0).0);
-        let out = S::as_mut_simd_f32s(&mut sum).0;
-        for ((upper, lower), out) in corners.zip(others).zip(out) {
-            let upper = between(*upper.0, *upper.1, right);
-            let lower = between(*lower.0, *lower.1, right);
-            *out = between(upper, lower, down);
+        let mut sum = [simd.splat_f32s(0.0); LANES];
+        for register in 0..registers::<S>() {
+            let upper = between(
+                upper_left.load::<S>()[register],
+                upper_right.load::<S>()[register],
+                right,
+            );
+            let lower = between(
+                lower_left.load::<S>()[register],
+                lower_right.load::<S>()[register],
+                right,
+            );
+            sum[register] = between(upper, lower, down);
         }
         sum
     }
@@ -341,9 +401,10 @@ mod tests {
                     let mut row = GradientRow::default();
                     row.compute(&frame, left..left + across, y, across);
                     for (x, (bin, strength)) in row.bins.iter().zip(&row.strengths).enumerate() {
-                        let (lower, share) = (*bin as usize, bin.fract());
+                        // A direction of 180 degrees is one of 0.
+                        let (lower, share) = (*bin as usize % DIRECTIONS, bin.fract());
                         expected[lower] += strength * (1.0 - share);
-                        expected[lower + 1] += strength * share;
+                        expected[(lower + 1) % DIRECTIONS] += strength * share;
                         expected[GRAY] += f32::from(frame.pixels()[y * 60 + left + x]);
                     }
                 }

@@ -8,7 +8,9 @@
 
 use std::ops::{AddAssign, Mul};
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd, bytemuck};
+
+use super::sums;
 
 /// Tiles of the second set that stay in the cache: twelve vectors at most, of 640 single-precision values 31 KB.
 const BLOCK: usize = 2;
@@ -40,14 +42,32 @@ pub(super) trait Element: Copy + Default + AddAssign + Mul<Output = Self> {
         b: Self::Lanes<S>,
         sum: Self::Lanes<S>,
     ) -> Self::Lanes<S>;
+    /// How many values a register has.
+    fn count<S: Simd>() -> usize;
+    /// A register of one value.
+    fn splat<S: Simd>(simd: S, value: Self) -> Self::Lanes<S>;
     /// The sum of a register.
     fn sum<S: Simd>(simd: S, lanes: Self::Lanes<S>) -> Self;
+    /// How many registers are summed up together.
+    const TOGETHER: usize;
+    /// The sum of each of the first `TOGETHER` registers, where [`sums::can_sum`] says so.
+    fn sum_each<S: Simd>(
+        simd: S,
+        registers: [Self::Lanes<S>; sums::TOGETHER],
+    ) -> [Self; sums::TOGETHER];
+    /// A small number.
+    fn from_index(index: usize) -> Self;
+    /// The small number that this is.
+    fn to_index(self) -> usize;
 }
 
 macro_rules! element {
-    ($number:ty, $lanes:ident, $as_simd:ident, $splat:ident, $multiply_add:ident, $sum:ident) => {
+    ($number:ty, $lanes:ident, $as_simd:ident, $splat:ident, $multiply_add:ident, $sum:ident,
+        $together:literal, $sum_each:ident) => {
         impl Element for $number {
             type Lanes<S: Simd> = S::$lanes;
+
+            const TOGETHER: usize = $together;
 
             #[inline(always)]
             fn lanes<S: Simd>(values: &[Self]) -> (&[S::$lanes], &[Self]) {
@@ -70,8 +90,36 @@ macro_rules! element {
             }
 
             #[inline(always)]
+            fn count<S: Simd>() -> usize {
+                size_of::<S::$lanes>() / size_of::<Self>()
+            }
+
+            #[inline(always)]
+            fn splat<S: Simd>(simd: S, value: Self) -> S::$lanes {
+                simd.$splat(value)
+            }
+
+            #[inline(always)]
             fn sum<S: Simd>(simd: S, lanes: S::$lanes) -> Self {
                 simd.$sum(lanes)
+            }
+
+            #[inline(always)]
+            fn sum_each<S: Simd>(
+                simd: S,
+                registers: [S::$lanes; sums::TOGETHER],
+            ) -> [Self; sums::TOGETHER] {
+                $sum_each(simd, registers)
+            }
+
+            #[inline(always)]
+            fn from_index(index: usize) -> Self {
+                index as Self
+            }
+
+            #[inline(always)]
+            fn to_index(self) -> usize {
+                self as usize
             }
         }
     };
@@ -83,7 +131,9 @@ element!(
     as_simd_f32s,
     splat_f32s,
     mul_add_e_f32s,
-    reduce_sum_f32s
+    reduce_sum_f32s,
+    4,
+    sum_each_single
 );
 element!(
     f64,
@@ -91,8 +141,30 @@ element!(
     as_simd_f64s,
     splat_f64s,
     mul_add_e_f64s,
-    reduce_sum_f64s
+    reduce_sum_f64s,
+    2,
+    sum_each_double
 );
+
+/// [`Element::sum_each`] in single precision.
+#[inline(always)]
+fn sum_each_single<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [f32; 4] {
+    let pair = |a, b| -> S::f64s {
+        let [even, odd] = simd.deinterleave_shfl_f32s([a, b]);
+        bytemuck::cast(simd.add_f32s(even, odd))
+    };
+    // Two neighbours, of the one and of the other, move together now.
+    let [even, odd] = simd.deinterleave_shfl_f64s([pair(a, b), pair(c, d)]);
+    let sum = simd.add_f32s(bytemuck::cast(even), bytemuck::cast(odd));
+    sums::fold::<f32, 4>(bytemuck::cast_slice(&[sum]))
+}
+
+/// [`Element::sum_each`] in double precision: of two.
+#[inline(always)]
+fn sum_each_double<S: Simd>(simd: S, [a, b, ..]: [S::f64s; 4]) -> [f64; 4] {
+    let [even, odd] = simd.deinterleave_shfl_f64s([a, b]);
+    sums::fold::<f64, 2>(bytemuck::cast_slice(&[simd.add_f64s(even, odd)]))
+}
 
 /// [`inner_products`], to be compiled for the instructions that this machine has.
 struct InnerProducts<'a, T> {
@@ -217,15 +289,32 @@ pub(super) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
         }
     }
     let mut products = [[T::default(); B]; A];
+    if sums::can_sum::<S, T>(simd) {
+        for first in (0..A * B).step_by(T::TOGETHER) {
+            let mut registers = [T::zeros(simd); sums::TOGETHER];
+            for (i, register) in registers.iter_mut().enumerate().take(T::TOGETHER) {
+                // A group at the end has the last sum more than once.
+                let at = (first + i).min(A * B - 1);
+                *register = sums[at / B][at % B];
+            }
+            let totals = T::sum_each(simd, registers);
+            for (i, total) in totals.iter().enumerate().take(T::TOGETHER) {
+                let at = (first + i).min(A * B - 1);
+                products[at / B][at % B] = *total;
+            }
+        }
+    } else {
+        for at in 0..A * B {
+            products[at / B][at % B] = T::sum(simd, sums[at / B][at % B]);
+        }
+    }
     for p in 0..A {
         let rest_a = T::lanes::<S>(a[p]).1;
         for q in 0..B {
-            let mut product = T::sum(simd, sums[p][q]);
             let rest_b = T::lanes::<S>(b[q]).1;
             for (&x, &y) in rest_a.iter().zip(rest_b) {
-                product += x * y;
+                products[p][q] += x * y;
             }
-            products[p][q] = product;
         }
     }
     products

@@ -78,6 +78,7 @@ mod snapshot;
 mod solitary;
 mod state;
 mod subspace;
+mod sums;
 mod trust;
 mod view;
 mod whitening;
