@@ -114,8 +114,7 @@ impl Background {
         for look in &self.samples {
             look.add_to(&mut self.mean, 1.0 / count as f32);
         }
-        room.vectors.clear();
-        self.append_samples(&mut room.vectors);
+        self.samples_into(&mut room.vectors);
         let ridge = params.background_ridge;
         if params.candidate_alone {
             self.metric
@@ -125,18 +124,32 @@ impl Background {
         }
     }
 
-    /// Appends the samples to `out`, with the mean taken off: none where there is no metric.
+    /// Makes `out` the samples, with the mean taken off: none where there is no metric.
     #[inline(always)]
-    pub fn append_samples(&self, out: &mut Vec<f32>) {
+    pub fn samples_into(&self, out: &mut Vec<f32>) {
+        out.resize(self.samples_len(), 0.0);
+        self.write_samples(out);
+    }
+
+    /// How many values the samples have: none where there is no metric.
+    #[inline(always)]
+    pub fn samples_len(&self) -> usize {
+        if self.mean.is_empty() {
+            0
+        } else {
+            self.samples.len() * self.mean.len()
+        }
+    }
+
+    /// Writes the samples, with the mean taken off, to `out`, which is as long as they are.
+    #[inline(always)]
+    pub fn write_samples(&self, out: &mut [f32]) {
         if self.mean.is_empty() {
             return;
         }
-        for look in &self.samples {
-            let first = out.len();
-            out.extend_from_slice(&self.mean);
-            let vector = &mut out[first..];
-            vector.iter_mut().for_each(|value| *value = -*value);
-            look.add_to(vector, 1.0);
+        let vectors = out.chunks_exact_mut(self.mean.len());
+        for (look, vector) in self.samples.iter().zip(vectors) {
+            look.write_without(&self.mean, vector);
         }
     }
 
@@ -234,7 +247,7 @@ mod tests {
                     .all(|value| (value - mean).abs() < 1e-5)
             );
             let mut samples = Vec::new();
-            background.append_samples(&mut samples);
+            background.samples_into(&mut samples);
             for (sample, off) in samples.chunks(16).zip([-1.0, 0.0, 1.0]) {
                 assert!(sample.iter().all(|value| (value - off).abs() < 1e-5));
             }

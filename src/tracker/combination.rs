@@ -5,6 +5,8 @@
 //! looks' Gram matrix, its eigenvectors the coefficients, and with the shadows of the combinations (see
 //! [`metric`](super::metric)) a change of the background costs small matrices.
 
+use pulp::Simd;
+
 use super::background::Background;
 use super::eigen::Spectrum;
 use super::look::Look;
@@ -43,8 +45,7 @@ pub(super) struct Room {
 impl Room {
     /// Takes the samples of `background`, which all combinations are made with from here on.
     pub fn take(&mut self, background: &Background) {
-        self.samples.clear();
-        background.append_samples(&mut self.samples);
+        background.samples_into(&mut self.samples);
     }
 }
 
@@ -138,23 +139,27 @@ impl Combination {
         &self.shadows
     }
 
-    /// Appends the mean and the basis vectors, before the metric, to `out`. `looks` are those that this was made of.
+    /// Writes the mean and the basis vectors, before the metric, to `out`, which is as long as they are. `looks` are those
+    /// that this was made of; `room` is room for them.
     #[inline(always)]
-    pub fn append_to(
+    pub fn write_to<S: Simd>(
         &self,
+        simd: S,
         looks: &[Look],
         background: &Background,
-        len: usize,
-        out: &mut Vec<f32>,
+        room: &mut Vec<f32>,
+        out: &mut [f32],
     ) {
-        for row in self.coefficients.chunks_exact(looks.len()) {
-            let first = out.len();
-            out.resize(first + len, 0.0);
-            let vector = &mut out[first..];
-            for (look, coefficient) in looks.iter().zip(row) {
-                look.add_to(vector, *coefficient);
+        let len = out.len() / (1 + self.dim);
+        room.resize(looks.len() * len, 0.0);
+        for (look, vector) in looks.iter().zip(room.chunks_exact_mut(len)) {
+            if background.mean().is_empty() {
+                vector.fill(0.0);
+                look.add_to(vector, 1.0);
+            } else {
+                look.write_without(background.mean(), vector);
             }
-            matrix::add(vector, -row.iter().sum::<f32>(), background.mean());
         }
+        matrix::become_combinations(simd, out, &self.coefficients, room, len);
     }
 }

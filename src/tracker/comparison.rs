@@ -72,8 +72,9 @@ pub(super) struct Comparison {
     pub sums: Vec<f64>,
     /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
     vectors: Vec<f32>,
-    /// Where the first of them begins.
+    /// Where the first of them begins, and how long each is.
     first: usize,
+    len: usize,
     /// Their squared lengths.
     squares: Vec<f32>,
     /// What the discriminant sees of them.
@@ -113,7 +114,8 @@ impl Comparison {
     /// a lost target finds it too.
     pub fn begin(&mut self, state: &State, most: usize) {
         let params = &state.params;
-        self.first = kernel::align(&mut self.vectors, most * params.feature_len());
+        self.len = params.feature_len();
+        self.first = kernel::hold_aligned(&mut self.vectors, most * self.len);
         let entries = params.bag_size as usize;
         empty(&mut self.particles, most);
         empty(&mut self.squares, most);
@@ -149,7 +151,7 @@ impl Comparison {
 
     /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
     pub fn vectors(&self) -> &[f32] {
-        &self.vectors[self.first..]
+        &self.vectors[self.first..][..self.squares.len() * self.len]
     }
 
     /// Looks at the particles from `first` on, and computes their distances and scores.
@@ -169,19 +171,18 @@ impl Comparison {
 
     fn extend_batch(&mut self, frame: &GrayFrame, batch: Range<usize>, state: &State) {
         let params = &state.params;
-        let before = self.vectors.len();
-        let first = batch.start;
+        let (first, range) = (batch.start, self.places(&batch));
         let particles = &self.particles[batch];
+        let vectors = &mut self.vectors[range.clone()];
         self.view
-            .features(frame, particles, &state.reach, params, &mut self.vectors);
-        let vectors = &mut self.vectors[before..];
+            .describe(frame, particles, &state.reach, params, vectors);
         Arch::new().dispatch(Center {
             vectors,
             mean: offset(state),
-            len: params.feature_len(),
+            len: self.len,
             squares: &mut self.squares,
         });
-        let vectors = &self.vectors[before..];
+        let vectors = &self.vectors[range.clone()];
         let squares = &self.squares[first..];
         if params.candidate_alone {
             self.solitary
@@ -195,7 +196,7 @@ impl Comparison {
         if state.discriminant.is_on() {
             self.examples.examine_alone(vectors);
         }
-        self.extend_whitened(before, state);
+        self.extend_whitened(range, state);
     }
 
     /// Compares particles as the paper does, without any other vector than the one cut out.
@@ -219,8 +220,13 @@ impl Comparison {
         }
     }
 
-    /// Compares the vectors from `before` on, and the history, whitened.
-    fn extend_whitened(&mut self, before: usize, state: &State) {
+    /// Where the vectors of so many particles are.
+    fn places(&self, particles: &Range<usize>) -> Range<usize> {
+        self.first + particles.start * self.len..self.first + particles.end * self.len
+    }
+
+    /// Compares the vectors of a batch, and the history, whitened.
+    fn extend_whitened(&mut self, batch: Range<usize>, state: &State) {
         let Some((_, evaluation)) = &mut self.evaluation else {
             return;
         };
@@ -228,7 +234,7 @@ impl Comparison {
         let whitening = state.background.whitening();
         let unit_length = params.unit_length;
         self.whitened.clear();
-        self.whitened.extend_from_slice(&self.vectors[before..]);
+        self.whitened.extend_from_slice(&self.vectors[batch]);
         whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
         let count = self.whitened.len() / len;
         for (index, vector) in self.whitened.chunks_exact(len).enumerate() {

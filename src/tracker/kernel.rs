@@ -18,13 +18,33 @@ const BLOCK: usize = 2;
 /// Empties `values` so that the next `count` of them begin at a cache line: returns where that is. A load that
 /// crosses two lines takes as long as two.
 pub(super) fn align<T: Copy + Default>(values: &mut Vec<T>, count: usize) -> usize {
-    const LINE: usize = 64;
-    let most = LINE / size_of::<T>() - 1;
     values.clear();
-    values.reserve(most + count);
-    let first = values.as_ptr().align_offset(LINE).min(most);
+    values.reserve(most_before_line::<T>() + count);
+    let first = first_at_line(values);
     values.resize(first, T::default());
     first
+}
+
+/// Makes `values` hold at least `count` of them, whatever they are, from a cache line on: returns where that is.
+pub(super) fn hold_aligned<T: Copy + Default>(values: &mut Vec<T>, count: usize) -> usize {
+    let most = most_before_line::<T>() + count;
+    if values.len() < most {
+        values.resize(most, T::default());
+    }
+    first_at_line(values)
+}
+
+const LINE: usize = 64;
+
+fn most_before_line<T>() -> usize {
+    LINE / size_of::<T>() - 1
+}
+
+fn first_at_line<T>(values: &[T]) -> usize {
+    values
+        .as_ptr()
+        .align_offset(LINE)
+        .min(most_before_line::<T>())
 }
 
 /// Numbers of either precision.

@@ -216,7 +216,6 @@ impl State {
             areas, features, ..
         } = &mut room.learning.scale;
         pyramid::areas(center, areas);
-        features.clear();
         let params = pyramid::params(&self.params);
         room.view
             .features(frame, areas, &self.reach, &params, features);
@@ -225,7 +224,6 @@ impl State {
     /// The feature vector of the answer, as the first in the room.
     fn look_at_answer(&self, frame: &GrayFrame, room: &mut Comparison) {
         let features = &mut room.learning.features;
-        features.clear();
         let answer = [self.answer];
         room.view
             .features(frame, &answer, &self.reach, &self.params, features);
@@ -248,7 +246,6 @@ impl State {
             ..
         } = &mut room.learning;
         background::areas(&self.answer, &self.reach, count, draws, areas);
-        features.clear();
         room.view
             .features(frame, areas, &self.reach, &self.params, features);
         self.background.renew(features, &self.params, background);
@@ -272,7 +269,6 @@ impl State {
             ..
         } = &mut room.learning;
         first_examples(&self.answer, &self.reach, draws, areas);
-        features.clear();
         room.view
             .features(frame, areas, &self.reach, &self.params, features);
         room.examples.begin(&self.discriminant, &[], areas.len());

@@ -40,6 +40,14 @@ impl Look {
         }
     }
 
+    /// Writes the features, with `mean` taken off, to `out`.
+    #[inline(always)]
+    pub fn write_without(&self, mean: &[f32], out: &mut [f32]) {
+        for ((out, &value), mean) in out.iter_mut().zip(&self.values).zip(mean) {
+            *out = self.scale * f32::from(value) - mean;
+        }
+    }
+
     /// Whether this may be a feature vector of length `len` with no value over `greatest`.
     pub fn is_sound(&self, len: usize, greatest: f32) -> bool {
         self.values.len() == len && (0.0..=greatest / 127.0).contains(&self.scale)
@@ -60,6 +68,9 @@ mod tests {
         for (value, back) in features.iter().zip(&back) {
             assert!((value - back).abs() <= 0.3 / 254.0 + 1e-6);
         }
+        let mut without = vec![7.0; 100];
+        look.write_without(&features, &mut without);
+        assert!(without.iter().all(|rest| rest.abs() <= 0.3 / 254.0 + 1e-6));
         look.keep(&[0.0; 3]);
         let mut zeros = vec![0.0; 3];
         look.add_to(&mut zeros, 1.0);

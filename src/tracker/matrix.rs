@@ -60,8 +60,47 @@ pub(super) fn combine<S: Simd>(
     vectors: &[f32],
     len: usize,
 ) {
+    combine_as::<S, false, false>(simd, targets, factor, coefficients, vectors, len);
+}
+
+/// As [`combine`], but the combinations take the place of whatever is in `targets`.
+#[inline(always)]
+pub(super) fn become_combinations<S: Simd>(
+    simd: S,
+    targets: &mut [f32],
+    coefficients: &[f32],
+    vectors: &[f32],
+    len: usize,
+) {
+    combine_as::<S, true, false>(simd, targets, 1.0, coefficients, vectors, len);
+}
+
+/// As [`become_combinations`], with coefficients that are a lower triangle and zeros.
+#[inline(always)]
+pub(super) fn become_triangular<S: Simd>(
+    simd: S,
+    targets: &mut [f32],
+    coefficients: &[f32],
+    vectors: &[f32],
+    len: usize,
+) {
+    combine_as::<S, true, true>(simd, targets, 1.0, coefficients, vectors, len);
+}
+
+#[inline(always)]
+fn combine_as<S: Simd, const IS_NEW: bool, const IS_LOWER: bool>(
+    simd: S,
+    targets: &mut [f32],
+    factor: f32,
+    coefficients: &[f32],
+    vectors: &[f32],
+    len: usize,
+) {
     let (count, terms) = (targets.len() / len, vectors.len() / len);
     if terms == 0 {
+        if IS_NEW {
+            targets.fill(0.0);
+        }
         return;
     }
     let columns = 2 * S::F32_LANES;
@@ -69,17 +108,26 @@ pub(super) fn combine<S: Simd>(
     let scale = simd.splat_f32s(factor);
     for column in (0..whole).step_by(columns) {
         for first in (0..count).step_by(TILE) {
+            let used = if IS_LOWER {
+                terms.min(first + TILE)
+            } else {
+                terms
+            };
             let mut rows = [&coefficients[..0]; TILE];
             for (p, row) in rows.iter_mut().enumerate() {
                 // A tile at the end has the last target more than once.
-                *row = &coefficients[(first + p).min(count - 1) * terms..][..terms];
+                *row = &coefficients[(first + p).min(count - 1) * terms..][..used];
             }
             let sums = tile(simd, rows, &vectors[column..], len);
             for (p, sums) in sums.iter().enumerate().take(count - first) {
                 let target = &mut targets[(first + p) * len + column..][..columns];
                 let (target, _) = S::as_mut_simd_f32s(target);
                 for (target, sum) in target.iter_mut().zip(sums) {
-                    *target = simd.mul_add_e_f32s(*sum, scale, *target);
+                    *target = if IS_NEW {
+                        simd.mul_f32s(*sum, scale)
+                    } else {
+                        simd.mul_add_e_f32s(*sum, scale, *target)
+                    };
                 }
             }
         }
@@ -87,6 +135,9 @@ pub(super) fn combine<S: Simd>(
     if whole < len {
         let rows = coefficients.chunks_exact(terms);
         for (target, row) in targets.chunks_exact_mut(len).zip(rows) {
+            if IS_NEW {
+                target[whole..].fill(0.0);
+            }
             for (vector, &coefficient) in vectors.chunks_exact(len).zip(row) {
                 add(&mut target[whole..], factor * coefficient, &vector[whole..]);
             }
@@ -194,6 +245,25 @@ mod tests {
                     let term = |j: usize| coefficients[i * terms + j] * vectors[j * len + d];
                     let sum: f32 = (0..terms).map(term).sum();
                     assert!((sums[i * len + d] - given[i * len + d] + 0.5 * sum).abs() < 1e-4);
+                }
+            }
+            let mut lower = coefficients.clone();
+            for (at, coefficient) in lower.iter_mut().enumerate() {
+                if at % terms > at / terms {
+                    *coefficient = 0.0;
+                }
+            }
+            for (coefficients, is_lower) in [(&coefficients, false), (&lower, true)] {
+                let mut expected = vec![0.0; count * len];
+                add_combinations(&mut expected, 1.0, coefficients, &vectors, len);
+                let mut found = given.clone();
+                if is_lower {
+                    become_triangular(pulp::Scalar, &mut found, coefficients, &vectors, len);
+                } else {
+                    become_combinations(pulp::Scalar, &mut found, coefficients, &vectors, len);
+                }
+                for (expected, found) in expected.iter().zip(&found) {
+                    assert!((expected - found).abs() < 1e-4);
                 }
             }
             let (a, b) = (numbers(len, 4), numbers(len, 5));

@@ -24,8 +24,11 @@ const GROUP: usize = 32;
 pub(super) struct Solitary {
     /// The samples; for each entry of the bag its mean, then its basis vectors; what the discriminant asks for.
     vectors: Vec<f32>,
-    /// Where the first of them begins.
+    /// Where the first of them begins, and how many values they have.
     first: usize,
+    len: usize,
+    /// The looks of an entry.
+    looks: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
     samples: usize,
     inverse: Vec<f32>,
@@ -53,8 +56,8 @@ impl WithSimd for SetState<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.solitary.set_all(self.state, self.asked);
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.solitary.set_all(simd, self.state, self.asked);
     }
 }
 
@@ -92,27 +95,32 @@ impl Solitary {
     }
 
     #[inline(always)]
-    fn set_all(&mut self, state: &State, asked: [&[f32]; 2]) {
+    fn set_all<S: Simd>(&mut self, simd: S, state: &State, asked: [&[f32]; 2]) {
         let background = &state.background;
         let len = state.params.feature_len();
-        let entry = 1 + state.params.basis_dim as usize;
-        let most = background.metric().count() + state.bag.entries().len() * entry + asked.len();
-        self.first = kernel::align(&mut self.vectors, most * len);
-        background.append_samples(&mut self.vectors);
         self.samples = background.metric().count();
         self.inverse.clear();
         self.inverse
             .extend_from_slice(background.metric().inverse());
         self.entries.clear();
+        let entries = state.bag.entries();
+        self.entries
+            .extend(entries.iter().map(|entry| entry.combination().0.size()));
+        self.len = (self.samples + self.templates() + asked.len()) * len;
+        self.first = kernel::hold_aligned(&mut self.vectors, self.len);
+        let vectors = &mut self.vectors[self.first..][..self.len];
+        let (samples, mut rest) = vectors.split_at_mut(self.samples * len);
+        background.write_samples(samples);
         self.shadows.clear();
-        for entry in state.bag.entries() {
+        for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
             let (combination, looks) = entry.combination();
-            combination.append_to(looks, background, len, &mut self.vectors);
+            let (vectors, others) = rest.split_at_mut((1 + dim) * len);
+            combination.write_to(simd, looks, background, &mut self.looks, vectors);
             self.shadows.extend_from_slice(combination.shadows());
-            self.entries.push(combination.size());
+            rest = others;
         }
-        for vector in asked {
-            self.vectors.extend_from_slice(vector);
+        for (vector, asked) in rest.chunks_exact_mut(len).zip(asked) {
+            vector[..asked.len()].copy_from_slice(asked);
         }
     }
 
@@ -151,16 +159,15 @@ impl Solitary {
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, candidates: &[f32], len: usize, stride: usize) {
         let (samples, templates) = (self.samples, self.templates());
-        let vectors = &self.vectors[self.first..];
+        let vectors = &self.vectors[self.first..][..self.len];
+        // What is in the places between the products is of no account.
         let products = &mut self.products;
-        products.clear();
-        products.resize(vectors.len() / len * stride, 0.0);
+        products.resize(self.len / len * stride, 0.0);
         kernel::multiply(simd, vectors, candidates, len, stride, products);
-        let (of_samples, rest) = self.products.split_at_mut(samples * stride);
-        self.candidate_shadows.clear();
-        self.candidate_shadows.resize(samples * stride, 0.0);
+        let (of_samples, rest) = products.split_at_mut(samples * stride);
         let shadows = &mut self.candidate_shadows;
-        matrix::combine(simd, shadows, 1.0, &self.inverse, of_samples, stride);
+        shadows.resize(samples * stride, 0.0);
+        matrix::become_triangular(simd, shadows, &self.inverse, of_samples, stride);
         let of_templates = &mut rest[..templates * stride];
         matrix::combine(simd, of_templates, -1.0, &self.shadows, shadows, stride);
     }

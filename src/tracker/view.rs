@@ -46,7 +46,7 @@ impl View {
         }
     }
 
-    /// Appends the feature vectors, of length D, of `particles` to `out`.
+    /// Makes `out` the feature vectors, of length D, of `particles`.
     pub fn features(
         &mut self,
         frame: &GrayFrame,
@@ -55,15 +55,25 @@ impl View {
         params: &Params,
         out: &mut Vec<f32>,
     ) {
-        let len = params.feature_len();
-        let before = out.len();
-        out.resize(before + particles.len() * len, 0.0);
+        out.resize(particles.len() * params.feature_len(), 0.0);
+        self.describe(frame, particles, reach, params, out);
+    }
+
+    /// Writes the feature vectors, of length D, of `particles` to `out`, which is as long as they are.
+    pub fn describe(
+        &mut self,
+        frame: &GrayFrame,
+        particles: &[Particle],
+        reach: &Reach,
+        params: &Params,
+        out: &mut [f32],
+    ) {
         match params.features {
             Features::Gray => {
                 let mut exact = std::mem::take(&mut self.exact);
-                exact.resize(particles.len() * len, 0.0);
+                exact.resize(particles.len() * params.feature_len(), 0.0);
                 self.cut(frame, particles, reach, params, &mut exact);
-                for (value, exact) in out[before..].iter_mut().zip(&exact) {
+                for (value, exact) in out.iter_mut().zip(&exact) {
                     *value = *exact as f32;
                 }
                 self.exact = exact;
@@ -72,8 +82,7 @@ impl View {
                 let areas = particles
                     .iter()
                     .map(|particle| seen(particle, reach, params));
-                self.cells
-                    .describe(&self.gradients, areas, params, &mut out[before..]);
+                self.cells.describe(&self.gradients, areas, params, out);
             }
         }
     }
