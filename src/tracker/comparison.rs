@@ -8,11 +8,11 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::bag::Bag;
 use super::camera::Camera;
 use super::discriminant::Discriminant;
 use super::examples::Examples;
 use super::motion::Particle;
+use super::posterior::Posterior;
 use super::score::Evidence;
 use super::search::Sought;
 use super::solitary::Solitary;
@@ -85,7 +85,7 @@ pub(super) struct Comparison {
     evaluation: Option<(Params, Evaluation)>,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
-    likelihoods: Vec<f64>,
+    posterior: Posterior,
     /// The weights of all particles; they sum to 1.
     pub weights: Vec<f64>,
     /// For what is learned from a frame.
@@ -120,7 +120,7 @@ impl Comparison {
         empty(&mut self.particles, most);
         empty(&mut self.squares, most);
         empty(&mut self.distances, most * entries);
-        empty(&mut self.likelihoods, most * entries);
+        self.posterior.begin(most, entries);
         empty(&mut self.weights, most);
         let mean = offset(state);
         self.examples.begin(&state.discriminant, mean, most);
@@ -263,28 +263,22 @@ impl Comparison {
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11), the prior of the place, the
     /// discriminant's score. Returns the most likely one (equation 12).
-    pub fn weigh(&mut self, sought: &Sought<'_>, bag: &Bag, discriminant: &Discriminant) -> usize {
+    pub fn weigh(&mut self, sought: &Sought<'_>, discriminant: &Discriminant) -> usize {
         let params = sought.params;
-        let entries = bag.entries().len();
-        likelihood::normalized(
-            &self.distances,
-            entries,
-            params.sigma,
-            &mut self.likelihoods,
-        );
-        let pinned = (params.pinned as usize, params.pinned_weight);
-        likelihood::sum_rule(&self.likelihoods, entries, pinned, &mut self.weights);
-        for (weight, particle) in self.weights.iter_mut().zip(&self.particles) {
-            *weight *= sought.prior(particle);
-        }
+        let priors = self.particles.iter().map(|particle| sought.prior(particle));
+        self.weights.clear();
+        self.weights.extend(priors);
         if discriminant.is_on() {
             let factor = params.discriminant_weight;
             let scores = self.examples.scores();
             let most = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             for (weight, score) in self.weights.iter_mut().zip(scores) {
-                *weight *= (factor * f64::from(score - most)).exp();
+                *weight += factor * f64::from(score - most);
             }
         }
+        let pinned = (params.pinned as usize, params.pinned_weight);
+        self.posterior
+            .weigh(&self.distances, params.sigma, pinned, &mut self.weights);
         let total: f64 = self.weights.iter().sum();
         if total > 0.0 {
             self.weights.iter_mut().for_each(|weight| *weight /= total);

@@ -114,7 +114,7 @@ impl State {
     fn survey(&mut self, frame: &GrayFrame, number: u64, room: &mut Comparison) {
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
         room.view
-            .open(frame, &self.answer, everywhere, &self.reach, &self.params);
+            .open(frame, &[self.answer], everywhere, &self.reach, &self.params);
         let mut draws = motion::generator(self.params.seed, number, Draws::Examples);
         let count = self.params.background_samples as usize;
         self.sample_background(frame, count, &mut draws, room);

@@ -55,6 +55,7 @@ mod eigen;
 mod energies;
 mod evaluation;
 mod examples;
+mod exponential;
 mod frame;
 mod gradients;
 mod kernel;
@@ -66,6 +67,7 @@ mod metric;
 mod motion;
 mod params;
 mod patch;
+mod posterior;
 mod presets;
 mod products;
 mod pyramid;
@@ -209,16 +211,17 @@ impl Tracker {
         }
 
         // (B) What is seen there, and (D) how that compares with what is known.
-        let furthest = sought.furthest() + state.learning_radius(number);
+        let furthest = sought.refined_reach() + state.learning_radius(number);
+        let particles = &room.particles;
         room.view
-            .open(frame, &state.answer, furthest, &state.reach, &state.params);
+            .open(frame, particles, furthest, &state.reach, &state.params);
         room.extend(frame, 0, state);
-        let mut best = room.weigh(&sought, &state.bag, &state.discriminant);
+        let mut best = room.weigh(&sought, &state.discriminant);
         let first = room.particles.len();
         if first < sought.counts().0 {
             sought.refine(&room.weights, &mut draws, &mut room.particles);
             room.extend(frame, first, state);
-            best = room.weigh(&sought, &state.bag, &state.discriminant);
+            best = room.weigh(&sought, &state.discriminant);
         }
         let evidence = room.evidence(best, &state.trust);
         let lost = state.is_out_of_sight(&evidence);

@@ -50,11 +50,9 @@ impl Sought<'_> {
         self.shift.0.abs().max(self.shift.1.abs()) > NOTABLE_SHIFT
     }
 
-    /// How far from the last answer a particle may come to be, in working pixels, but for one draw in a thousand.
-    pub fn furthest(&self) -> f64 {
-        let draws = self.widening * self.params.motion_std_x.max(self.params.motion_std_y);
-        let shift = self.shift.0.abs().max(self.shift.1.abs());
-        3.3 * (draws + self.params.refined_std) + shift
+    /// How far from the first particles the others may come to be, in working pixels, but for one draw in a thousand.
+    pub fn refined_reach(&self) -> f64 {
+        3.3 * self.params.refined_std
     }
 
     /// How many particles are drawn in all, and how many of these first. Where the target is out of sight there are more.
@@ -131,10 +129,10 @@ impl Sought<'_> {
         }
     }
 
-    /// The prior of a particle, 1 at the last answer and where it was carried to.
+    /// The logarithm of the prior of a particle, 0 at the last answer and where it was carried to.
     pub fn prior(&self, particle: &Particle) -> f64 {
         if self.params.search == Search::Resampled {
-            return 1.0;
+            return 0.0;
         }
         let squared =
             |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
@@ -153,7 +151,7 @@ impl Sought<'_> {
             exponent +=
                 particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
         }
-        (-0.5 * exponent).exp()
+        -0.5 * exponent
     }
 }
 
@@ -269,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_prior_of_any_width_is_1_at_the_last_answer_and_falls() {
+    fn a_prior_of_any_width_is_greatest_at_the_last_answer_and_falls() {
         let reach = Reach {
             frame_width: 100.0,
             frame_height: 80.0,
@@ -295,14 +293,14 @@ mod tests {
                 params: &params,
                 reach: &reach,
             };
-            assert_eq!(sought.prior(&last), 1.0, "{std}");
+            assert_eq!(sought.prior(&last), 0.0, "{std}");
             let beside = Particle {
                 x: 53.0,
                 scale: 1.01,
                 ..last
             };
             let prior = sought.prior(&beside);
-            let falls = if std > 0.0 { prior < 1.0 } else { prior == 1.0 };
+            let falls = if std > 0.0 { prior < 0.0 } else { prior == 0.0 };
             assert!(falls, "{std}: {prior}");
         }
     }

@@ -8,8 +8,8 @@ use super::motion::{Particle, Reach};
 use super::patch::PatchCutter;
 use super::{Features, GrayFrame, Params, Rect, pyramid};
 
-/// How much larger than the last answer the areas of a frame may be: scales change by a few hundredths a frame.
-const LARGER: f64 = 1.15;
+/// How much larger than the largest particle the areas of a frame may be: scales change by a few hundredths a frame.
+const LARGER: f64 = 1.08;
 
 /// Cuts feature vectors out of one frame.
 #[derive(Debug, Default)]
@@ -21,27 +21,41 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Gets ready for areas around `center`, up to `furthest` working pixels from its centre and [`LARGER`] than it.
+    /// Gets ready for the areas of `particles`, of which there is one, and for others up to `furthest` working pixels from
+    /// one of these and [`LARGER`] than the largest.
     pub fn open(
         &mut self,
         frame: &GrayFrame,
-        center: &Particle,
+        particles: &[Particle],
         furthest: f64,
         reach: &Reach,
         params: &Params,
     ) {
         if params.features == Features::Gradients {
-            let area = seen(center, reach, params);
-            let (x, y) = area.center();
+            let mut largest = particles[0];
+            let (mut left, mut right) = (largest.x, largest.x);
+            let (mut top, mut bottom) = (largest.y, largest.y);
+            for particle in particles {
+                (left, right) = (left.min(particle.x), right.max(particle.x));
+                (top, bottom) = (top.min(particle.y), bottom.max(particle.y));
+                largest.scale = largest.scale.max(particle.scale);
+            }
+            let area = seen(&largest, reach, params);
             // A pyramid is of the box alone, without its context.
             let larger = LARGER.max(pyramid::largest() / params.context);
-            let width = larger * area.width + 2.0 * furthest;
-            let height = larger * area.height + 2.0 * furthest;
+            let (width, height) = (larger * area.width, larger * area.height);
+            let window = Rect::new(
+                left - furthest - width / 2.0,
+                top - furthest - height / 2.0,
+                right - left + 2.0 * furthest + width,
+                bottom - top + 2.0 * furthest + height,
+            );
+            // One size of cells for all: the first particle is the last answer.
+            let area = seen(&particles[0], reach, params);
             let cell = (
                 area.width / f64::from(params.patch_width),
                 area.height / f64::from(params.patch_height),
             );
-            let window = Rect::centered(x, y, width, height);
             self.gradients.compute(frame, &window, cell);
         }
     }
