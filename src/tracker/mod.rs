@@ -48,6 +48,7 @@ mod candidate;
 mod cells;
 mod combination;
 mod comparison;
+mod directions;
 mod discriminant;
 mod distance;
 mod downscale;
