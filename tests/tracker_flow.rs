@@ -196,7 +196,7 @@ fn every_parameter_out_of_range_is_named() {
 #[test]
 fn every_parameter_of_a_mend_out_of_range_is_named() {
     type Change = fn(&mut Params);
-    let cases: [(&str, Change); 23] = [
+    let cases: [(&str, Change); 25] = [
         ("background_samples", |p| p.background_samples = 257),
         ("background_every", |p| p.background_every = 0),
         ("background_ridge", |p| p.background_ridge = 0.0),
@@ -209,6 +209,8 @@ fn every_parameter_of_a_mend_out_of_range_is_named() {
         ("displacement_std", |p| p.displacement_std = -1.0),
         ("scale_change_std", |p| p.scale_change_std = 11.0),
         ("scale_rate", |p| p.scale_rate = 1.1),
+        ("scan_peaks", |p| p.scan_peaks = 17),
+        ("scan_reach", |p| p.scan_reach = 4.1),
         ("averaging_radius", |p| p.averaging_radius = f64::NAN),
         ("pinned", |p| p.pinned = 17),
         ("pinned", |p| p.pinned = p.bag_size),

@@ -63,6 +63,8 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         displacement_std: 1000.0 * share(),
         scale_change_std: 10.0 * share(),
         scale_rate: if on(3) { share() } else { 0.0 },
+        scan_peaks: seed as u32 % 17,
+        scan_reach: 4.0 * share(),
         averaging_radius: 100.0 * share(),
         pinned_weight: 100.0 * share(),
         trusted_ratio: 100.0 * (seed % 3) as f64 / 2.0,

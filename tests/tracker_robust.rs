@@ -3,7 +3,7 @@
 mod tracker_scene;
 
 use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
-use tracker_scene::{frame, panned, receding, robust, target};
+use tracker_scene::{frame, leaping, panned, receding, robust, target};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
 fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
@@ -46,6 +46,33 @@ fn a_target_that_shrinks_while_its_background_grows_keeps_its_box() {
             assert!(overlap > 0.75, "seed {seed}, frame {t}: {overlap:.3}");
         }
     }
+}
+
+#[test]
+fn a_target_that_leaps_by_its_own_length_is_held() {
+    for seed in 0..3 {
+        let overlap = mean_overlap(leaping, 60, seed);
+        println!("seed {seed}: overlap {overlap:.3}");
+        assert!(overlap >= 0.7, "seed {seed}: {overlap}");
+    }
+}
+
+#[test]
+fn without_a_look_at_every_place_the_leaps_lose_the_target() {
+    // So that the scene above tests what it says.
+    let params = bagtrack::tracker::Params {
+        scan_peaks: 0,
+        ..robust(0)
+    };
+    let (first, given) = leaping(0);
+    let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");
+    let held = (1..=60).filter(|&t| {
+        let (frame, truth) = leaping(t);
+        let answer = tracker.step(&frame).expect("frames of one size");
+        answer.target.overlap(&truth) > 0.5
+    });
+    let held = held.count();
+    assert!(held < 45, "{held}");
 }
 
 #[test]

@@ -39,6 +39,8 @@ const ROWS: &[Row] = &[
     ),
     ("no prior on the scale", &[("scale_std", "0")]),
     ("no filter for the scale", &[("scale_rate", "0")]),
+    ("no look at every place", &[("scan_peaks", "0")]),
+    ("a pinned subspace as any other", &[("pinned_weight", "1")]),
     ("never out of sight", &[("lost_below", "0")]),
     ("no camera shift", &[("camera_shift", "false")]),
     ("arg max, not averaged", &[("averaging_radius", "0")]),

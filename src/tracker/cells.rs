@@ -15,7 +15,7 @@ const GREATEST: f32 = 0.4;
 /// Gradients of flat cells are noise: this much, in gray levels a pixel, is added to what they are divided by.
 const FLAT: f32 = 2.0;
 /// The least standard deviation of gray values, in gray levels, that theirs are divided by.
-const LEAST_CONTRAST: f32 = 4.0;
+pub(super) const LEAST_CONTRAST: f32 = 4.0;
 
 /// The share of each channel in a cell's energy.
 const ENERGY_SHARES: Lanes = {
@@ -101,6 +101,18 @@ impl Cells {
             gray_weight: params.gray_weight as f32,
             out,
         });
+    }
+
+    /// The gray values of the cells of the last area, summed over their pixels.
+    pub fn grays(&self) -> impl Iterator<Item = f32> {
+        self.cells.iter().map(|cell| cell.0[GRAY])
+    }
+
+    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
+    pub fn reserve(&mut self, columns: usize, rows: usize) {
+        if self.cells.capacity() < columns * rows {
+            self.prepare(columns, rows);
+        }
     }
 
     /// Makes room for so many columns and rows of cells.

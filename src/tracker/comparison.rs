@@ -13,6 +13,7 @@ use super::discriminant::Discriminant;
 use super::examples::Examples;
 use super::motion::Particle;
 use super::posterior::Posterior;
+use super::scan::Scan;
 use super::score::Evidence;
 use super::search::Sought;
 use super::solitary::Solitary;
@@ -92,6 +93,8 @@ pub(super) struct Comparison {
     pub learning: learning::Room,
     /// For the profiles of a frame.
     pub camera: Camera,
+    /// For the places that are looked at before particles are drawn.
+    pub scan: Scan,
 }
 
 thread_local! {

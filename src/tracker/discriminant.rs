@@ -70,6 +70,12 @@ impl Discriminant {
         &self.origin
     }
 
+    /// Takes other weights.
+    #[cfg(test)]
+    pub fn set_weights(&mut self, weights: &[f32]) {
+        self.weights.copy_from_slice(weights);
+    }
+
     /// Learns from the first frame.
     pub fn begin(
         &mut self,

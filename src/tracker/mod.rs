@@ -75,6 +75,7 @@ mod pyramid;
 mod ranges;
 mod rect;
 mod scale;
+mod scan;
 mod score;
 mod search;
 mod snapshot;
@@ -85,6 +86,7 @@ mod sums;
 mod trust;
 mod view;
 mod whitening;
+mod windows;
 
 pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE, working_size};
@@ -204,18 +206,24 @@ impl Tracker {
 
         // (A) Where it may be.
         room.begin(state, sought.most());
-        match state.params.search {
+        let furthest = sought.furthest() + state.learning_radius(number);
+        let furthest = furthest.max(sought.scanned());
+        let (reach, params) = (&state.reach, &state.params);
+        match params.search {
             Search::Resampled => {
                 motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
+                let particles = &room.particles;
+                room.view.open(frame, particles, furthest, reach, params);
             }
-            Search::Answer => sought.propose(&mut draws, &mut room.particles),
+            Search::Answer => {
+                let answer = [state.answer];
+                room.view.open(frame, &answer, furthest, reach, params);
+                room.scan.look(&mut room.view, &sought, &state.discriminant);
+                sought.propose(room.scan.peaks(), &mut draws, &mut room.particles);
+            }
         }
 
         // (B) What is seen there, and (D) how that compares with what is known.
-        let furthest = sought.refined_reach() + state.learning_radius(number);
-        let particles = &room.particles;
-        room.view
-            .open(frame, particles, furthest, &state.reach, &state.params);
         room.extend(frame, 0, state);
         let mut best = room.weigh(&sought, &state.discriminant);
         let first = room.particles.len();

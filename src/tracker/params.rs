@@ -104,6 +104,12 @@ pub struct Params {
     /// few hundredths larger or smaller look nearly alike, and a box then grows or shrinks with what is behind the
     /// target. Off: 0.
     pub scale_rate: f64,
+    /// Around how many of the places where the discriminant sees most some of the first particles are drawn, 0 to 16: it
+    /// looks at every place, a cell apart, for there are gaps between particles. With gradients only. Off: 0.
+    pub scan_peaks: u32,
+    /// How far around the last answer it looks at every place, as a multiple of the box's longer side, 0 to 4; at least
+    /// as far as particles come, at most 24 cells.
+    pub scan_reach: f64,
     /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
     /// moves a target further than targets move. Off: false.
     pub camera_shift: bool,

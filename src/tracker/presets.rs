@@ -56,6 +56,8 @@ const PAPER: Params = Params {
     scale_change_std: 0.0,
     scale_std: 0.0,
     scale_rate: 0.0,
+    scan_peaks: 0,
+    scan_reach: 0.0,
     camera_shift: false,
     averaging_radius: 0.0,
     pinned: 0,
@@ -97,10 +99,13 @@ const ROBUST: Params = Params {
     scale_std: 0.5,
     // A look of forty frames ago still counts a third.
     scale_rate: 0.025,
+    scan_peaks: 6,
+    // A target that moves by all of its own length is still seen.
+    scan_reach: 1.0,
     camera_shift: true,
     averaging_radius: 3.0,
     pinned: 1,
-    pinned_weight: 3.0,
+    pinned_weight: 6.0,
     trusted_ratio: 1.5,
     discriminant_weight: 12.0,
     discriminant_damping: 0.3,

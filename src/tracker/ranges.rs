@@ -67,6 +67,7 @@ impl Params {
             "from 1 to 1000",
         )?;
         count("refined_modes", self.refined_modes, 1..=50, "from 1 to 50")?;
+        count("scan_peaks", self.scan_peaks, 0..=16, "from 0 to 16")?;
         count("pinned", self.pinned, 0..=16, "from 0 to 16")?;
         real("alpha", self.alpha, 0.0..=1.0, "from 0 to 1")?;
         real("sigma", self.sigma, 0.0001..=100.0, "from 0.0001 to 100")?;
@@ -127,6 +128,7 @@ impl Params {
             "from 0 to 10",
         )?;
         real("scale_std", self.scale_std, 0.0..=10.0, "from 0 to 10")?;
+        real("scan_reach", self.scan_reach, 0.0..=4.0, "from 0 to 4")?;
         real("scale_rate", self.scale_rate, 0.0..=1.0, "from 0 to 1")?;
         real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(

@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::motion::{Particle, Reach};
+use super::view::View;
 use super::{Params, Search};
 
 /// A shift below this, in working pixels, is within what a search covers anyway.
@@ -16,6 +17,8 @@ const NOTABLE_SHIFT: f64 = 2.0;
 
 /// A wider search has as many times the first particles, up to this: a target is seen from a third of its box away.
 const DENSEST: f64 = 4.0;
+/// Particles that are drawn around each peak: one of several is within a quarter of a cell.
+const AROUND_PEAK: usize = 6;
 /// The greatest number of modes.
 const MOST_MODES: usize = 50;
 
@@ -50,9 +53,11 @@ impl Sought<'_> {
         self.shift.0.abs().max(self.shift.1.abs()) > NOTABLE_SHIFT
     }
 
-    /// How far from the first particles the others may come to be, in working pixels, but for one draw in a thousand.
-    pub fn refined_reach(&self) -> f64 {
-        3.3 * self.params.refined_std
+    /// How far from the last answer a particle may come to be, in working pixels, but for one draw in a thousand.
+    pub fn furthest(&self) -> f64 {
+        let draws = self.widening * self.params.motion_std_x.max(self.params.motion_std_y);
+        let shift = self.shift.0.abs().max(self.shift.1.abs());
+        3.3 * (draws + self.params.refined_std) + shift
     }
 
     /// How many particles are drawn in all, and how many of these first. Where the target is out of sight there are more.
@@ -78,8 +83,17 @@ impl Sought<'_> {
         wide.min(self.params.most_particles())
     }
 
-    /// Draws the first particles around the last answer into `out`.
-    pub fn propose(&self, generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
+    /// How far from the last answer every place is looked at, in working pixels; 0 where that is not done.
+    pub fn scanned(&self) -> f64 {
+        if self.params.scan_peaks == 0 {
+            return 0.0;
+        }
+        let longer = self.reach.box_width.max(self.reach.box_height) * self.last.scale;
+        self.furthest().max(self.params.scan_reach * longer)
+    }
+
+    /// Draws the first particles around the last answer, and around `peaks`, into `out`.
+    pub fn propose(&self, peaks: &[Particle], generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
         let carried = self.carried();
         out.clear();
         out.push(self.reach.hold(self.last));
@@ -88,6 +102,7 @@ impl Sought<'_> {
             out.push(self.reach.hold(carried));
         }
         let count = self.counts().1.max(out.len());
+        self.propose_around(peaks, count / 2, generator, out);
         while out.len() < count {
             let moved = self.has_shift() && out.len().is_multiple_of(2);
             let from = if moved { carried } else { self.last };
@@ -99,6 +114,27 @@ impl Sought<'_> {
                     * (self.widening * params.motion_std_scale * normal(generator)).exp(),
             };
             out.push(self.reach.hold(drawn));
+        }
+    }
+
+    /// Draws particles around `peaks`, which are a cell apart, until there are `most`.
+    fn propose_around(
+        &self,
+        peaks: &[Particle],
+        most: usize,
+        generator: &mut ChaCha8Rng,
+        out: &mut Vec<Particle>,
+    ) {
+        for peak in peaks {
+            let (width, height) = View::cell(peak, self.reach, self.params);
+            for _ in 0..AROUND_PEAK.min(most.saturating_sub(out.len())) {
+                let scale_std = self.params.motion_std_scale;
+                out.push(self.reach.hold(Particle {
+                    x: peak.x + 0.5 * width * normal(generator),
+                    y: peak.y + 0.5 * height * normal(generator),
+                    scale: peak.scale * (scale_std * normal(generator)).exp(),
+                }));
+            }
         }
     }
 
@@ -129,20 +165,25 @@ impl Sought<'_> {
         }
     }
 
+    /// The logarithm of the prior of how far a particle is from the last answer, or from where it was carried to.
+    pub fn log_displacement(&self, particle: &Particle) -> f64 {
+        if self.params.displacement_std <= 0.0 {
+            return 0.0;
+        }
+        let squared =
+            |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
+        let nearest = squared(&self.last).min(squared(&self.carried()));
+        // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
+        let variance = (self.widening * self.params.displacement_std).powi(2);
+        -0.5 * nearest / variance.max(f64::MIN_POSITIVE)
+    }
+
     /// The logarithm of the prior of a particle, 0 at the last answer and where it was carried to.
     pub fn prior(&self, particle: &Particle) -> f64 {
         if self.params.search == Search::Resampled {
             return 0.0;
         }
-        let squared =
-            |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
-        let mut exponent = 0.0;
-        if self.params.displacement_std > 0.0 {
-            let nearest = squared(&self.last).min(squared(&self.carried()));
-            // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
-            let variance = (self.widening * self.params.displacement_std).powi(2);
-            exponent += nearest / variance.max(f64::MIN_POSITIVE);
-        }
+        let mut exponent = -2.0 * self.log_displacement(particle);
         if self.params.scale_change_std > 0.0 {
             let change = (particle.scale / self.last.scale).ln();
             exponent += (change / self.widening / self.params.scale_change_std).powi(2);

@@ -2,11 +2,11 @@
 //!
 //! A view is open on one frame, around one place: what lies further off is not there.
 
-use super::cells::Cells;
-use super::gradients::GradientSums;
+use super::cells::{CHANNELS, Cells};
+use super::gradients::{DIRECTIONS, GradientSums};
 use super::motion::{Particle, Reach};
 use super::patch::PatchCutter;
-use super::{Features, GrayFrame, Params, Rect, pyramid};
+use super::{Features, GrayFrame, Params, Rect, comparison, pyramid};
 
 /// How much larger than the largest particle the areas of a frame may be: scales change by a few hundredths a frame.
 const LARGER: f64 = 1.08;
@@ -17,7 +17,19 @@ pub(super) struct View {
     cutter: PatchCutter,
     gradients: GradientSums,
     cells: Cells,
+    /// Those of a grid.
+    grid_cells: Cells,
     exact: Vec<f64>,
+}
+
+/// The cells of a place and its surroundings, row by row.
+#[derive(Debug, Default)]
+pub(super) struct Grid {
+    pub columns: usize,
+    /// The channels of each cell; in place of the gray value 0.
+    pub values: Vec<f32>,
+    /// The gray value of each cell, summed over its pixels.
+    pub grays: Vec<f32>,
 }
 
 impl View {
@@ -98,6 +110,56 @@ impl View {
                     .map(|particle| seen(particle, reach, params));
                 self.cells.describe(&self.gradients, areas, params, out);
             }
+        }
+    }
+
+    /// Width and height of a cell of `particle`, in working pixels.
+    pub fn cell(particle: &Particle, reach: &Reach, params: &Params) -> (f64, f64) {
+        let area = seen(particle, reach, params);
+        (
+            area.width / f64::from(params.patch_width),
+            area.height / f64::from(params.patch_height),
+        )
+    }
+
+    /// Makes `grid` the cells of `center` and as many more as `more` says to the left and to the right, above and below:
+    /// with room for `most` of these.
+    pub fn grid(
+        &mut self,
+        center: &Particle,
+        more: (usize, usize),
+        most: usize,
+        reach: &Reach,
+        params: &Params,
+        grid: &mut Grid,
+    ) {
+        let sides = |more: (usize, usize)| {
+            let width = params.patch_width + 2 * more.0 as u32;
+            (width, params.patch_height + 2 * more.1 as u32)
+        };
+        let (columns, rows) = sides(more);
+        let (most_columns, most_rows) = sides((most, most));
+        let (x, y) = reach.area(center).center();
+        let (width, height) = Self::cell(center, reach, params);
+        let area = Rect::centered(x, y, width * f64::from(columns), height * f64::from(rows));
+        let most = (most_columns * most_rows) as usize;
+        comparison::empty(&mut grid.values, most * CHANNELS);
+        comparison::empty(&mut grid.grays, most);
+        grid.columns = columns as usize;
+        grid.values
+            .resize((columns * rows) as usize * CHANNELS, 0.0);
+        let params = Params {
+            patch_width: columns,
+            patch_height: rows,
+            ..params.clone()
+        };
+        let cells = &mut self.grid_cells;
+        cells.reserve(most_columns as usize, most_rows as usize);
+        let areas = std::iter::once(area);
+        cells.describe(&self.gradients, areas, &params, &mut grid.values);
+        grid.grays.extend(cells.grays());
+        for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
+            cell[DIRECTIONS] = 0.0;
         }
     }
 

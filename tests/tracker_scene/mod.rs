@@ -67,6 +67,30 @@ pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
     (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
 }
 
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: over hills that stay it leaps to and fro, every fifth frame.
+pub fn leaping(t: usize) -> (GrayFrame, Rect) {
+    let (hills, _) = panned(0, (0, 0));
+    let [(left, top), (next_left, next_top)] = [(88, 68), (122, 46)];
+    let (left, top) = if t / 5 % 2 == 0 {
+        (left, top)
+    } else {
+        (next_left, next_top)
+    };
+    let mut luma = hills.pixels().to_vec();
+    // Hills where that picture has its target.
+    for y in 18..38 {
+        let (row, below) = (y * 200, (y + 20) * 200);
+        luma.copy_within(below + 20..below + 44, row + 20);
+    }
+    for y in 0..20 {
+        for x in 0..24 {
+            luma[(top + y) * 200 + left + x] = 70 + texture(x, y, 5) / 4;
+        }
+    }
+    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
+}
+
 /// Frame `t`, 200 x 160 pixels, with two unlike targets and their boxes: the first moves as ever, the second stands
 /// below it and swings a little.
 pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
@@ -158,6 +182,7 @@ const MENDS_OFF: [(&str, Change); 13] = [
     ("no refinement", |p| p.refined_share = 0.0),
     ("arg max", |p| p.averaging_radius = 0.0),
     ("no filter of the scale", |p| p.scale_rate = 0.0),
+    ("no look at every place", |p| p.scan_peaks = 0),
     ("nothing pinned", |p| p.pinned = 0),
     ("all trusted", |p| p.trusted_ratio = 0.0),
     ("any length", |p| p.unit_length = false),

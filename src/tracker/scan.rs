@@ -1,0 +1,164 @@
+//! (A) Where the discriminant sees the target among all places around the last answer.
+//!
+//! Particles are few, and what is between them is not seen: the further a target may have moved, the wider the gaps.
+//! Areas of one size that are whole cells apart have their cells in common, though. So one grid of cells over the
+//! surroundings serves all of them, and the discriminant's scores are a correlation of its weights with the grid.
+//! Some of the first particles are then drawn around the best places; they are weighed as all particles are.
+//!
+//! A score here is not quite that of a particle at the same place: a cell at the edge of an area is normalised with
+//! the cells beyond the edge as well.
+
+use super::discriminant::Discriminant;
+use super::motion::Particle;
+use super::search::Sought;
+use super::view::{Grid, View};
+use super::windows::Windows;
+use super::{Features, Params, comparison};
+
+/// Places in each direction at most: a look further than that costs more than the rest of a step.
+pub(super) const MOST_AWAY: usize = 24;
+/// Values that are multiplied at most: as many as [`MOST_AWAY`] takes with 8 x 8 cells. More cells, fewer places.
+const MOST_PRODUCTS: usize = 1_600_000;
+
+/// The scores of a frame, and room for them.
+#[derive(Debug, Default)]
+pub(super) struct Scan {
+    grid: Grid,
+    windows: Windows,
+    /// How likely each place is, row by row: the logarithm of what its particle's weight is multiplied with.
+    values: Vec<f32>,
+    peaks: Vec<Particle>,
+}
+
+impl Scan {
+    /// The best places, best first.
+    pub fn peaks(&self) -> &[Particle] {
+        &self.peaks
+    }
+
+    /// Looks at all places around the one that is sought, in what `view` is open on.
+    pub fn look(&mut self, view: &mut View, sought: &Sought<'_>, discriminant: &Discriminant) {
+        let params = sought.params;
+        self.peaks.clear();
+        if params.scan_peaks == 0 || !discriminant.is_on() || params.features != Features::Gradients
+        {
+            return;
+        }
+        let center = sought.carried();
+        let (cell_width, cell_height) = View::cell(&center, sought.reach, params);
+        let (across, down) = places(sought.scanned(), (cell_width, cell_height), params);
+        view.grid(
+            &center,
+            (across, down),
+            MOST_AWAY,
+            sought.reach,
+            params,
+            &mut self.grid,
+        );
+        let (columns, rows) = (2 * across + 1, 2 * down + 1);
+        comparison::empty(&mut self.values, (2 * MOST_AWAY + 1).pow(2));
+        self.values.resize(columns * rows, 0.0);
+        let cell_pixels = (cell_width * cell_height) as f32;
+        let values = &mut self.values;
+        self.windows
+            .scores(&self.grid, discriminant, params, cell_pixels, values);
+        let place = |index: usize| Particle {
+            x: center.x + ((index % columns) as f64 - across as f64) * cell_width,
+            y: center.y + ((index / columns) as f64 - down as f64) * cell_height,
+            ..center
+        };
+        for (index, value) in self.values.iter_mut().enumerate() {
+            let likely = params.discriminant_weight * f64::from(*value);
+            *value = (likely + sought.log_displacement(&place(index))) as f32;
+        }
+        for _ in 0..params.scan_peaks {
+            let Some(best) = take_peak(&mut self.values, columns) else {
+                break;
+            };
+            self.peaks.push(place(best));
+        }
+    }
+}
+
+/// How many places to look at to each side, and up and down, to get `away` working pixels far.
+fn places(away: f64, (cell_width, cell_height): (f64, f64), params: &Params) -> (usize, usize) {
+    let [mut across, mut down] =
+        [cell_width, cell_height].map(|cell| ((away / cell).ceil() as usize).min(MOST_AWAY));
+    let len = params.feature_len();
+    while (2 * across + 1) * (2 * down + 1) * len > MOST_PRODUCTS && across.max(down) > 0 {
+        (across, down) = (across.saturating_sub(1), down.saturating_sub(1));
+    }
+    (across, down)
+}
+
+/// The index of the greatest value; it and those beside it count no more.
+fn take_peak(values: &mut [f32], columns: usize) -> Option<usize> {
+    let indices = 0..values.len();
+    let best = indices.reduce(|best, i| if values[i] > values[best] { i } else { best })?;
+    if values[best] == f32::NEG_INFINITY {
+        return None;
+    }
+    let (column, row) = (best % columns, best / columns);
+    let rows = values.chunks_exact_mut(columns);
+    for row in rows.skip(row.saturating_sub(1)).take(3.min(row + 2)) {
+        let last = (column + 1).min(columns - 1);
+        row[column.saturating_sub(1)..=last].fill(f32::NEG_INFINITY);
+    }
+    Some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::motion::Reach;
+    use crate::tracker::{GrayFrame, Preset};
+
+    fn frame() -> GrayFrame {
+        let luma = (0..160 * 120).map(|i| ((i * i / 7 + i / 160 * 13 + i) % 251) as u8);
+        GrayFrame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
+    }
+
+    /// The cells of a grid are those of areas, but for the edges.
+    #[test]
+    fn a_grid_has_the_gray_values_of_its_areas() {
+        let params = Preset::Robust.params();
+        let reach = Reach {
+            frame_width: 160.0,
+            frame_height: 120.0,
+            box_width: 32.0,
+            box_height: 24.0,
+        };
+        let center = Particle {
+            x: 80.0,
+            y: 60.0,
+            scale: 1.0,
+        };
+        let mut view = View::default();
+        view.open(&frame(), &[center], 40.0, &reach, &params);
+        let mut grid = Grid::default();
+        view.grid(&center, (2, 1), MOST_AWAY, &reach, &params, &mut grid);
+        assert_eq!(grid.columns, 12);
+        assert_eq!(grid.grays.len(), 120);
+        let mut alone = Grid::default();
+        view.grid(&center, (0, 0), MOST_AWAY, &reach, &params, &mut alone);
+        for (index, gray) in alone.grays.iter().enumerate() {
+            let on_grid = grid.grays[(1 + index / 8) * 12 + 2 + index % 8];
+            assert!(
+                (gray - on_grid).abs() < 1e-2 * gray.abs().max(1.0),
+                "{gray} {on_grid}"
+            );
+        }
+    }
+
+    #[test]
+    fn peaks_are_taken_best_first_and_not_side_by_side() {
+        let mut values = vec![0.0_f32; 35];
+        for (index, value) in [(8, 5.0), (9, 4.0), (1, 4.5), (20, 3.0), (34, 2.0)] {
+            values[index] = value;
+        }
+        let peaks: Vec<_> = (0..3).map(|_| take_peak(&mut values, 7)).collect();
+        assert_eq!(peaks, [Some(8), Some(20), Some(34)]);
+        values.fill(f32::NEG_INFINITY);
+        assert_eq!(take_peak(&mut values, 7), None);
+    }
+}
