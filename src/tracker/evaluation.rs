@@ -74,21 +74,14 @@ impl Evaluation {
     ///
     /// # Panics
     /// If `index` is N or more.
-    pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
+    pub fn candidate_mut(&mut self, index: usize) -> &mut [f32] {
         assert!(index < self.candidates, "a candidate below N");
         self.products.candidate_mut(index)
     }
 
     /// The feature vectors of all N candidates, one after the other, to be filled in.
-    pub fn candidates_mut(&mut self) -> &mut [f64] {
+    pub fn candidates_mut(&mut self) -> &mut [f32] {
         self.products.candidates_mut()
-    }
-
-    /// The feature vector v of candidate `index` as it is stored in histories, into `out`.
-    pub fn candidate(&self, index: usize, out: &mut Vec<f32>) {
-        out.clear();
-        let values = self.products.candidate(index).iter();
-        out.extend(values.map(|&value| value as f32));
     }
 
     /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every

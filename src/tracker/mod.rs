@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod abreast;
 mod angle;
 mod background;
 mod bag;
@@ -50,6 +51,7 @@ mod combination;
 mod comparison;
 mod discriminant;
 mod distance;
+mod dominant;
 mod downscale;
 mod eigen;
 mod energies;
@@ -66,6 +68,8 @@ mod metric;
 mod motion;
 mod params;
 mod patch;
+#[cfg(target_arch = "x86_64")]
+mod permute;
 mod presets;
 mod products;
 mod pyramid;
@@ -74,6 +78,7 @@ mod rect;
 mod scale;
 mod score;
 mod search;
+mod singular;
 mod snapshot;
 mod solitary;
 mod state;

@@ -17,7 +17,6 @@ pub(super) struct View {
     cutter: PatchCutter,
     gradients: GradientSums,
     cells: Cells,
-    exact: Vec<f64>,
 }
 
 impl View {
@@ -60,13 +59,7 @@ impl View {
         out.resize(before + particles.len() * len, 0.0);
         match params.features {
             Features::Gray => {
-                let mut exact = std::mem::take(&mut self.exact);
-                exact.resize(particles.len() * len, 0.0);
-                self.cut(frame, particles, reach, params, &mut exact);
-                for (value, exact) in out[before..].iter_mut().zip(&exact) {
-                    *value = *exact as f32;
-                }
-                self.exact = exact;
+                self.cut(frame, particles, reach, params, &mut out[before..]);
             }
             Features::Gradients => {
                 let areas = particles
@@ -78,14 +71,14 @@ impl View {
         }
     }
 
-    /// Writes gray features, exact in single precision, to `out`.
+    /// Writes gray features to `out`.
     pub fn cut(
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
         reach: &Reach,
         params: &Params,
-        out: &mut [f64],
+        out: &mut [f32],
     ) {
         let areas = particles
             .iter()
