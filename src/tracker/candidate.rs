@@ -56,7 +56,7 @@ impl CandidateBases {
     #[inline(always)]
     fn fill(&mut self, products: &Products, index: usize) {
         let (size, last) = (self.size, self.size - 1);
-        let eigenvalues = products.history_eigenvalues();
+        let eigenvalues = products.history().eigenvalues();
         let mut trace = [eigenvalues.iter().sum::<f64>(); ABREAST];
         for i in 0..size {
             let z = coordinate(products, index, i);
@@ -152,7 +152,7 @@ impl CandidateBases {
 #[inline(always)]
 fn coordinate(products: &Products, group: usize, i: usize) -> &Doubles {
     let group = products.group(group);
-    if i < products.history_eigenvalues().len() {
+    if i < products.history().eigenvalues().len() {
         group.coordinate(i)
     } else {
         group.rest()

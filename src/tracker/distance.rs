@@ -89,8 +89,8 @@ impl Distances {
 #[inline(always)]
 fn origins(products: &Products, index: usize, k: usize, norm: f64) -> Doubles {
     let group = products.group(index);
-    let share = 1.0 / (products.history_len() as f64 + 1.0);
-    let (shared_norm, shared_mean) = (products.shared_norm(), products.shared_means()[k]);
+    let share = 1.0 / (products.history().count() as f64 + 1.0);
+    let (shared_norm, shared_mean) = (products.history().sum_norm(), products.shared_means()[k]);
     let (square, with_shared) = (group.square(), group.with_shared());
     let with_mean = group.with_mean(k);
     let mut distances = [0.0; ABREAST];
@@ -113,7 +113,7 @@ fn grassmann<const N: usize>(
 ) -> Singles {
     let own = products.group(group);
     let count = products.shared_means().len();
-    let slots = products.history_eigenvalues().len();
+    let slots = products.history().eigenvalues().len();
     let mut columns: Columns<N> = [[[0.0; ABREAST]; N]; N];
     for (i, column) in columns.iter_mut().enumerate() {
         let coefficients = bases.column(group, i);

@@ -59,10 +59,10 @@ struct Cuts<'a, A> {
 
 impl PatchCutter {
     /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each.
-    pub fn cut(
+    pub fn cut<A: Iterator<Item = Rect> + Clone>(
         &mut self,
         image: &GrayFrame,
-        areas: impl Iterator<Item = Rect> + Clone,
+        areas: A,
         params: &Params,
         out: &mut [f32],
     ) {
@@ -77,13 +77,24 @@ impl PatchCutter {
                 out,
             });
         }
-        Arch::new().dispatch(Cuts {
+        Arch::new().dispatch(self.cuts(image, areas, params, out));
+    }
+
+    /// All cuts of a frame for any machine.
+    fn cuts<'a, A>(
+        &'a mut self,
+        image: &'a GrayFrame,
+        areas: A,
+        params: &'a Params,
+        out: &'a mut [f32],
+    ) -> Cuts<'a, A> {
+        Cuts {
             quads: &mut self.quads,
             image,
             areas,
             params,
             out,
-        });
+        }
     }
 }
 
@@ -231,6 +242,8 @@ pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
+    use pulp::Scalar;
+
     use super::*;
     use crate::tracker::Preset;
 
@@ -253,6 +266,52 @@ mod tests {
         (row(top) * (1.0 - lower_share) + row(top + 1.0) * lower_share) / 255.0
     }
 
+    /// Areas within the image, over its edges, beyond it, small and large.
+    fn areas() -> [Rect; 7] {
+        [
+            Rect::new(5.0, 6.0, 7.0, 5.0),
+            Rect::new(5.3, 6.8, 21.7, 3.9),
+            Rect::new(-8.0, -3.5, 20.0, 14.0),
+            Rect::new(36.0, 25.0, 30.0, 30.0),
+            Rect::new(-200.0, 300.0, 10.0, 10.0),
+            Rect::new(-1.5, 3.0, 320.0, 33.0),
+            Rect::new(-400.0, -400.0, 1000.0, 1200.0),
+        ]
+    }
+
+    #[test]
+    fn every_machine_cuts_the_same_values() {
+        for (columns, rows) in [(32, 32), (4, 4), (7, 5), (17, 33), (64, 64)] {
+            let params = Params {
+                patch_width: columns,
+                patch_height: rows,
+                ..Preset::Paper.params()
+            };
+            for (width, height) in [(320, 240), (40, 30), (240, 320), (1, 30), (40, 1), (1, 1)] {
+                let image = image(width, height);
+                let room = vec![0.5_f32; 7 * params.feature_len()];
+                let areas = areas().into_iter();
+                let mut cutter = PatchCutter::default();
+                let mut fastest = room.clone();
+                cutter.cut(&image, areas.clone(), &params, &mut fastest);
+                let mut widest = room.clone();
+                let cuts = cutter.cuts(&image, areas.clone(), &params, &mut widest);
+                Arch::new().dispatch(cuts);
+                assert_eq!(fastest, widest, "{columns} x {rows} of {width} x {height}");
+                let mut plain = room.clone();
+                let cuts = cutter.cuts(&image, areas.clone(), &params, &mut plain);
+                Simd::vectorize(Scalar::new(), cuts);
+                assert_eq!(fastest, plain, "{columns} x {rows} of {width} x {height}");
+                #[cfg(target_arch = "x86_64")]
+                if let Some(simd) = pulp::x86::V3::try_new() {
+                    let mut middle = room;
+                    Simd::vectorize(simd, cutter.cuts(&image, areas, &params, &mut middle));
+                    assert_eq!(fastest, middle, "{columns} x {rows} of {width} x {height}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn every_cell_is_interpolated_at_its_centre() {
         let params = Params {
@@ -260,15 +319,9 @@ mod tests {
             patch_height: 5,
             ..Preset::Paper.params()
         };
-        for (width, height) in [(40, 30), (1, 30), (40, 1), (1, 1)] {
+        for (width, height) in [(320, 40), (40, 30), (1, 30), (40, 1), (1, 1)] {
             let image = image(width, height);
-            for area in [
-                Rect::new(5.0, 6.0, 7.0, 5.0),
-                Rect::new(5.3, 6.8, 21.7, 3.9),
-                Rect::new(-8.0, -3.5, 20.0, 14.0),
-                Rect::new(36.0, 25.0, 30.0, 30.0),
-                Rect::new(-200.0, 300.0, 10.0, 10.0),
-            ] {
+            for area in areas() {
                 let patch = patch(&image, &area, &params);
                 for (i, &value) in patch.iter().enumerate() {
                     let x = area.x + area.width * ((i % 7) as f64 + 0.5) / 7.0;

@@ -5,6 +5,7 @@
 //! values are those of [`patch`](super::patch) to the last bit.
 
 use std::arch::x86_64::{__m512, __m512i};
+use std::ops::Range;
 
 use pulp::{NullaryFnOnce, x86::V4};
 
@@ -17,8 +18,8 @@ const LANES: usize = 16;
 /// Pixels among which one permutation looks up.
 const REACH: usize = 2 * LANES;
 
-/// Most permutations for one look-up; enough for the longest row of pixels.
-const MOST: usize = super::WORKING_SIDE as usize / REACH + 2;
+/// Room after the last pixel: more than the look-ups in the longest row of pixels reach over its end.
+const ROOM: usize = (super::WORKING_SIDE as usize).next_multiple_of(REACH) + 2 * REACH;
 
 /// All cuts of a frame.
 pub(super) struct PermutedCuts<'a, A> {
@@ -32,7 +33,6 @@ pub(super) struct PermutedCuts<'a, A> {
 }
 
 /// Sixteen neighbouring cells of each row.
-#[derive(Clone, Copy)]
 struct Block {
     /// The pixel at or before the first of them.
     first: usize,
@@ -61,32 +61,38 @@ impl<A: Iterator<Item = Rect> + Clone> NullaryFnOnce for PermutedCuts<'_, A> {
         let width = region.width + 1;
         fill(&region, image, pixels);
         let columns = params.patch_width as usize;
-        let mut blocks = [Block {
-            first: 0,
-            at: [0; LANES],
-            shares: [0.0; LANES],
-            pieces: 0,
-        }; MOST_CELLS / LANES];
         for (area, patch) in areas.zip(out.chunks_exact_mut(params.feature_len())) {
             let across = Axis::lay(area.x, area.width, params.patch_width, image.width());
             let down = Axis::lay(area.y, area.height, params.patch_height, image.height());
-            for (index, block) in blocks[..columns.div_ceil(LANES)].iter_mut().enumerate() {
-                *block = Block::of(&across, index, columns, region.left);
-            }
-            let rows = down.first.iter().zip(&down.share);
-            for (target, (&row, &share)) in patch.chunks_exact_mut(columns).zip(rows) {
-                let upper = &pixels[(row - region.top) as usize * width..];
-                let lower = &upper[width..];
-                for (target, block) in target.chunks_mut(LANES).zip(&blocks) {
-                    let values = block.cut(simd, upper, lower, share);
-                    match target.as_mut_array::<LANES>() {
-                        Some(target) => *target = values,
-                        None => target.copy_from_slice(&values[..target.len()]),
-                    }
+            let down = Rows {
+                starts: &down
+                    .first
+                    .map(|row| row.wrapping_sub(region.top) as usize * width),
+                shares: &down.share,
+                pixels,
+                width,
+            };
+            for index in 0..columns.div_ceil(LANES) {
+                let block = Block::of(&across, index, columns, region.left);
+                let cells = index * LANES..columns.min((index + 1) * LANES);
+                match block.pieces {
+                    1 => block.cut::<1>(simd, &down, patch, columns, cells),
+                    2 => block.cut::<2>(simd, &down, patch, columns, cells),
+                    _ => block.cut::<0>(simd, &down, patch, columns, cells),
                 }
             }
         }
     }
+}
+
+/// The rows of cells of one area.
+struct Rows<'a> {
+    /// Where the row of pixels at or before the centres begins.
+    starts: &'a [usize; MOST_CELLS],
+    /// The share of the row after that one.
+    shares: &'a [f32; MOST_CELLS],
+    pixels: &'a [f32],
+    width: usize,
 }
 
 impl Block {
@@ -101,11 +107,8 @@ impl Block {
             at: [0; LANES],
             shares: [0.0; LANES],
             // The pixel after the last counts too.
-            pieces: (across.first[last] - first) as usize / REACH + 1,
+            pieces: (across.first[last] - first + 1) as usize / REACH + 1,
         };
-        if (across.first[last] - first) as usize % REACH == REACH - 1 {
-            block.pieces += 1;
-        }
         for lane in 0..LANES {
             block.at[lane] = across.first[cells + lane].wrapping_sub(first);
             block.shares[lane] = across.share[cells + lane];
@@ -113,35 +116,44 @@ impl Block {
         block
     }
 
-    /// The cells between two rows of pixels, `share` being that of the lower one.
+    /// Cuts the columns `cells` of all rows of `patch`. `PIECES` is the number of pieces, or 0 for any.
     #[inline(always)]
-    fn cut(&self, simd: V4, upper: &[f32], lower: &[f32], share: f32) -> [f32; LANES] {
+    fn cut<const PIECES: usize>(
+        &self,
+        simd: V4,
+        down: &Rows<'_>,
+        patch: &mut [f32],
+        columns: usize,
+        cells: Range<usize>,
+    ) {
         let x = simd.avx512f;
         let left: __m512i = pulp::cast(self.at);
         let right = x._mm512_add_epi32(left, x._mm512_set1_epi32(1));
-        let (upper, lower) = (&upper[self.first..], &lower[self.first..]);
-        let [a, b, c, d] = if self.pieces == 1 {
-            let (upper, lower) = (Piece::of(upper, 0), Piece::of(lower, 0));
-            [
-                upper.look_up(simd, left),
-                upper.look_up(simd, right),
-                lower.look_up(simd, left),
-                lower.look_up(simd, right),
-            ]
-        } else {
-            [
-                look_up_far(simd, upper, left, self.pieces),
-                look_up_far(simd, upper, right, self.pieces),
-                look_up_far(simd, lower, left, self.pieces),
-                look_up_far(simd, lower, right, self.pieces),
-            ]
-        };
-        let share = x._mm512_set1_ps(share);
-        let left = between(simd, a, c, share);
-        let right = between(simd, b, d, share);
-        let gray = between(simd, left, right, pulp::cast(self.shares));
-        let gray = x._mm512_mul_ps(gray, x._mm512_set1_ps(1.0 / 255.0));
-        pulp::cast(x._mm512_min_ps(gray, x._mm512_set1_ps(1.0)))
+        let shares: __m512 = pulp::cast(self.shares);
+        let pieces = if PIECES > 0 { PIECES } else { self.pieces };
+        let rows = down.starts.iter().zip(down.shares);
+        for (target, (&start, &share)) in patch.chunks_exact_mut(columns).zip(rows) {
+            let upper = &down.pixels[start + self.first..];
+            let lower = &upper[down.width..];
+            let a = look_up(simd, upper, left, pieces);
+            let b = look_up(simd, upper, right, pieces);
+            let c = look_up(simd, lower, left, pieces);
+            let d = look_up(simd, lower, right, pieces);
+            let share = x._mm512_set1_ps(share);
+            let before = between(simd, a, c, share);
+            let after = between(simd, b, d, share);
+            let gray = between(simd, before, after, shares);
+            let gray = x._mm512_mul_ps(gray, x._mm512_set1_ps(1.0 / 255.0));
+            let gray = x._mm512_min_ps(gray, x._mm512_set1_ps(1.0));
+            let target = &mut target[cells.clone()];
+            match target.as_mut_array::<LANES>() {
+                Some(target) => *target = pulp::cast(gray),
+                None => {
+                    let values: [f32; LANES] = pulp::cast(gray);
+                    target.copy_from_slice(&values[..target.len()]);
+                }
+            }
+        }
     }
 }
 
@@ -153,37 +165,30 @@ fn between(simd: V4, a: __m512, b: __m512, share: __m512) -> __m512 {
     simd.avx512f._mm512_add_ps(a, part)
 }
 
-/// [`REACH`] pixels.
-struct Piece([__m512; 2]);
-
-impl Piece {
-    #[inline(always)]
-    fn of(row: &[f32], index: usize) -> Self {
-        let pixels: &[f32; REACH] = row[index * REACH..]
-            .first_chunk()
-            .expect("a window of room after the last pixel");
-        let (halves, _) = pixels.as_chunks::<LANES>();
-        Self([pulp::cast(halves[0]), pulp::cast(halves[1])])
-    }
-
-    /// The pixels whose places are in the five low bits of `at`.
-    #[inline(always)]
-    fn look_up(&self, simd: V4, at: __m512i) -> __m512 {
-        simd.avx512f._mm512_permutex2var_ps(self.0[0], at, self.0[1])
-    }
-}
-
-/// The pixels of `row` at the places `at`, which lie among as many `pieces`.
+/// The pixels of `row` at the places `at`, which lie among so many `pieces`.
 #[inline(always)]
-fn look_up_far(simd: V4, row: &[f32], at: __m512i, pieces: usize) -> __m512 {
-    let mut pixels = Piece::of(row, 0).look_up(simd, at);
-    for index in 1..pieces.min(MOST) {
-        let further = Piece::of(row, index).look_up(simd, at);
+fn look_up(simd: V4, row: &[f32], at: __m512i, pieces: usize) -> __m512 {
+    let mut pixels = look_up_near(simd, row, at);
+    for index in 1..pieces {
+        // A permutation looks at the five low bits of a place.
+        let further = look_up_near(simd, &row[index * REACH..], at);
         let least = simd.avx512f._mm512_set1_epi32((index * REACH) as i32);
         let is_further = simd.avx512f._mm512_cmpge_epi32_mask(at, least);
-        pixels = simd.avx512f._mm512_mask_blend_ps(is_further, pixels, further);
+        pixels = simd
+            .avx512f
+            ._mm512_mask_blend_ps(is_further, pixels, further);
     }
     pixels
+}
+
+#[inline(always)]
+fn look_up_near(simd: V4, row: &[f32], at: __m512i) -> __m512 {
+    let pixels: &[f32; REACH] = row
+        .first_chunk()
+        .expect("a window of room after the last pixel");
+    let (halves, _) = pixels.as_chunks::<LANES>();
+    let (first, second) = (pulp::cast(halves[0]), pulp::cast(halves[1]));
+    simd.avx512f._mm512_permutex2var_ps(first, at, second)
 }
 
 /// Copies the pixels of the region, the last column and the last row once more, and room for a look-up at the end.
@@ -191,11 +196,10 @@ fn look_up_far(simd: V4, row: &[f32], at: __m512i, pieces: usize) -> __m512 {
 fn fill(region: &Region, image: &GrayFrame, pixels: &mut Vec<f32>) {
     let (image_width, image_height) = (image.width() as usize, image.height() as usize);
     // Room for all of the image at once, so that a region that grows allocates nothing.
-    let room = MOST * REACH;
-    let most = (image_width + 1) * (image_height + 1) + room;
+    let most = (image_width + 1) * (image_height + 1) + ROOM;
     pixels.reserve(most.saturating_sub(pixels.len()));
     let width = region.width + 1;
-    pixels.resize(width * (region.height + 1) + room, 0.0);
+    pixels.resize(width * (region.height + 1) + ROOM, 0.0);
     let left = region.left as usize;
     // The last column of the image has no right neighbour.
     let inner = width.min(image_width - left);

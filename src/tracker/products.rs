@@ -14,7 +14,7 @@
 use pulp::Simd;
 
 use super::abreast::{ABREAST, Doubles, Singles};
-use super::eigen::Spectrum;
+use super::history::{self, SharedHistory};
 use super::subspace::{self, AffineSubspace};
 use super::{Params, kernel};
 
@@ -62,18 +62,11 @@ pub(super) struct Products {
     squares: Vec<Doubles>,
     /// For each slot its products with the bases of the bag.
     of_directions: Vec<f32>,
-    spectrum: Spectrum,
-    history_eigenvalues: Vec<f64>,
-    /// Qᵀh.
-    reference: Vec<f64>,
-    history_len: usize,
-    /// h + the sum of H, in double precision.
-    shared: Vec<f64>,
-    shared_norm: f64,
+    history: SharedHistory,
+    /// The products of h + the sum of H with the means of the bag.
     shared_means: Vec<f64>,
     /// A rest, in double precision.
     rest: Vec<f64>,
-    resolved: usize,
 }
 
 impl Products {
@@ -98,9 +91,7 @@ impl Products {
         self.rests.resize(self.groups, room);
         self.squares.clear();
         self.squares.resize(self.groups, room);
-        self.history_eigenvalues.resize(self.slots, 0.0);
-        self.reference.resize(self.slots, 0.0);
-        self.shared.resize(self.len, 0.0);
+        self.history.prepare(self.slots, self.len);
         self.rest.resize(self.len, 0.0);
     }
 
@@ -148,52 +139,18 @@ impl Products {
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
     #[inline(always)]
     pub fn compute<S: Simd>(&mut self, simd: S, history: &[&[f32]]) {
-        self.factor(history);
+        let right = &mut self.right[self.right_first..];
+        let (shared, bag) = right.split_at_mut((self.slots + 1) * self.stride);
+        self.history.take(history, shared, self.stride);
+        let means = bag.chunks_exact(self.stride);
+        for (product, mean) in self.shared_means.iter_mut().zip(means) {
+            *product = history::dot(self.history.sum(), mean);
+        }
         self.multiply_directions(simd);
-        self.resolved = 0;
         if S::REGISTER_COUNT >= 32 {
             self.multiply::<S, MOST_ROWS, 4>(simd, history[0]);
         } else {
             self.multiply::<S, 4, 3>(simd, history[0]);
-        }
-    }
-
-    /// Q = H R Λ^(-1/2), where HᵀH = R Λ Rᵀ, and h + the sum of H.
-    #[inline(always)]
-    fn factor(&mut self, history: &[&[f32]]) {
-        let (len, count) = (self.len, history.len());
-        let spectrum = &mut self.spectrum;
-        spectrum.solve(count, |i, j| subspace::dot(history[i], history[j]));
-        let rank = subspace::dominant(spectrum.values(), count);
-        self.history_eigenvalues.fill(0.0);
-        self.reference.fill(0.0);
-        let right = &mut self.right[self.right_first..];
-        let (directions, right) = right.split_at_mut(self.slots * self.stride);
-        for direction in directions.chunks_exact_mut(self.stride).skip(rank) {
-            direction[..len].fill(0.0);
-        }
-        let directions = directions.chunks_exact_mut(self.stride).enumerate();
-        for ((slot, direction), value) in directions.zip(spectrum.values().take(rank)) {
-            self.history_eigenvalues[slot] = value;
-            // H = Q Λ^(1/2) Rᵀ
-            self.reference[slot] = value.sqrt() * spectrum.weight(slot, 0);
-            let weight = |index| spectrum.weight(slot, index) / value.sqrt();
-            subspace::combine(history, weight, &mut direction[..len]);
-        }
-        self.history_len = count;
-        self.shared.fill(0.0);
-        for (index, vector) in history.iter().enumerate() {
-            let weight = if index == 0 { 2.0 } else { 1.0 };
-            subspace::accumulate(&mut self.shared, vector, weight);
-        }
-        let (shared, right) = right.split_at_mut(self.stride);
-        for (single, value) in shared.iter_mut().zip(&self.shared) {
-            *single = *value as f32;
-        }
-        self.shared_norm = self.shared.iter().map(|value| value * value).sum();
-        let means = right.chunks_exact(self.stride);
-        for (product, mean) in self.shared_means.iter_mut().zip(means) {
-            *product = dot(&self.shared, mean);
         }
     }
 
@@ -255,7 +212,7 @@ impl Products {
         let coordinates = self.coordinates.as_flattened_mut();
         let square = self.squares.as_flattened()[index];
         let (mut norm, mut inside) = (0.0, 0.0);
-        for (slot, reference) in self.reference.iter().enumerate() {
+        for (slot, reference) in self.history.newest().iter().enumerate() {
             let along = f64::from(out[slot * lanes + index]);
             let coordinate = reference + along;
             coordinates[slot * lanes + index] = coordinate;
@@ -272,9 +229,8 @@ impl Products {
 
     /// Finds the rest of candidate `index` as a vector, and puts its products in the place of those of d; gives its
     /// squared length.
-    #[inline(never)]
+    #[inline(always)]
     fn resolve(&mut self, index: usize, row: usize) -> f64 {
-        self.resolved += 1;
         let (stride, lanes) = (self.stride, self.groups * ABREAST);
         let tile = &self.tile[self.tile_first + row * stride..];
         for (rest, value) in self.rest.iter_mut().zip(tile) {
@@ -282,7 +238,7 @@ impl Products {
         }
         let out = self.out.as_flattened_mut();
         let coordinates = self.coordinates.as_flattened_mut();
-        for (slot, reference) in self.reference.iter().enumerate() {
+        for (slot, reference) in self.history.newest().iter().enumerate() {
             coordinates[slot * lanes + index] = *reference;
             out[slot * lanes + index] = 0.0;
         }
@@ -291,7 +247,7 @@ impl Products {
         for _ in 0..2 {
             let directions = vectors.clone().take(self.slots);
             for (slot, direction) in directions.enumerate() {
-                let along = dot(&self.rest, direction);
+                let along = history::dot(&self.rest, direction);
                 coordinates[slot * lanes + index] += along;
                 subspace::accumulate(&mut self.rest, direction, -along);
             }
@@ -299,7 +255,7 @@ impl Products {
         let bases = self.slots + 1 + self.entries;
         vectors.by_ref().take(bases).for_each(drop);
         for (column, basis) in (bases..).zip(vectors) {
-            out[column * lanes + index] = dot(&self.rest, basis) as f32;
+            out[column * lanes + index] = history::dot(&self.rest, basis) as f32;
         }
         self.rest.iter().map(|value| value * value).sum()
     }
@@ -325,30 +281,14 @@ impl Products {
         &self.of_directions[slot * columns..][..columns]
     }
 
-    /// The eigenvalues Λ of HHᵀ that belong to the directions of Q, largest first, then zeros: P values.
-    pub fn history_eigenvalues(&self) -> &[f64] {
-        &self.history_eigenvalues
-    }
-
-    /// The number of previous patches.
-    pub fn history_len(&self) -> usize {
-        self.history_len
-    }
-
-    /// The squared norm of h + the sum of H.
-    pub fn shared_norm(&self) -> f64 {
-        self.shared_norm
+    /// What all candidates share.
+    pub fn history(&self) -> &SharedHistory {
+        &self.history
     }
 
     /// The products of h + the sum of H with the means of the bag's entries.
     pub fn shared_means(&self) -> &[f64] {
         &self.shared_means
-    }
-
-    /// How many candidates had a rest that was computed in double precision.
-    #[cfg(test)]
-    pub fn resolved(&self) -> usize {
-        self.resolved
     }
 }
 
@@ -431,19 +371,4 @@ fn subtract(a: &[f32], b: &[f32], difference: &mut [f32]) -> f64 {
         sum += f64::from(*value * *value);
     }
     sum
-}
-
-/// The inner product of a vector in double and one in single precision, in eight parts so that the loop vectorises.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f32]) -> f64 {
-    let mut parts = [0.0_f64; 8];
-    let (a_chunks, a_rest) = a.as_chunks::<8>();
-    let (b_chunks, b_rest) = b[..a.len()].as_chunks::<8>();
-    for (x, y) in a_chunks.iter().zip(b_chunks) {
-        for lane in 0..8 {
-            parts[lane] += x[lane] * f64::from(y[lane]);
-        }
-    }
-    let rest = a_rest.iter().zip(b_rest);
-    parts.iter().sum::<f64>() + rest.map(|(x, &y)| x * f64::from(y)).sum::<f64>()
 }

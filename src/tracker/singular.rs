@@ -6,13 +6,13 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use super::abreast::{ABREAST, Singles};
+use super::abreast::{ABREAST, Singles, inverse_root};
 
 /// Three sweeps are usual; the bound only guards against a NaN.
 const MAX_SWEEPS: usize = 10;
 
-/// Columns whose cosine (squared) is below this are orthogonal.
-const ORTHOGONAL: f32 = 1e-12;
+/// Columns whose cosine (squared) is below this are orthogonal: the smaller singular value is off by half of it.
+const ORTHOGONAL: f32 = 1e-9;
 
 /// Keeps 0 / 0 out.
 const LEAST: f32 = 1e-30;
@@ -81,10 +81,17 @@ fn rotate<const N: usize>(columns: &mut Columns<N>, p: usize, q: usize) -> bool 
     for lane in 0..ABREAST {
         let gap = b[lane] - a[lane];
         let twice = 2.0 * both[lane];
-        // The smaller root, without a branch.
         let root = (gap * gap + twice * twice).sqrt() + gap.abs() + LEAST;
+        // At most 1 even where the squares underflowed.
+        let root = if root > twice.abs() {
+            root
+        } else {
+            twice.abs()
+        };
         let tangent = twice * 1.0_f32.copysign(gap) / root;
-        cosine[lane] = 1.0 / (tangent * tangent + 1.0).sqrt();
+        let square = tangent * tangent;
+        let first = inverse_root(square);
+        cosine[lane] = first * (1.5 - (0.5 + 0.5 * square) * first * first);
         sine[lane] = tangent * cosine[lane];
     }
     for i in 0..N {
@@ -144,5 +151,89 @@ fn squared_angle(squared_cosine: f32) -> f32 {
         complement * complement
     } else {
         squared
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Σ θ² of the `dim` largest singular values.
+    fn expected(matrix: &DMatrix<f64>, dim: usize) -> f64 {
+        let mut values: Vec<f64> = matrix.singular_values().iter().copied().collect();
+        values.sort_by(|a, b| b.total_cmp(a));
+        let angles = values[..dim].iter().map(|value| value.min(1.0).acos());
+        angles.map(|angle| angle * angle).sum()
+    }
+
+    fn check<const N: usize>() {
+        for seed in 0..200_usize {
+            let matrices: Vec<DMatrix<f64>> = (0..ABREAST)
+                .map(|lane| {
+                    let number = |i: usize, j: usize| {
+                        let hash = (i * 37 + j * 101 + lane * 53 + seed * 7919) % 997;
+                        hash as f64 / 997.0 - 0.5
+                    };
+                    // A product of orthonormal bases, near the identity or anything, some of low rank.
+                    let spread = [1e-3, 0.1, 1.0, 10.0][lane % 4];
+                    let a = DMatrix::from_fn(2 * N, N, |i, j| {
+                        f64::from(u8::from(i == j)) + spread * number(i, j)
+                    });
+                    let b = DMatrix::from_fn(2 * N, N, |i, j| {
+                        f64::from(u8::from(i == j)) + spread * number(j + 5, i)
+                    });
+                    let mut product = a.qr().q().transpose() * b.qr().q();
+                    if lane % 5 == 4 {
+                        product.column_mut(N - 1).fill(0.0);
+                    }
+                    product
+                })
+                .collect();
+            let mut columns: Columns<N> = [[[0.0; ABREAST]; N]; N];
+            for (lane, matrix) in matrices.iter().enumerate() {
+                for j in 0..N {
+                    for i in 0..N {
+                        columns[j][i][lane] = matrix[(i, j)] as f32;
+                    }
+                }
+            }
+            let dims: Singles = std::array::from_fn(|lane| (N - usize::from(lane % 5 == 4)) as f32);
+            let sums = squared_angles(&mut columns, &dims);
+            for (lane, matrix) in matrices.iter().enumerate() {
+                let expected = expected(matrix, dims[lane] as usize);
+                let difference = (f64::from(sums[lane]) - expected).abs();
+                assert!(difference < 5e-6, "{N} {seed} {lane}: {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn angles_are_those_of_a_decomposition() {
+        check::<1>();
+        check::<2>();
+        check::<3>();
+        check::<6>();
+    }
+
+    #[test]
+    fn angles_are_those_of_acos() {
+        for index in 0..=10_000_u16 {
+            let angle = f64::from(index) / 10_000.0 * f64::from(FRAC_PI_2);
+            let squared = squared_angle(angle.cos().powi(2) as f32);
+            assert!((f64::from(squared) - angle * angle).abs() < 1e-6, "{angle}");
+        }
+        assert_eq!(squared_angle(1.0 + 1e-6), 0.0);
+    }
+
+    #[test]
+    fn tiny_and_zero_columns_stay_finite() {
+        for value in [0.0, 1e-10, 1e-25, 1e-40] {
+            let mut columns: Columns<3> = [[[value; ABREAST]; 3]; 3];
+            let [sum, ..] = squared_angles(&mut columns, &[3.0; ABREAST]);
+            let expected = 3.0 * FRAC_PI_2 * FRAC_PI_2;
+            assert!((sum - expected).abs() < 1e-5, "{value}: {sum}");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
 
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::eigen::Spectrum;
@@ -14,6 +15,24 @@ pub struct AffineSubspace {
     pub(super) mean: Vec<f32>,
     /// The columns of U, one after the other.
     pub(super) basis: Vec<f32>,
+}
+
+/// [`AffineSubspace::become_of`], to be compiled for the instructions that this machine has.
+struct BecomeOf<'a> {
+    subspace: &'a mut AffineSubspace,
+    vectors: &'a [&'a [f32]],
+    basis_dim: usize,
+    spectrum: &'a mut Spectrum,
+}
+
+impl WithSimd for BecomeOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.subspace
+            .make_of(self.vectors, self.basis_dim, self.spectrum);
+    }
 }
 
 impl AffineSubspace {
@@ -36,6 +55,16 @@ impl AffineSubspace {
         basis_dim: usize,
         spectrum: &mut Spectrum,
     ) {
+        Arch::new().dispatch(BecomeOf {
+            subspace: self,
+            vectors,
+            basis_dim,
+            spectrum,
+        });
+    }
+
+    #[inline(always)]
+    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
         let len = vectors[0].len();
         assert!(
             vectors.iter().all(|vector| vector.len() == len),
