@@ -129,6 +129,12 @@ impl CandidateBases {
         self.dims[index] = dims;
     }
 
+    /// n.
+    #[inline(always)]
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+
     /// The number of basis vectors of a candidate.
     pub fn dim(&self, candidate: usize) -> usize {
         self.dims[candidate / ABREAST][candidate % ABREAST] as usize

@@ -43,13 +43,11 @@ impl Distances {
     ) {
         self.values.resize(candidates * entries.len(), 0.0);
         let all = (products, bases, entries);
-        match self.limit {
-            1 => self.compute_all::<1>(all),
-            2 => self.compute_all::<2>(all),
-            3 => self.compute_all::<3>(all),
-            4 => self.compute_all::<4>(all),
-            5 => self.compute_all::<5>(all),
-            _ => self.compute_all::<6>(all),
+        // Columns of zeros at the end change nothing; a function for each number of columns would be six.
+        if self.limit <= 3 {
+            self.compute_all::<3>(all);
+        } else {
+            self.compute_all::<6>(all);
         }
     }
 
@@ -114,10 +112,11 @@ fn grassmann<const N: usize>(
     let own = products.group(group);
     let count = products.shared_means().len();
     let slots = products.history().eigenvalues().len();
+    let limit = bases.limit();
     let mut columns: Columns<N> = [[[0.0; ABREAST]; N]; N];
-    for (i, column) in columns.iter_mut().enumerate() {
+    for (i, column) in columns.iter_mut().enumerate().take(limit) {
         let coefficients = bases.column(group, i);
-        for (j, product) in column.iter_mut().enumerate() {
+        for (j, product) in column.iter_mut().enumerate().take(limit) {
             let (with_basis, of_rest) = (own.with_basis(j, k), &coefficients[slots]);
             let mut sum = [0.0; ABREAST];
             for lane in 0..ABREAST {
