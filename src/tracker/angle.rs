@@ -1,4 +1,4 @@
-//! (D) Principal angles from their cosines, several at a time.
+//! (D) Principal angles from their cosines, several at a time, in double precision.
 //!
 //! What equation 8 needs is θ² where cos²θ is known. By way of `acos` that would be one call for each of some
 //! thousand angles a frame; as a polynomial it is a few vector instructions. Near θ = 0, where most angles are, `acos` of a
@@ -6,7 +6,11 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::eigen::{LANES, Lanes};
+/// How many angles are computed together.
+pub(super) const LANES: usize = 8;
+
+/// A number for each of them.
+pub(super) type Lanes = [f64; LANES];
 
 /// arcsin²(√y) / y on [0, 1/2], lowest power first: the Chebyshev fit of degree 16, off by less than 3e-15 (mpmath's
 /// `chebyfit(lambda y: asin(sqrt(y))**2 / y, [0, 0.5], 17)`).

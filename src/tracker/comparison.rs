@@ -241,10 +241,7 @@ impl Comparison {
         whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
         let count = self.whitened.len() / len;
         for (index, vector) in self.whitened.chunks_exact(len).enumerate() {
-            let candidate = evaluation.candidate_mut(index);
-            for (to, from) in candidate.iter_mut().zip(vector) {
-                *to = f64::from(*from);
-            }
+            evaluation.candidate_mut(index).copy_from_slice(vector);
         }
         // Candidates are diagonalised side by side: what another frame left there would change the last bits.
         for index in count..params.particles as usize {

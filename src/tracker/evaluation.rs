@@ -26,19 +26,56 @@ pub struct Evaluation {
     weights: Vec<f64>,
 }
 
-/// [`Evaluation::compute`], to be compiled for the instructions that this machine has. Everything in it is inlined,
-/// since a function of its own would be compiled for the least of machines.
-struct Compute<'a> {
-    evaluation: &'a mut Evaluation,
+// The parts of `Evaluation::compute`, each to be compiled for the instructions that this machine has. Everything in them is
+// inlined, since a function of its own would be compiled for the least of machines; in one part they would take the compiler
+// several times as long.
+
+/// The inner products.
+struct ComputeProducts<'a> {
+    products: &'a mut Products,
     history: &'a [&'a [f32]],
 }
 
-impl WithSimd for Compute<'_> {
+/// The bases of the candidates.
+struct ComputeBases<'a> {
+    bases: &'a mut CandidateBases,
+    products: &'a Products,
+}
+
+/// The distances.
+struct ComputeDistances<'a> {
+    distances: &'a mut Distances,
+    products: &'a Products,
+    bases: &'a CandidateBases,
+    candidates: usize,
+    entries: &'a [(f64, usize)],
+}
+
+impl WithSimd for ComputeProducts<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        self.evaluation.compute_all(simd, self.history);
+        self.products.compute(simd, self.history);
+    }
+}
+
+impl WithSimd for ComputeBases<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.bases.compute(self.products);
+    }
+}
+
+impl WithSimd for ComputeDistances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.distances
+            .compute(self.products, self.bases, self.candidates, self.entries);
     }
 }
 
@@ -74,21 +111,14 @@ impl Evaluation {
     ///
     /// # Panics
     /// If `index` is N or more.
-    pub fn candidate_mut(&mut self, index: usize) -> &mut [f64] {
+    pub fn candidate_mut(&mut self, index: usize) -> &mut [f32] {
         assert!(index < self.candidates, "a candidate below N");
         self.products.candidate_mut(index)
     }
 
     /// The feature vectors of all N candidates, one after the other, to be filled in.
-    pub fn candidates_mut(&mut self) -> &mut [f64] {
+    pub fn candidates_mut(&mut self) -> &mut [f32] {
         self.products.candidates_mut()
-    }
-
-    /// The feature vector v of candidate `index` as it is stored in histories, into `out`.
-    pub fn candidate(&self, index: usize, out: &mut Vec<f32>) {
-        out.clear();
-        let values = self.products.candidate(index).iter();
-        out.extend(values.map(|&value| value as f32));
     }
 
     /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every
@@ -110,18 +140,22 @@ impl Evaluation {
 
     /// The first half of [`compute`](Self::compute): the distances alone.
     pub(super) fn compute_distances(&mut self, history: &[&[f32]]) {
-        Arch::new().dispatch(Compute {
-            evaluation: self,
+        let arch = Arch::new();
+        arch.dispatch(ComputeProducts {
+            products: &mut self.products,
             history,
         });
-    }
-
-    #[inline(always)]
-    fn compute_all<S: Simd>(&mut self, simd: S, history: &[&[f32]]) {
-        self.products.compute(simd, history);
-        self.bases.compute(&self.products);
-        self.distances
-            .compute(&self.products, &self.bases, self.candidates, &self.entries);
+        arch.dispatch(ComputeBases {
+            bases: &mut self.bases,
+            products: &self.products,
+        });
+        arch.dispatch(ComputeDistances {
+            distances: &mut self.distances,
+            products: &self.products,
+            bases: &self.bases,
+            candidates: self.candidates,
+            entries: &self.entries,
+        });
     }
 
     /// dist(Aᵢ, B\[k\]) (equation 4), in [0, 1], of candidate `index` to each entry of the bag.

@@ -35,19 +35,25 @@ impl WithSimd for Exp<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let (groups, rest) = self.0.as_chunks_mut::<16>();
-        for group in groups {
-            *group = exp_each(*group);
-        }
-        for value in rest {
-            [*value] = exp_each([*value]);
-        }
+        exp_within(self.0);
     }
 }
 
 /// Replaces each of `values`, none above 700, by its exponential, to a few parts in 10^16.
 pub(super) fn exp(values: &mut [f64]) {
     Arch::new().dispatch(Exp(values));
+}
+
+/// As [`exp`], within what is compiled for this machine's instructions.
+#[inline(always)]
+pub(super) fn exp_within(values: &mut [f64]) {
+    let (groups, rest) = values.as_chunks_mut::<16>();
+    for group in groups {
+        *group = exp_each(*group);
+    }
+    for value in rest {
+        [*value] = exp_each([*value]);
+    }
 }
 
 #[inline(always)]

@@ -4,22 +4,70 @@
 //! likelihood. Equation 10 normalises over the candidates, so the least distance to an entry may be taken from all
 //! distances to it first: the result is the same, and the largest term is always 1.
 
+use pulp::{Arch, Simd, WithSimd};
+
+use super::exponential;
+
+/// Entries whose sums are kept together.
+const BLOCK: usize = 16;
+
 /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equations 10 and 11) of `distances`, which hold for each candidate its
 /// distance to each of `entries` entries; the result in the same order. Each entry's sum over the candidates is 1.
-#[inline(always)]
 pub(super) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mut Vec<f64>) {
     out.clear();
     out.extend_from_slice(distances);
-    for k in 0..entries {
-        let column = distances.iter().skip(k).step_by(entries);
-        let least = column.copied().fold(f64::INFINITY, f64::min);
-        let mut sum = 0.0;
-        for value in out.iter_mut().skip(k).step_by(entries) {
-            *value = ((least - *value) / sigma).exp();
-            sum += *value;
+    Arch::new().dispatch(Normalize {
+        values: out,
+        entries,
+        sigma,
+    });
+}
+
+/// [`normalized`] in place, to be compiled for the instructions that this machine has.
+struct Normalize<'a> {
+    values: &'a mut [f64],
+    entries: usize,
+    sigma: f64,
+}
+
+impl WithSimd for Normalize<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            values,
+            entries,
+            sigma,
+        } = self;
+        for first in (0..entries).step_by(BLOCK) {
+            let block = first..entries.min(first + BLOCK);
+            let mut least = [f64::INFINITY; BLOCK];
+            for row in values.chunks_exact(entries) {
+                for (least, &value) in least.iter_mut().zip(&row[block.clone()]) {
+                    *least = if value < *least { value } else { *least };
+                }
+            }
+            for row in values.chunks_exact_mut(entries) {
+                for (value, least) in row[block.clone()].iter_mut().zip(&least) {
+                    *value = (least - *value) / sigma;
+                }
+            }
         }
-        for value in out.iter_mut().skip(k).step_by(entries) {
-            *value /= sum;
+        exponential::exp_within(values);
+        for first in (0..entries).step_by(BLOCK) {
+            let block = first..entries.min(first + BLOCK);
+            let mut sums = [0.0; BLOCK];
+            for row in values.chunks_exact(entries) {
+                for (sum, value) in sums.iter_mut().zip(&row[block.clone()]) {
+                    *sum += value;
+                }
+            }
+            for row in values.chunks_exact_mut(entries) {
+                for (value, sum) in row[block.clone()].iter_mut().zip(&sums) {
+                    *value /= sum;
+                }
+            }
         }
     }
 }

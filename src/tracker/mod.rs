@@ -40,6 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod abreast;
 mod angle;
 mod background;
 mod bag;
@@ -51,6 +52,7 @@ mod comparison;
 mod directions;
 mod discriminant;
 mod distance;
+mod dominant;
 mod downscale;
 mod eigen;
 mod energies;
@@ -59,6 +61,7 @@ mod examples;
 mod exponential;
 mod frame;
 mod gradients;
+mod history;
 mod kernel;
 mod learning;
 mod likelihood;
@@ -68,6 +71,8 @@ mod metric;
 mod motion;
 mod params;
 mod patch;
+#[cfg(target_arch = "x86_64")]
+mod permute;
 mod posterior;
 mod presets;
 mod products;
@@ -78,6 +83,7 @@ mod scale;
 mod scan;
 mod score;
 mod search;
+mod singular;
 mod snapshot;
 mod solitary;
 mod state;

@@ -3,15 +3,19 @@
 //! The area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
 //! gray values in [0, 1] (section III-B). Outside the frame the nearest edge pixel counts.
 
+#[cfg(target_arch = "x86_64")]
+use pulp::x86::V4;
 use pulp::{Arch, Simd, WithSimd};
 
+#[cfg(target_arch = "x86_64")]
+use super::permute::PermutedCuts;
 use super::{GrayFrame, Params, Rect};
 
 /// How many columns are worked on together.
-const BLOCK: usize = 8;
+const BLOCK: usize = 16;
 
 /// Most rows or columns of cells; whole blocks.
-const MOST_CELLS: usize = 64;
+pub(super) const MOST_CELLS: usize = 64;
 
 /// More than the quads of a row; a power of two, so that a masked index needs no check.
 const WINDOW: usize = 512;
@@ -25,20 +29,23 @@ const _: () = assert!((super::WORKING_SIDE as usize) < WINDOW);
 pub(super) struct PatchCutter {
     /// For each pixel of the region row by row: itself, the one right of it, and the two below these, lowest byte first.
     quads: Vec<u32>,
+    /// The pixels of the region, where patches are cut by permutations.
+    #[cfg(target_arch = "x86_64")]
+    pixels: Vec<f32>,
 }
 
 /// For each cell along one axis, the pixel at or before its centre, and the share of the pixel after that one.
-struct Axis {
-    first: [u32; MOST_CELLS],
-    share: [f32; MOST_CELLS],
+pub(super) struct Axis {
+    pub first: [u32; MOST_CELLS],
+    pub share: [f32; MOST_CELLS],
 }
 
-/// The pixels that cells can lie between, as quads: from (`left`, `top`), `width` a row, `height` rows.
-struct Region {
-    left: u32,
-    top: u32,
-    width: usize,
-    height: usize,
+/// The pixels at or after which cells can lie: from (`left`, `top`), `width` a row, `height` rows.
+pub(super) struct Region {
+    pub left: u32,
+    pub top: u32,
+    pub width: usize,
+    pub height: usize,
 }
 
 /// All cuts of a frame, to be compiled for the instructions that this machine has.
@@ -47,26 +54,47 @@ struct Cuts<'a, A> {
     image: &'a GrayFrame,
     areas: A,
     params: &'a Params,
-    out: &'a mut [f64],
+    out: &'a mut [f32],
 }
 
 impl PatchCutter {
-    /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each. The
-    /// values are exact in single precision.
-    pub fn cut(
+    /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each.
+    pub fn cut<A: Iterator<Item = Rect> + Clone>(
         &mut self,
         image: &GrayFrame,
-        areas: impl Iterator<Item = Rect> + Clone,
+        areas: A,
         params: &Params,
-        out: &mut [f64],
+        out: &mut [f32],
     ) {
-        Arch::new().dispatch(Cuts {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = V4::try_new() {
+            return simd.vectorize(PermutedCuts {
+                simd,
+                pixels: &mut self.pixels,
+                image,
+                areas,
+                params,
+                out,
+            });
+        }
+        Arch::new().dispatch(self.cuts(image, areas, params, out));
+    }
+
+    /// All cuts of a frame for any machine.
+    fn cuts<'a, A>(
+        &'a mut self,
+        image: &'a GrayFrame,
+        areas: A,
+        params: &'a Params,
+        out: &'a mut [f32],
+    ) -> Cuts<'a, A> {
+        Cuts {
             quads: &mut self.quads,
             image,
             areas,
             params,
             out,
-        });
+        }
     }
 }
 
@@ -108,7 +136,7 @@ fn cut_row(
     at: &[u32; MOST_CELLS],
     shares: &[f32; MOST_CELLS],
     lower: f32,
-    target: &mut [f64],
+    target: &mut [f32],
 ) {
     let blocks = at.as_chunks::<BLOCK>().0.iter();
     let blocks = blocks.zip(shares.as_chunks::<BLOCK>().0);
@@ -121,7 +149,7 @@ fn cut_row(
             let right = b + (d - b) * lower;
             let gray = (left + (right - left) * shares[lane]) * (1.0 / 255.0);
             // Not f32::min, which takes four instructions for the sake of NaN.
-            values[lane] = f64::from(if gray < 1.0 { gray } else { 1.0 });
+            values[lane] = if gray < 1.0 { gray } else { 1.0 };
         }
         match target.as_mut_array::<BLOCK>() {
             Some(target) => *target = values,
@@ -133,7 +161,7 @@ fn cut_row(
 impl Axis {
     /// `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
     #[inline(always)]
-    fn lay(start: f64, extent: f64, count: u32, pixels: u32) -> Self {
+    pub fn lay(start: f64, extent: f64, count: u32, pixels: u32) -> Self {
         let mut axis = Self {
             first: [0; MOST_CELLS],
             share: [0.0; MOST_CELLS],
@@ -157,7 +185,7 @@ impl Axis {
 impl Region {
     /// The pixels between which the cells of `areas` lie.
     #[inline(always)]
-    fn around(image: &GrayFrame, areas: impl Iterator<Item = Rect>) -> Self {
+    pub fn around(image: &GrayFrame, areas: impl Iterator<Item = Rect>) -> Self {
         let (mut left, mut top) = (f64::INFINITY, f64::INFINITY);
         let (mut right, mut bottom) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for area in areas {
@@ -209,11 +237,13 @@ impl Region {
 pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
     let mut values = vec![0.0; params.feature_len()];
     PatchCutter::default().cut(image, std::iter::once(*area), params, &mut values);
-    values.into_iter().map(|value| value as f32).collect()
+    values
 }
 
 #[cfg(test)]
 mod tests {
+    use pulp::Scalar;
+
     use super::*;
     use crate::tracker::Preset;
 
@@ -236,6 +266,52 @@ mod tests {
         (row(top) * (1.0 - lower_share) + row(top + 1.0) * lower_share) / 255.0
     }
 
+    /// Areas within the image, over its edges, beyond it, small and large.
+    fn areas() -> [Rect; 7] {
+        [
+            Rect::new(5.0, 6.0, 7.0, 5.0),
+            Rect::new(5.3, 6.8, 21.7, 3.9),
+            Rect::new(-8.0, -3.5, 20.0, 14.0),
+            Rect::new(36.0, 25.0, 30.0, 30.0),
+            Rect::new(-200.0, 300.0, 10.0, 10.0),
+            Rect::new(-1.5, 3.0, 320.0, 33.0),
+            Rect::new(-400.0, -400.0, 1000.0, 1200.0),
+        ]
+    }
+
+    #[test]
+    fn every_machine_cuts_the_same_values() {
+        for (columns, rows) in [(32, 32), (4, 4), (7, 5), (17, 33), (64, 64)] {
+            let params = Params {
+                patch_width: columns,
+                patch_height: rows,
+                ..Preset::Paper.params()
+            };
+            for (width, height) in [(320, 240), (40, 30), (240, 320), (1, 30), (40, 1), (1, 1)] {
+                let image = image(width, height);
+                let room = vec![0.5_f32; 7 * params.feature_len()];
+                let areas = areas().into_iter();
+                let mut cutter = PatchCutter::default();
+                let mut fastest = room.clone();
+                cutter.cut(&image, areas.clone(), &params, &mut fastest);
+                let mut widest = room.clone();
+                let cuts = cutter.cuts(&image, areas.clone(), &params, &mut widest);
+                Arch::new().dispatch(cuts);
+                assert_eq!(fastest, widest, "{columns} x {rows} of {width} x {height}");
+                let mut plain = room.clone();
+                let cuts = cutter.cuts(&image, areas.clone(), &params, &mut plain);
+                Simd::vectorize(Scalar::new(), cuts);
+                assert_eq!(fastest, plain, "{columns} x {rows} of {width} x {height}");
+                #[cfg(target_arch = "x86_64")]
+                if let Some(simd) = pulp::x86::V3::try_new() {
+                    let mut middle = room;
+                    Simd::vectorize(simd, cutter.cuts(&image, areas, &params, &mut middle));
+                    assert_eq!(fastest, middle, "{columns} x {rows} of {width} x {height}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn every_cell_is_interpolated_at_its_centre() {
         let params = Params {
@@ -243,15 +319,9 @@ mod tests {
             patch_height: 5,
             ..Preset::Paper.params()
         };
-        for (width, height) in [(40, 30), (1, 30), (40, 1), (1, 1)] {
+        for (width, height) in [(320, 40), (40, 30), (1, 30), (40, 1), (1, 1)] {
             let image = image(width, height);
-            for area in [
-                Rect::new(5.0, 6.0, 7.0, 5.0),
-                Rect::new(5.3, 6.8, 21.7, 3.9),
-                Rect::new(-8.0, -3.5, 20.0, 14.0),
-                Rect::new(36.0, 25.0, 30.0, 30.0),
-                Rect::new(-200.0, 300.0, 10.0, 10.0),
-            ] {
+            for area in areas() {
                 let patch = patch(&image, &area, &params);
                 for (i, &value) in patch.iter().enumerate() {
                     let x = area.x + area.width * ((i % 7) as f64 + 0.5) / 7.0;

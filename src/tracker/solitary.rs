@@ -10,9 +10,8 @@ use std::f64::consts::PI;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::angle::squared_angles;
+use super::angle::{LANES, squared_angles};
 use super::combination::LEAST_LEFT;
-use super::eigen::LANES;
 use super::state::State;
 use super::{Params, kernel, matrix};
 

@@ -1,5 +1,6 @@
 //! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
 
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::eigen::Spectrum;
@@ -14,6 +15,24 @@ pub struct AffineSubspace {
     pub(super) mean: Vec<f32>,
     /// The columns of U, one after the other.
     pub(super) basis: Vec<f32>,
+}
+
+/// [`AffineSubspace::become_of`], to be compiled for the instructions that this machine has.
+struct BecomeOf<'a> {
+    subspace: &'a mut AffineSubspace,
+    vectors: &'a [&'a [f32]],
+    basis_dim: usize,
+    spectrum: &'a mut Spectrum,
+}
+
+impl WithSimd for BecomeOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.subspace
+            .make_of(self.vectors, self.basis_dim, self.spectrum);
+    }
 }
 
 impl AffineSubspace {
@@ -36,23 +55,35 @@ impl AffineSubspace {
         basis_dim: usize,
         spectrum: &mut Spectrum,
     ) {
+        Arch::new().dispatch(BecomeOf {
+            subspace: self,
+            vectors,
+            basis_dim,
+            spectrum,
+        });
+    }
+
+    #[inline(always)]
+    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
         let len = vectors[0].len();
         assert!(
             vectors.iter().all(|vector| vector.len() == len),
             "feature vectors of one length"
         );
         let share = 1.0 / vectors.len() as f64;
-        self.mean.clear();
-        combine(vectors, |_| share, len, &mut self.mean);
+        self.mean.resize(len, 0.0);
+        combine(vectors, |_| share, &mut self.mean);
 
         // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
         spectrum.solve(vectors.len(), |i, j| dot(vectors[i], vectors[j]));
         self.basis.clear();
         self.basis.reserve_exact(len * basis_dim);
         let dim = dominant(spectrum.values(), basis_dim);
-        for (place, value) in spectrum.values().take(dim).enumerate() {
+        self.basis.resize(len * dim, 0.0);
+        let columns = self.basis.chunks_exact_mut(len);
+        for ((place, value), column) in spectrum.values().enumerate().zip(columns) {
             let weight = |index| spectrum.weight(place, index) / value.sqrt();
-            combine(vectors, weight, len, &mut self.basis);
+            combine(vectors, weight, column);
         }
     }
 
@@ -121,16 +152,19 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
             .sum::<f64>()
 }
 
-/// Appends the sum of vectors of length `len`, each with its weight, to `out`; summed in double precision.
-fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, len: usize, out: &mut Vec<f32>) {
+/// The sum of vectors, each with its weight, into `out`; summed in double precision.
+#[inline(always)]
+pub(super) fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
     const BLOCK: usize = 64;
-    for first in (0..len).step_by(BLOCK) {
+    for (block, out) in out.chunks_mut(BLOCK).enumerate() {
         let mut sums = [0.0; BLOCK];
-        let sums = &mut sums[..BLOCK.min(len - first)];
+        let sums = &mut sums[..out.len()];
         for (index, vector) in vectors.iter().enumerate() {
-            accumulate(sums, &vector[first..first + sums.len()], weight(index));
+            accumulate(sums, &vector[block * BLOCK..][..out.len()], weight(index));
         }
-        out.extend(sums.iter().map(|&sum| sum as f32));
+        for (out, &sum) in out.iter_mut().zip(sums.iter()) {
+            *out = sum as f32;
+        }
     }
 }
 

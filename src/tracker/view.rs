@@ -19,7 +19,6 @@ pub(super) struct View {
     cells: Cells,
     /// Those of a grid.
     grid_cells: Cells,
-    exact: Vec<f64>,
 }
 
 /// The cells of a place and its surroundings, row by row.
@@ -96,13 +95,7 @@ impl View {
     ) {
         match params.features {
             Features::Gray => {
-                let mut exact = std::mem::take(&mut self.exact);
-                exact.resize(particles.len() * params.feature_len(), 0.0);
-                self.cut(frame, particles, reach, params, &mut exact);
-                for (value, exact) in out.iter_mut().zip(&exact) {
-                    *value = *exact as f32;
-                }
-                self.exact = exact;
+                self.cut(frame, particles, reach, params, out);
             }
             Features::Gradients => {
                 let areas = particles
@@ -163,14 +156,14 @@ impl View {
         }
     }
 
-    /// Writes gray features, exact in single precision, to `out`.
+    /// Writes gray features to `out`.
     pub fn cut(
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
         reach: &Reach,
         params: &Params,
-        out: &mut [f64],
+        out: &mut [f32],
     ) {
         let areas = particles
             .iter()

@@ -164,10 +164,7 @@ pub fn shipped(
     let mut evaluation = Evaluation::new(params);
     evaluation.set_bag(bag.iter());
     for (index, candidate) in candidates.iter().enumerate() {
-        let target = evaluation.candidate_mut(index);
-        for (target, &value) in target.iter_mut().zip(candidate) {
-            *target = f64::from(value);
-        }
+        evaluation.candidate_mut(index).copy_from_slice(candidate);
     }
     evaluation.compute(history);
     evaluation
