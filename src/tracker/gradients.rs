@@ -271,7 +271,7 @@ impl SumsRow<'_> {
             simd.mul_add_e_f32s(simd.sub_f32s(to, from), share, from)
         };
         let mut sum = [simd.splat_f32s(0.0); LANES];
-        for register in 0..registers::<S>() {
+        for (register, sum) in sum.iter_mut().enumerate().take(registers::<S>()) {
             let upper = between(
                 upper_left.load::<S>()[register],
                 upper_right.load::<S>()[register],
@@ -282,7 +282,7 @@ impl SumsRow<'_> {
                 lower_right.load::<S>()[register],
                 right,
             );
-            sum[register] = between(upper, lower, down);
+            *sum = between(upper, lower, down);
         }
         sum
     }
