@@ -106,23 +106,31 @@ def overlap(a, b):
     return shared / (a[2] * a[3] + b[2] * b[3] - shared)
 
 
-def track(name, frames, boxes):
-    """One tracker through one sequence: its figures under the names that `bagtrack eval` gives them."""
+def updates(name, frames, boxes):
+    """One tracker through one sequence: for each frame after the first the seconds of its update, whether it says that it
+    has the target, and its box, which is held while it has not."""
     cv2.setRNGSeed(SEED)
     tracker = new_tracker(name)
     held = boxes[0] if name == "static" else tuple(round(value) for value in boxes[0])
     tracker.init(frames[0], held)
-    errors, overlaps, spent = [], [], 0.0
-    for frame, truth in zip(frames[1:], boxes[1:]):
+    for frame in frames[1:]:
         start = time.perf_counter()
         try:
             found, box = tracker.update(frame)
         except cv2.error:
             # KCF and others raise when their window leaves the frame.
             found = False
-        spent += time.perf_counter() - start
+        seconds = time.perf_counter() - start
         if found:
             held = box
+        yield seconds, found, held
+
+
+def track(name, frames, boxes):
+    """One tracker through one sequence: its figures under the names that `bagtrack eval` gives them."""
+    errors, overlaps, spent = [], [], 0.0
+    for truth, (seconds, _, held) in zip(boxes[1:], updates(name, frames, boxes)):
+        spent += seconds
         if truth is not None:
             errors.append(center_error(held, truth))
             overlaps.append(overlap(held, truth))
@@ -189,12 +197,28 @@ def positive(text):
     return value
 
 
-def arguments():
+def add_common(parser):
+    """The arguments that every comparison with bagtrack has."""
     root = pathlib.Path(__file__).resolve().parent.parent
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sequences", nargs="+", type=pathlib.Path, metavar="DIR", help="sequences; files among them are passed over")
-    parser.add_argument("--trackers", default=",".join(ALL), help="which of OpenCV's, by commas (default: %(default)s); may be empty")
     parser.add_argument("--bagtrack", default=root / "target/release/bagtrack", type=pathlib.Path, metavar="BINARY", help="default: %(default)s")
+
+
+def folders(paths, parser):
+    """The sequences among the paths; the program ends where there is none, or one without boxes."""
+    found = [path for path in paths if not path.is_file()]
+    if not found:
+        parser.error("none of the paths is a folder")
+    for path in found:
+        if not (path / BOXES).is_file():
+            parser.error(f"{path} has no {BOXES}")
+    return found
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_common(parser)
+    parser.add_argument("--trackers", default=",".join(ALL), help="which of OpenCV's, by commas (default: %(default)s); may be empty")
     parser.add_argument("--presets", default="robust", help="bagtrack's presets, by commas (default: %(default)s)")
     parser.add_argument("--seeds", default=10, type=positive, help="bagtrack's seeds (default: %(default)s)")
     args = parser.parse_args()
@@ -205,12 +229,7 @@ def arguments():
             parser.error(f"there is no tracker {name}; there are {', '.join(ALL)}")
     args.trackers = [known[name.lower()] for name in wanted]
     args.presets = [name.strip() for name in args.presets.split(",") if name.strip()]
-    args.sequences = [path for path in args.sequences if not path.is_file()]
-    if not args.sequences:
-        parser.error("none of the paths is a folder")
-    for path in args.sequences:
-        if not (path / BOXES).is_file():
-            parser.error(f"{path} has no {BOXES}")
+    args.sequences = folders(args.sequences, parser)
     return args
 
 

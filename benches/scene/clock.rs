@@ -1,25 +1,40 @@
-//! Timing on a machine that others use too: things that are compared take turns, and the median counts.
+//! Timing on a machine that others use too: things that are compared take turns, the median counts, and time is that of the
+//! thread on its processor, without that in which others had it.
 
-use std::time::Instant;
+use rustix::time::{ClockId, Timespec, clock_gettime};
 
 /// What is timed.
 pub type Action<'a> = Box<dyn FnMut() + 'a>;
 
 /// Calls every one of `actions` `rounds` times, in turns; gives the median seconds of each.
-pub fn medians(rounds: usize, mut actions: Vec<Action<'_>>) -> Vec<f64> {
-    let mut times = vec![Vec::with_capacity(rounds); actions.len()];
-    for _ in 0..rounds {
+pub fn medians(rounds: usize, actions: Vec<Action<'_>>) -> Vec<f64> {
+    cycles(rounds, 1, actions)
+}
+
+/// The same for actions of which every `period`-th call has more to do: `rounds` times `period` calls, in turns; gives
+/// for each action the mean, over the calls of a period, of their medians. So rare work counts, and other work on the machine
+/// does not.
+pub fn cycles(rounds: usize, period: usize, mut actions: Vec<Action<'_>>) -> Vec<f64> {
+    let mut times = vec![vec![Vec::with_capacity(rounds); period]; actions.len()];
+    for call in 0..rounds * period {
         for (action, times) in actions.iter_mut().zip(&mut times) {
-            let start = Instant::now();
+            let start = seconds();
             action();
-            times.push(start.elapsed().as_secs_f64());
+            times[call % period].push(seconds() - start);
         }
     }
+    let median = |mut times: Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
     times
         .into_iter()
-        .map(|mut times| {
-            times.sort_by(f64::total_cmp);
-            times[times.len() / 2]
-        })
+        .map(|calls| calls.into_iter().map(median).sum::<f64>() / period as f64)
         .collect()
+}
+
+/// Processor time of this thread.
+fn seconds() -> f64 {
+    let Timespec { tv_sec, tv_nsec } = clock_gettime(ClockId::ThreadCPUTime);
+    tv_sec as f64 + tv_nsec as f64 * 1e-9
 }

@@ -45,6 +45,13 @@ pub fn luma(t: usize, zoom: usize) -> Vec<u8> {
         .collect()
 }
 
+/// Gray values of a picture of any size without the target: as much detail for each pixel in a large one as in a small one.
+pub fn wall(width: usize, height: usize) -> Vec<u8> {
+    (0..width * height)
+        .map(|i| texture(i % width, i / width, 1))
+        .collect()
+}
+
 /// Frame `t`.
 pub fn frame(t: usize) -> GrayFrame {
     GrayFrame::from_luma(WIDTH as u32, HEIGHT as u32, luma(t, 1)).expect("a frame of this size")

@@ -1,7 +1,8 @@
 //! The tables of docs/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
 //!
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
-//! - `growth`: the time of a step against N, D, K, P and the frame's size;
+//! - `growth [--plot FILE]`: the time of a step against N, D, K, P and more, and of what comes before it against the
+//!   frame's size, each with the order that is expected; as a figure, too;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers;
 //! - `repeat step PRESET COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
@@ -9,11 +10,16 @@
 #[path = "../scene/clock.rs"]
 mod clock;
 mod decode;
+mod fit;
 mod growth;
+mod growth_plot;
 mod memory;
 mod ratios;
 #[path = "../scene/mod.rs"]
 mod scene;
+#[allow(dead_code)] // The figures of `eval` use the rest.
+#[path = "../../src/eval/plots/style.rs"]
+mod style;
 #[path = "../../tests/textbook/mod.rs"]
 mod textbook;
 
@@ -42,7 +48,8 @@ fn main() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
         ["ratios"] => ratios::print(),
-        ["growth"] => growth::print(),
+        ["growth"] => growth::print(None),
+        ["growth", "--plot", file] => growth::print(Some(file)),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
@@ -53,7 +60,7 @@ fn main() {
         [] => ratios::print(),
         _ => {
             eprintln!(
-                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
+                "tables: ratios | growth [--plot FILE] | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
             );
             std::process::exit(2);
         }

@@ -2,7 +2,8 @@
 
 use std::hint::black_box;
 
-use bagtrack::tracker::{AffineSubspace, Preset, Rect, patch};
+use bagtrack::sample::{Clip, Scene, Settings};
+use bagtrack::tracker::{AffineSubspace, GrayFrame, Preset, Rect, Status, Tracker, patch};
 use nalgebra::DMatrix;
 
 use crate::{clock, scene, textbook, warm};
@@ -66,7 +67,7 @@ pub fn print() {
             }),
         ],
     );
-    let [step, robust, evaluation, product, product_double] = times[..] else {
+    let [step, robust_step, evaluation, product, product_double] = times[..] else {
         unreachable!("one time for each action")
     };
     // By itself: it would leave nothing in the caches for the next in turn.
@@ -76,17 +77,23 @@ pub fn print() {
             black_box(textbook::evaluate(&candidates, history, &bag, &params));
         })],
     )[0];
-    println!("median of {ROUNDS} rounds, in turns, one thread\n");
+    println!("median of {ROUNDS} rounds, in turns, processor time of one thread\n");
     println!("| what | µs | |");
     println!("|---|---|---|");
     let line = |what: &str, seconds: f64, note: String| {
         println!("| {what} | {:.0} | {note} |", seconds * 1e6);
     };
     line("`Tracker::step`, `paper`", step, String::new());
-    line("`Tracker::step`, `robust`", robust, String::new());
+    line("`Tracker::step`, `robust`", robust_step, String::new());
+    let (lost, note) = out_of_sight(robust_step);
+    line(
+        "the same while the target is out of sight, in a clip of `sample`",
+        lost,
+        note,
+    );
     let note = format!("{:.1} × the product", evaluation / product);
     line(
-        "its arithmetic: feature vectors to weights, `paper`",
+        "the arithmetic of `paper`: feature vectors to weights",
         evaluation,
         note,
     );
@@ -103,4 +110,49 @@ pub fn print() {
         textbook / step
     );
     line("the textbook version of the same", textbook, note);
+}
+
+/// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and how that compares. By itself: so many
+/// particles would empty the others' caches.
+fn out_of_sight(held: f64) -> (f64, String) {
+    let settings = Settings {
+        scene: Scene::Leaves,
+        ..Settings::default()
+    };
+    let clip = Clip::new(settings).expect("the settings are in order");
+    let frame = |index: u32| {
+        let luma = image::DynamicImage::from(clip.draw(index)).into_luma8();
+        GrayFrame::from_luma(luma.width(), luma.height(), luma.into_raw()).expect("a whole picture")
+    };
+    let mut tracker = Tracker::new(&frame(0), clip.target(0), Preset::Robust.params())
+        .expect("a box inside the frame");
+    let mut index = 1;
+    while clip.visible(index) > 0.0 {
+        tracker.step(&frame(index)).expect("frames of one size");
+        index += 1;
+    }
+    let hidden = (index..clip.frames()).take_while(|&index| clip.visible(index) == 0.0);
+    let hidden: Vec<GrayFrame> = hidden.map(frame).collect();
+    // Over and over: the search has become as wide as it gets.
+    for frame in hidden.iter().chain(&hidden) {
+        tracker.step(frame).expect("frames of one size");
+    }
+    let (mut t, mut found) = (0, 0);
+    let times = clock::medians(
+        ROUNDS,
+        vec![Box::new(|| {
+            t += 1;
+            let estimate = black_box(tracker.step(&hidden[t % hidden.len()]));
+            let status = estimate.expect("frames of one size").status;
+            found += usize::from(status != Status::Lost);
+        })],
+    );
+    let ratio = times[0] / held;
+    let note = match found {
+        0 => format!("{ratio:.1} × a step that has it"),
+        found => {
+            format!("{ratio:.1} × a step that has it, but {found} of {ROUNDS} were not `lost`")
+        }
+    };
+    (times[0], note)
 }

@@ -1,7 +1,8 @@
 //! A load generator: `cargo build --release && cargo run --release --example load -- --help`.
 //!
 //! It starts a server of its own on a free loopback port and prints, from one run:
-//! - the processor time of decoding and tracking a frame in this process, one thread, before and after each measurement;
+//! - the processor time of decoding and tracking a frame in this process, one thread, before and after each measurement: of
+//!   one session over and over, all of whose data stays in the caches, and of as many sessions as are measured, in turns;
 //! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
 //! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
 //!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
@@ -75,27 +76,40 @@ fn main() -> Outcome<()> {
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
     }
-    let mut alone = InProcess::new(pictures, target, preset)?;
+    let mut one = InProcess::new(pictures.clone(), target, preset, 1)?;
+    let mut several = InProcess::new(pictures, target, preset, options.sessions)?;
     let limit = Duration::from_secs(options.seconds);
     let mut measure = |name: &str, sessions: u32, rate: Option<f64>| -> Outcome<f64> {
         // On a machine that others use too, before and after may differ much.
-        let work_before = alone.seconds_a_frame(options.frames / 4)?;
-        let before = cpu_seconds(server.pid())?;
+        let mut work = || -> Outcome<(f64, f64)> {
+            let one = one.seconds_a_frame(options.frames / 8)?;
+            match sessions {
+                1 => Ok((one, one)),
+                _ => Ok((one, several.seconds_a_frame(options.frames / 8)?)),
+            }
+        };
+        let before = work()?;
+        let used = cpu_seconds(server.pid())?;
         let done = runtime.block_on(driver.run(sessions, options.frames, rate, limit))?;
-        let cpu = (cpu_seconds(server.pid())? - before) / done.frames as f64;
-        let work_after = alone.seconds_a_frame(options.frames / 4)?;
-        let work = (work_before + work_after) / 2.0;
+        let cpu = (cpu_seconds(server.pid())? - used) / done.frames as f64;
+        let after = work()?;
         println!(
             "{name}: {} frames, {:.0} a second",
             done.frames, done.per_second
         );
-        println!(
-            "    server {:.0} µs of processor time a frame = {:.2} × (decode + step), which took {:.0} before and {:.0} after",
-            cpu * 1e6,
-            cpu / work,
-            work_before * 1e6,
-            work_after * 1e6
-        );
+        println!("    server {:.0} µs of processor time a frame", cpu * 1e6);
+        let ratio = |what: &str, before: f64, after: f64| {
+            println!(
+                "    = {:.2} × (decode + step) of {what}, which took {:.0} before and {:.0} after",
+                cpu / (before + after) * 2.0,
+                before * 1e6,
+                after * 1e6
+            );
+        };
+        ratio("one session over and over", before.0, after.0);
+        if sessions > 1 {
+            ratio("as many sessions in turns", before.1, after.1);
+        }
         let quantile = |q| done.latencies.value_at_quantile(q) as f64 / 1e3;
         println!(
             "    latency p50 {:.1} ms, p99 {:.1} ms, p99.9 {:.1} ms, most {:.1} ms",
@@ -123,28 +137,32 @@ fn main() -> Outcome<()> {
 /// The work of a frame without a service.
 struct InProcess {
     pictures: Vec<Vec<u8>>,
-    tracker: Tracker,
+    trackers: Vec<Tracker>,
     done: usize,
 }
 
 impl InProcess {
-    fn new(pictures: Vec<Vec<u8>>, target: Rect, preset: Preset) -> Outcome<Self> {
+    fn new(pictures: Vec<Vec<u8>>, target: Rect, preset: Preset, sessions: u32) -> Outcome<Self> {
         let first = ingest::decode(&pictures[0], &Limits::default())?;
-        let mut alone = Self {
-            tracker: Tracker::new(&first, target, preset.params())?,
+        let tracker = Tracker::new(&first, target, preset.params())?;
+        let mut work = Self {
+            trackers: vec![tracker; sessions as usize],
             pictures,
             done: 0,
         };
-        alone.run(100)?;
-        Ok(alone)
+        work.run(100 * sessions)?;
+        Ok(work)
     }
 
+    /// The next picture for each session in turn.
     fn run(&mut self, frames: u32) -> Outcome<()> {
         for _ in 0..frames {
+            let sessions = self.trackers.len();
+            let picture = &self.pictures[(self.done / sessions + 1) % self.pictures.len()];
+            let frame = ingest::decode(picture, &Limits::default())?;
+            self.trackers[self.done % sessions].step(&frame)?;
+            ingest::recycle(frame);
             self.done += 1;
-            let picture = &self.pictures[self.done % self.pictures.len()];
-            self.tracker
-                .step(&ingest::decode(picture, &Limits::default())?)?;
         }
         Ok(())
     }

@@ -3,7 +3,9 @@
 use super::params::ParamFlags;
 use super::{output, progress};
 use bagtrack::eval::plots::{self, Evaluated};
-use bagtrack::eval::{self, Comparison, Report, Sequence, SequenceRuns, Variant, ablation};
+use bagtrack::eval::{
+    self, Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation,
+};
 use bagtrack::ingest::Limits;
 use bagtrack::tracker::Params;
 use std::error::Error;
@@ -26,6 +28,13 @@ pub struct Args {
     /// Threads that share the seeds of a sequence. Times (ms/frame) are honest with 1 only.
     #[arg(long, default_value = "1")]
     jobs: NonZeroUsize,
+    /// Plays each sequence from its end: the run starts at the last annotated frame.
+    #[arg(long)]
+    backwards: bool,
+    /// Passes over this share of the frames, 0 <= SHARE < 1, from the end with --backwards: the run starts at the first
+    /// annotated frame after them.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    start_at: Option<f64>,
     /// A table for people, JSON, or a table as markdown.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -48,6 +57,25 @@ enum Format {
     Markdown,
 }
 
+impl Args {
+    fn playback(&self) -> Playback {
+        Playback {
+            backwards: self.backwards,
+            start_at: self.start_at,
+        }
+    }
+}
+
+/// Reads a share of the frames.
+fn share(text: &str) -> Result<f64, String> {
+    let share: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
+    if (0.0..1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("it must be at least 0 and less than 1".to_owned())
+    }
+}
+
 /// Runs `eval`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let base = args.params.params()?;
@@ -60,7 +88,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let mut reports = Vec::new();
     for (variant, evaluated) in variants.into_iter().zip(&evaluated) {
         let report = Report::new(preset, &evaluated.runs).ok_or("none of the paths is a folder")?;
-        reports.push((variant, report));
+        reports.push((variant, report.played(args.playback())));
     }
     if !args.ablate && args.sweep.is_none() {
         let (_, report) = &reports[0];
@@ -68,6 +96,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     }
     let names = evaluated[0].runs.iter().map(|runs| runs.name.clone());
     let comparison = Comparison::new(preset, args.seeds.get(), names.collect(), &reports);
+    let comparison = comparison.played(args.playback());
     print(args.format, &comparison, Comparison::markdown)
 }
 
@@ -115,7 +144,7 @@ fn evaluate(
         .collect();
     let bar = progress::bar((dirs.len() * variants.len()) as u64, "sequences");
     for dir in dirs {
-        let sequence = Sequence::load(dir, &Limits::default())?;
+        let sequence = Sequence::load_played(dir, args.playback(), &Limits::default())?;
         let mut done: Vec<SequenceRuns> = Vec::new();
         for (index, set) in params.iter().enumerate() {
             let same = params[..index].iter().position(|before| before == set);

@@ -4,6 +4,7 @@
 mod draw;
 mod eval;
 mod health;
+mod log;
 mod output;
 mod params;
 mod progress;

@@ -1,5 +1,6 @@
 //! `bagtrack serve`: the HTTP service until SIGTERM or SIGINT.
 
+use super::log::Log;
 use bagtrack::http::{Application, Config};
 use std::error::Error;
 use std::io::IsTerminal;
@@ -28,13 +29,16 @@ enum LogFormat {
 
 /// Runs `serve`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
-    start_log(&args.log, args.log_format)?;
+    let log = start_log(&args.log, args.log_format)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(args.config.network_threads())
+        .on_thread_park(bagtrack::sessions::rested)
         .enable_all()
         .build()?;
     // Work that did not end in time does not hold up the exit: its threads end with the process.
-    runtime.block_on(serve(args.config))
+    let served = runtime.block_on(serve(args.config));
+    log.flush();
+    served
 }
 
 async fn serve(config: Config) -> Result<(), Box<dyn Error>> {
@@ -46,18 +50,19 @@ async fn serve(config: Config) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn start_log(filter: &str, format: LogFormat) -> Result<(), Box<dyn Error>> {
+fn start_log(filter: &str, format: LogFormat) -> Result<Log, Box<dyn Error>> {
     let filter = EnvFilter::try_new(filter)
         .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
+    let lines = Log::start()?;
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr);
+        .with_writer(lines.clone());
     match format {
         LogFormat::Text => log.init(),
         LogFormat::Json => log.json().init(),
     }
-    Ok(())
+    Ok(lines)
 }
 
 #[cfg(unix)]

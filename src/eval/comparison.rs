@@ -1,6 +1,7 @@
 //! Several variants on the same sequences, a row each.
 
 use super::figures::{ScoreFigures, SeedMean};
+use super::playback::Playback;
 use super::report::Report;
 use super::table::{Table, figure};
 use super::variant::{Assignment, Variant};
@@ -50,6 +51,9 @@ fn map<S: Serializer>(set: &[Assignment], serializer: S) -> Result<S::Ok, S::Err
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     preset: Preset,
+    /// None where it is the default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    playback: Option<Playback>,
     seeds: usize,
     sequences: Vec<String>,
     variants: Vec<Row>,
@@ -80,15 +84,24 @@ impl Comparison {
         };
         Self {
             preset,
+            playback: None,
             seeds,
             sequences,
             variants: variants.iter().map(row).collect(),
         }
     }
 
-    /// The table as markdown.
+    /// Tells how the sequences were played.
+    #[must_use]
+    pub fn played(mut self, playback: Playback) -> Self {
+        self.playback = playback.unusual();
+        self
+    }
+
+    /// The table as markdown, and how the sequences were played where that is unusual.
     pub fn markdown(&self) -> String {
-        self.table().markdown()
+        let note = self.playback.map(|playback| format!("\n{playback}\n"));
+        self.table().markdown() + &note.unwrap_or_default()
     }
 
     fn table(&self) -> Table {
@@ -111,6 +124,10 @@ impl Comparison {
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.table().text())
+        f.write_str(&self.table().text())?;
+        match self.playback {
+            Some(playback) => writeln!(f, "\n{playback}"),
+            None => Ok(()),
+        }
     }
 }

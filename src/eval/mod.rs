@@ -1,6 +1,6 @@
 //! Annotated sequences, error measures, runs over several seeds, and what they show.
 //!
-//! A [`Sequence`] is a folder in the OTB layout; [`run`] tracks through it once for each seed;
+//! A [`Sequence`] is a folder in the OTB layout, played [one way or another](Playback); [`run`] tracks through it once for each seed;
 //! [`Report`] holds the figures as a table or as JSON, and says how good the [score](calibration) is.
 //! [`Comparison`] sets [variants](Variant) side by side, of which the [`ablation`] is a fixed list, and [`plots`] draws
 //! them. What could go wrong: frames and annotations that do not belong together would give figures that mean nothing;
@@ -14,6 +14,7 @@ mod figures;
 pub mod frames;
 mod isotonic;
 pub mod measures;
+mod playback;
 pub mod plots;
 mod report;
 mod run;
@@ -25,6 +26,7 @@ mod variant;
 pub use comparison::Comparison;
 pub use figures::{Figures, Named, ScoreFigures, SeedMean};
 pub use isotonic::Isotonic;
+pub use playback::Playback;
 pub use report::Report;
 pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};
 pub use sequence::{Sequence, SequenceError, parse_boxes};

@@ -1,6 +1,7 @@
 //! All figures of an evaluation, as a table for people and as JSON for programs.
 
 use super::figures::{Figures, Named, ScoreFigures, SeedMean};
+use super::playback::Playback;
 use super::run::SequenceRuns;
 use super::table::{Table, figure};
 use crate::tracker::Preset;
@@ -24,6 +25,9 @@ const HEADER: [&str; 9] = [
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     preset: Preset,
+    /// None where it is the default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    playback: Option<Playback>,
     seeds: usize,
     sequences: Vec<Named>,
     mean: Figures,
@@ -39,6 +43,7 @@ impl Report {
         let seed_means = SeedMean::all(runs);
         Some(Self {
             preset,
+            playback: None,
             seeds: seed_means.len(),
             mean: Figures::over_sequences(&sequences),
             sequences,
@@ -46,6 +51,13 @@ impl Report {
             seed_means,
             score: ScoreFigures::of(runs),
         })
+    }
+
+    /// Tells how the sequences were played.
+    #[must_use]
+    pub fn played(mut self, playback: Playback) -> Self {
+        self.playback = playback.unusual();
+        self
     }
 
     /// The means over the sequences.
@@ -90,6 +102,9 @@ impl Report {
 
     fn lines(&self) -> String {
         let mut text = String::new();
+        if let Some(playback) = self.playback {
+            let _ = writeln!(text, "{playback}");
+        }
         if let Some(error) = self.mean.center_error_sem {
             let count = self.sequences.len();
             let _ = writeln!(

@@ -18,20 +18,20 @@ pub enum EvalError {
     Tracker {
         /// Name of the sequence.
         sequence: String,
-        /// Index of the frame, from 0.
+        /// Index of the frame in the order in which they are played, from 0.
         frame: usize,
         /// What the tracker says.
         source: TrackerError,
     },
     /// There is nothing to measure: the box of the first frame is given, those of others are held against.
-    #[error("{0}: the first frame and at least one more must be annotated")]
+    #[error("{0}: the first frame that is played and at least one more must be annotated")]
     NothingToScore(String),
 }
 
 /// An annotated frame of a run, held against its annotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoredFrame {
-    /// Index of the frame in the sequence, from 0; at least 1, for the first is given.
+    /// Index of the frame in the order in which they are played, from 0; at least 1, for the first is given.
     pub index: usize,
     /// Distance of the centres in pixels of the uploaded frames.
     pub center_error: f64,
@@ -55,9 +55,9 @@ pub struct SeedRun {
 pub struct SequenceRuns {
     /// Name of the sequence.
     pub name: String,
-    /// Number of frames.
+    /// Number of frames that are played.
     pub frames: usize,
-    /// Number of annotated frames, the first among them.
+    /// Number of those that are annotated, the first among them.
     pub annotated: usize,
     /// The runs with the seeds 0, 1, 2 …; at least one, all with the same frames.
     pub seeds: Vec<SeedRun>,

@@ -1,6 +1,6 @@
 //! A sequence in the OTB layout: `img/` with the frames and `groundtruth_rect.txt` with a box a line.
 
-use super::frames;
+use super::{Playback, frames};
 use crate::ingest::{self, Limits};
 use crate::tracker::{GrayFrame, Rect};
 use std::fs;
@@ -23,7 +23,7 @@ impl SequenceError {
     }
 }
 
-/// Frames with the boxes that people drew on them.
+/// Frames with the boxes that people drew on them, in the order in which they are played.
 #[derive(Debug, Clone)]
 pub struct Sequence {
     /// Name of the folder.
@@ -38,12 +38,23 @@ impl Sequence {
     /// Name of the file with the boxes.
     pub const BOXES: &'static str = "groundtruth_rect.txt";
 
-    /// Reads and decodes a sequence.
+    /// Reads and decodes a sequence, from its first frame to its last.
     ///
     /// # Errors
-    /// A missing or unreadable folder, file or frame; another number of boxes than frames; a first frame
-    /// without a box.
+    /// As [`Self::load_played`]; a first frame without a box is one.
     pub fn load(dir: &Path, limits: &Limits) -> Result<Self, SequenceError> {
+        Self::load_played(dir, Playback::default(), limits)
+    }
+
+    /// Reads and decodes the frames of a sequence that are played, in that order.
+    ///
+    /// # Errors
+    /// A missing or unreadable folder, file or frame; another number of boxes than frames; no box to start with.
+    pub fn load_played(
+        dir: &Path,
+        playback: Playback,
+        limits: &Limits,
+    ) -> Result<Self, SequenceError> {
         let refuse = |reason: String| SequenceError::new(dir, reason);
         let paths = frames::list(dir)?;
         let boxes = Self::read_boxes(dir)?;
@@ -55,11 +66,9 @@ impl Sequence {
                 Self::BOXES
             )));
         }
-        if boxes[0].is_none() {
-            return Err(refuse("the first frame is not annotated".to_owned()));
-        }
-        let mut decoded = Vec::with_capacity(paths.len());
-        for path in &paths {
+        let order = playback.order(&boxes).map_err(refuse)?;
+        let mut decoded = Vec::with_capacity(order.len());
+        for path in order.iter().map(|&index| &paths[index]) {
             let file = path.file_name().unwrap_or_default().display();
             let bytes = fs::read(path).map_err(|error| refuse(format!("{file}: {error}")))?;
             let frame = ingest::decode(&bytes, limits)
@@ -74,7 +83,7 @@ impl Sequence {
                 .to_string_lossy()
                 .into_owned(),
             frames: decoded,
-            boxes,
+            boxes: order.into_iter().map(|index| boxes[index]).collect(),
         })
     }
 

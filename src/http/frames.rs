@@ -15,6 +15,7 @@ use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
+use std::time::Instant;
 
 const FORM: Form = Form {
     settings: &[],
@@ -110,8 +111,12 @@ pub async fn post(
     } = FORM.receive(&state, request, || path.enter(&state)).await?;
     let number = upload.fields.number;
     let limits = state.config.frame_limits();
-    let (estimates, replayed) = work::on_session(&state, place, queue, move |locked| {
-        advance(locked, number, &upload.frames, &limits)
+    let is_brief = work::is_brief(place.session(), &upload.frames);
+    let (estimates, replayed) = work::on_session(&state, place, queue, is_brief, move |locked| {
+        let started = Instant::now();
+        let answered = advance(locked, number, &upload.frames, &limits);
+        locked.session().took(started.elapsed());
+        answered
     })
     .await?;
     let response = match estimates[..] {

@@ -58,6 +58,6 @@ pub async fn get(
         .map_err(|_| Problem::queue_full())?;
     let place = session.enter().map_err(|_| Problem::session_busy())?;
     let take = |locked: &mut crate::sessions::Locked| Ok(locked.state().snapshot());
-    let bytes = work::on_session(&state, place, queue, take).await?;
+    let bytes = work::on_session(&state, place, queue, false, take).await?;
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], bytes).into_response())
 }

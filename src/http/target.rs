@@ -106,7 +106,7 @@ pub async fn put(
     let target = upload.fields.target.ok_or_else(Problem::missing_box)?;
     let number = upload.fields.number;
     let limits = state.config.frame_limits();
-    let (estimate, replayed) = work::on_session(&state, place, queue, move |locked| {
+    let (estimate, replayed) = work::on_session(&state, place, queue, false, move |locked| {
         correct(locked, number, &upload.frames, target, &limits)
     })
     .await?;

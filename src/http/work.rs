@@ -6,7 +6,7 @@
 use super::problem::Problem;
 use super::state::AppState;
 use crate::ingest;
-use crate::sessions::{Locked, Place, QueuePermit};
+use crate::sessions::{Locked, Place, QueuePermit, Session};
 use crate::tracker::GrayFrame;
 use axum::body::Bytes;
 use std::sync::Arc;
@@ -25,11 +25,13 @@ where
     }
 }
 
-/// Waits for the session in order of arrival, then runs `work` with its state on a worker.
+/// Waits for the session in order of arrival, then runs `work` with its state on a worker, or where it is where it is
+/// brief.
 pub async fn on_session<T, F>(
     state: &AppState,
     place: Place,
     queue: QueuePermit,
+    is_brief: bool,
     work: F,
 ) -> Result<T, Problem>
 where
@@ -42,12 +44,27 @@ where
             .await
             .map_err(|_| Problem::session_not_found())?;
         let work = move || work(&mut locked);
-        let done = state.admission.run(queue, work).await;
+        let done = if is_brief {
+            state.admission.run_brief(queue, work).await
+        } else {
+            state.admission.run(queue, work).await
+        };
         done.map_err(|lost| Problem::internal(Arc::new(lost)))?
     };
     timeout(state.config.work_timeout, waiting)
         .await
         .map_err(|_| Problem::work_timeout())?
+}
+
+/// Whether these frames, the next of the session, are work of a few milliseconds at most: one plain frame of the session's size,
+/// where the last one was so, too.
+pub fn is_brief(session: &Session, frames: &[Bytes]) -> bool {
+    let [frame] = frames else { return false };
+    let (width, height) = session.source_size();
+    let size = session.is_brief().then(|| ingest::plain_size(frame));
+    // As stored: its sides may have to change places.
+    size.flatten()
+        .is_some_and(|size| [(width, height), (height, width)].contains(&size))
 }
 
 /// Decodes the frames of a request: all of them, or the problem of the first bad one.

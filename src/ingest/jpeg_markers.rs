@@ -226,7 +226,7 @@ impl FrameHeader {
 }
 
 /// The next marker's code, at or after `at`, and where its segment begins. Fill bytes are skipped.
-fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
+pub(super) fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
     loop {
         at += memchr(0xFF, bytes.get(at..)?)?;
         at += bytes[at..].iter().position(|&byte| byte != 0xFF)?;

@@ -28,12 +28,14 @@ mod limits;
 mod luma;
 mod orientation;
 mod picture;
+mod plain;
 mod raster;
 mod sniff;
 #[cfg(feature = "turbo")]
 mod turbo;
 
 pub use limits::Limits;
+pub use plain::plain_size;
 
 use crate::tracker::GrayFrame;
 use picture::Room;

@@ -3,8 +3,10 @@
 //! A request first takes a place in the queue (refused at once when it is full) and the room for its body,
 //! since bodies are what requests in the queue cost; then it waits for a worker. Both permits move into the blocking work itself: a request that times out or whose client
 //! goes away does not stop work that has begun, so its permits stay taken until that work has ended, and
-//! the number of threads at work is never more than the number of workers.
+//! the number of threads at work is never more than the number of workers. Brief work may be done by the thread that
+//! asks for it, in place of a worker and with its permit.
 
+use super::here;
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -50,6 +52,8 @@ pub struct Admission {
     queue: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
     workers: Arc<Semaphore>,
+    /// How many workers there are.
+    most: usize,
     threads: Arc<Workers>,
 }
 
@@ -61,6 +65,7 @@ impl Admission {
             queue: Arc::new(Semaphore::new(queue)),
             bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(UNIT))),
             workers: Arc::new(Semaphore::new(workers)),
+            most: workers,
             threads: Arc::new(Workers::new(workers)),
         }
     }
@@ -81,6 +86,28 @@ impl Admission {
         }
     }
 
+    /// Like [`Self::run`], for work that takes a few milliseconds at most: where no worker is busy, and this thread [takes
+    /// such work](super::rested), it is done here and now.
+    ///
+    /// # Errors
+    /// The work panicked, or there was no thread for it.
+    pub async fn run_brief<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
+    where
+        T: Send + 'static,
+        F: FnOnce() -> T + Send + 'static,
+    {
+        let all_are_free = self.free_workers() == self.most;
+        match self.workers.clone().try_acquire_owned() {
+            Ok(worker) if all_are_free && here::takes_work() => {
+                let outcome = catch_unwind(AssertUnwindSafe(work));
+                drop((queue, worker));
+                outcome.map_err(|panic| WorkLost::of(panic.as_ref()))
+            }
+            Ok(worker) => self.hand_over((queue, worker), work).await,
+            Err(_) => self.run(queue, work).await,
+        }
+    }
+
     /// Waits for a worker, in order of arrival, and runs `work` on its thread. Dropping the future
     /// before a worker is free cancels the work; afterwards it runs to its end, holding its permits.
     ///
@@ -93,10 +120,21 @@ impl Admission {
     {
         let acquired = self.workers.clone().acquire_owned().await;
         let worker = acquired.expect("the semaphore is never closed");
+        self.hand_over((queue, worker), work).await
+    }
+
+    async fn hand_over<T, F>(
+        &self,
+        permits: (QueuePermit, OwnedSemaphorePermit),
+        work: F,
+    ) -> Result<T, WorkLost>
+    where
+        T: Send + 'static,
+        F: FnOnce() -> T + Send + 'static,
+    {
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         self.threads.start(Box::new(move || {
-            let permits = (queue, worker);
             // `work` is used up by a panic, so nobody sees what it left half changed.
             let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
             drop(permits);
@@ -170,6 +208,33 @@ mod tests {
         let free = admission.workers.acquire().await.unwrap();
         drop(free);
         assert_eq!(admission.free_workers(), 1);
+    }
+
+    #[tokio::test]
+    async fn brief_work_is_done_here_where_no_worker_is_busy_and_the_thread_takes_it() {
+        let admission = Admission::new(9, 5000, 2);
+        let brief = async || {
+            let queue = admission.enter(0).unwrap();
+            let done = admission.run_brief(queue, || std::thread::current().id());
+            done.await.unwrap()
+        };
+        let here = std::thread::current().id();
+        assert_ne!(brief().await, here);
+        here::rested();
+        assert_eq!(brief().await, here);
+        assert_ne!(brief().await, here);
+        here::rested();
+        let busy = admission.workers.clone().acquire_owned().await.unwrap();
+        assert_ne!(brief().await, here);
+        let busy = (
+            busy,
+            admission.workers.clone().acquire_owned().await.unwrap(),
+        );
+        let waiting = tokio::time::timeout(std::time::Duration::ZERO, brief());
+        assert!(waiting.await.is_err());
+        drop(busy);
+        assert_eq!(brief().await, here);
+        assert_eq!((admission.queue_places(), admission.free_workers()), (9, 2));
     }
 
     #[tokio::test]

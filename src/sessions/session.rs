@@ -14,6 +14,9 @@ use std::time::Duration;
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, OwnedSemaphorePermit, Semaphore};
 use uuid::Uuid;
 
+/// A frame that took no longer than this is brief work.
+const BRIEF: Duration = Duration::from_millis(4);
+
 /// All places at the session are taken; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("too many requests wait for the session")]
@@ -142,6 +145,8 @@ pub struct Session {
     latest: Mutex<Estimate>,
     clock: Clock,
     last_used_ms: AtomicU64,
+    /// Whether the last frame took little time; not known before there was one.
+    brief: AtomicBool,
     closed: AtomicBool,
 }
 
@@ -157,6 +162,7 @@ impl Session {
             max_places,
             clock,
             last_used_ms: AtomicU64::new(0),
+            brief: AtomicBool::new(false),
             closed: AtomicBool::new(false),
         };
         session.touch();
@@ -192,6 +198,16 @@ impl Session {
     pub fn touch(&self) {
         let now = u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX);
         self.last_used_ms.fetch_max(now, Ordering::Relaxed);
+    }
+
+    /// Tells how long the work of the last frame took.
+    pub fn took(&self, time: Duration) {
+        self.brief.store(time <= BRIEF, Ordering::Relaxed);
+    }
+
+    /// Whether the next frame, if it is like the last one, takes a few milliseconds at most.
+    pub fn is_brief(&self) -> bool {
+        self.brief.load(Ordering::Relaxed)
     }
 
     /// Whether a request is at the session.

@@ -1,6 +1,10 @@
 //! The program itself: `bagtrack serve`, `bagtrack health`, SIGTERM.
 #![cfg(unix)]
 
+use crate::application::BOX;
+use crate::pictures;
+use image::ImageFormat;
+use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Output, Stdio};
 
@@ -53,6 +57,60 @@ fn serves_answers_health_and_ends_on_sigterm() {
         "{line}"
     );
     assert_eq!(line.lines().count(), 1);
+}
+
+#[test]
+fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
+    let mut command = bagtrack();
+    command.args(["serve", "--log-format", "json"]);
+    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let log = BufReader::new(child.stderr.take().unwrap()).lines();
+    let mut messages = Vec::new();
+    for line in log {
+        let line: Value = serde_json::from_str(&line.unwrap()).unwrap();
+        let message = line["fields"]["message"].as_str().unwrap_or("").to_owned();
+        if let Some(url) = message.strip_prefix("listening on ") {
+            for _ in 0..3 {
+                assert!(health(url).status.success());
+            }
+            let ended = Command::new("kill").arg(child.id().to_string()).status();
+            assert!(ended.unwrap().success());
+        }
+        messages.push(message);
+    }
+    assert!(child.wait().unwrap().success());
+    let answered = messages.iter().filter(|message| *message == "answered");
+    assert_eq!(answered.count(), 3, "{messages:?}");
+    assert_eq!(messages.last().unwrap(), "bye");
+}
+
+/// Frames that come one by one may be tracked where they are read, several in one post never are.
+#[tokio::test]
+async fn frames_one_by_one_get_the_answers_of_frames_together() {
+    let (mut child, url) = serve();
+    let client = reqwest::Client::new();
+    let jpeg = |t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg);
+    let open = async || {
+        let create = format!("{url}/sessions?box={BOX}&seed=7");
+        let created = client.post(create).body(jpeg(0)).send().await.unwrap();
+        let created: Value = created.json().await.unwrap();
+        format!("{url}/sessions/{}/frames", created["id"].as_str().unwrap())
+    };
+    let (one_by_one, together) = (open().await, open().await);
+    let mut answers = Vec::new();
+    let mut form = reqwest::multipart::Form::new();
+    for t in 1..=20 {
+        let answer = client.post(&one_by_one).body(jpeg(t)).send().await.unwrap();
+        answers.push(answer.json::<Value>().await.unwrap());
+        let part = reqwest::multipart::Part::bytes(jpeg(t)).file_name("frame.jpg");
+        form = form.part("frame", part);
+    }
+    let all = client.post(&together).multipart(form).send().await.unwrap();
+    let all: Value = all.json().await.unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(all["answers"], Value::from(answers));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! How all figures look.
 
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
@@ -22,11 +23,11 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(70, 70, 70),
 ];
 
-const INK: RGBColor = RGBColor(40, 40, 40);
+pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
-const FONT: &str = "sans-serif";
-const MARGIN: u32 = 14;
-const TITLE: u32 = 42;
+pub(super) const FONT: &str = "sans-serif";
+pub(super) const MARGIN: u32 = 14;
+pub(super) const TITLE: u32 = 42;
 const LEGEND_LINE: u32 = 22;
 const LEGEND_GAP: u32 = 10;
 
@@ -86,26 +87,51 @@ pub(super) fn figure(
             .x_label_area_size(48)
             .y_label_area_size(58)
             .build_cartesian_2d(0.0..plane.x, 0.0..plane.y)?;
-        let small = (FONT, 16).into_font().color(&INK);
-        chart
-            .configure_mesh()
-            .bold_line_style(GRID)
-            .light_line_style(TRANSPARENT)
-            .axis_style(INK)
-            .x_desc(labels.x)
-            .y_desc(labels.y)
-            .axis_desc_style(small.clone())
-            .label_style(small)
-            .x_labels(plane.marks.0)
-            .y_labels(plane.marks.1)
-            .x_label_formatter(&|x| format!("{x:.*}", plane.digits.0))
-            .y_label_formatter(&|y| format!("{y:.*}", plane.digits.1))
-            .draw()?;
+        axes(
+            &mut chart,
+            (labels.x, labels.y),
+            plane.marks,
+            (&|x| format!("{x:.*}", plane.digits.0), &|y| {
+                format!("{y:.*}", plane.digits.1)
+            }),
+        )?;
         curves(&mut chart)?;
         legend_below(&foot, &labels.legend)?;
         root.present()?;
     }
     Ok(svg)
+}
+
+/// How a number beside an axis is written.
+pub(super) type Number<'a> = &'a dyn Fn(&f64) -> String;
+
+/// Draws the axes of a chart with these descriptions, about so many marks, and numbers written like this (x, y).
+pub(super) fn axes<X, Y>(
+    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
+    descriptions: (&str, &str),
+    marks: (usize, usize),
+    numbers: (Number<'_>, Number<'_>),
+) -> Result<(), Box<dyn std::error::Error>>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let small = (FONT, 16).into_font().color(&INK);
+    chart
+        .configure_mesh()
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(INK)
+        .x_desc(descriptions.0)
+        .y_desc(descriptions.1)
+        .axis_desc_style(small.clone())
+        .label_style(small)
+        .x_labels(marks.0)
+        .y_labels(marks.1)
+        .x_label_formatter(&numbers.0)
+        .y_label_formatter(&numbers.1)
+        .draw()?;
+    Ok(())
 }
 
 fn legend_below(area: &Area<'_>, lines: &[String]) -> Result<(), Box<dyn std::error::Error>> {
