@@ -44,7 +44,7 @@ pub fn print() {
     let left = DMatrix::from_fn(columns, len, |i, j| (i * 31 + j * 7) as f32 % 13.0);
     let right = DMatrix::from_fn(len, rows, |i, j| (i * 17 + j * 5) as f32 % 11.0);
     let mut product = DMatrix::zeros(columns, rows);
-    let (left_double, right_double) = (left.cast::<f64>(), right.cast::<f64>());
+    let (left_double, right_double) = (left.clone().cast::<f64>(), right.clone().cast::<f64>());
     let mut product_double = DMatrix::zeros(columns, rows);
 
     let (mut t, mut u) = (0, 0);

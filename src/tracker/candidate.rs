@@ -77,10 +77,10 @@ impl CandidateBases {
                     element[lane] = a[lane] * b[lane] * scale[lane];
                 }
             }
-            if i < last {
+            if let Some(eigenvalue) = eigenvalues[..last].get(i) {
                 let element = &mut self.matrix[i * size + i];
                 for lane in 0..ABREAST {
-                    element[lane] += eigenvalues[i] * scale[lane];
+                    element[lane] += eigenvalue * scale[lane];
                 }
             }
         }

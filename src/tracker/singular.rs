@@ -94,8 +94,8 @@ fn rotate<const N: usize>(columns: &mut Columns<N>, p: usize, q: usize) -> bool 
         cosine[lane] = first * (1.5 - (0.5 + 0.5 * square) * first * first);
         sine[lane] = tangent * cosine[lane];
     }
-    for i in 0..N {
-        let (x, y) = (columns[p][i], columns[q][i]);
+    let (first, second) = (columns[p], columns[q]);
+    for (i, (x, y)) in first.iter().zip(&second).enumerate() {
         for lane in 0..ABREAST {
             columns[p][i][lane] = cosine[lane] * x[lane] - sine[lane] * y[lane];
             columns[q][i][lane] = sine[lane] * x[lane] + cosine[lane] * y[lane];
@@ -193,9 +193,9 @@ mod tests {
                 .collect();
             let mut columns: Columns<N> = [[[0.0; ABREAST]; N]; N];
             for (lane, matrix) in matrices.iter().enumerate() {
-                for j in 0..N {
-                    for i in 0..N {
-                        columns[j][i][lane] = matrix[(i, j)] as f32;
+                for (j, column) in columns.iter_mut().enumerate() {
+                    for (i, value) in column.iter_mut().enumerate() {
+                        value[lane] = matrix[(i, j)] as f32;
                     }
                 }
             }

@@ -71,7 +71,7 @@ pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
 pub fn leaping(t: usize) -> (GrayFrame, Rect) {
     let (hills, _) = panned(0, (0, 0));
     let [(left, top), (next_left, next_top)] = [(88, 68), (122, 46)];
-    let (left, top) = if t / 5 % 2 == 0 {
+    let (left, top) = if (t / 5).is_multiple_of(2) {
         (left, top)
     } else {
         (next_left, next_top)
@@ -172,7 +172,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each mend of the preset `robust`, switched off.
-const MENDS_OFF: [(&str, Change); 13] = [
+const MENDS_OFF: [(&str, Change); 14] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
