@@ -4,8 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::energies::Energies;
 use super::gradients::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, Place, registers};
-use super::kernel::Element;
-use super::{Params, Rect, sums};
+use super::{Params, Rect};
 
 /// Values of a cell: the directions, then its gray value.
 pub(super) const CHANNELS: usize = DIRECTIONS + 1;
@@ -179,7 +178,7 @@ impl Cells {
                 left = right;
             }
         }
-        self.sum_squares(simd);
+        self.energies.take(simd, &self.squares);
         let gray = |sums: [S::f32s; LANES]| {
             let mut lanes = Lanes::ZERO;
             lanes
@@ -190,21 +189,6 @@ impl Cells {
         Grays {
             sum: gray(total),
             squares: gray(squares),
-        }
-    }
-
-    /// The energies, from the squares of the directions.
-    #[inline(always)]
-    fn sum_squares<S: Simd>(&mut self, simd: S) {
-        let squares = S::as_simd_f32s(&self.squares).0.as_chunks().0;
-        let energies = self.energies.values_mut().as_chunks_mut().0;
-        let together = sums::can_sum::<S, f32>(simd);
-        for (squares, energies) in squares.iter().zip(energies) {
-            *energies = if together {
-                f32::sum_each(simd, *squares)
-            } else {
-                squares.map(|squares| simd.reduce_sum_f32s(squares))
-            };
         }
     }
 

@@ -3,7 +3,11 @@
 //! The energy of a cell is the sum of the squares of its directions. Each cell is brought to a scale by the root of the
 //! mean energy of the 3 x 3 cells around it, so that contrast is taken out where it is.
 
+use pulp::Simd;
+
 use super::gradients::LANES;
+use super::kernel::Element;
+use super::sums;
 
 /// Cells of a row that are worked on together.
 const GROUP: usize = 8;
@@ -48,10 +52,20 @@ impl Energies {
         self.row_shares.extend((0..rows).map(|j| share(j, rows)));
     }
 
-    /// The energies, row by row, to be written; and some more.
+    /// Takes the energies, from the squares of the directions of each cell: a register of this machine each, row by row, and
+    /// some more up to a whole number of groups.
     #[inline(always)]
-    pub fn values_mut(&mut self) -> &mut [f32] {
-        &mut self.values
+    pub fn take<S: Simd>(&mut self, simd: S, squares: &[f32]) {
+        let squares = S::as_simd_f32s(squares).0.as_chunks().0;
+        let energies = self.values.as_chunks_mut().0;
+        let together = sums::can_sum::<S, f32>(simd);
+        for (squares, energies) in squares.iter().zip(energies) {
+            *energies = if together {
+                f32::sum_each(simd, *squares)
+            } else {
+                squares.map(|squares| simd.reduce_sum_f32s(squares))
+            };
+        }
     }
 
     /// What the directions of each cell are multiplied by, a row after the other: one over three times the root of the
@@ -125,10 +139,7 @@ mod tests {
             let energy = |i: usize| (i * 37 % 23) as f32;
             let mut energies = Energies::default();
             energies.prepare(columns, rows);
-            for (i, value) in energies.values_mut()[..columns * rows]
-                .iter_mut()
-                .enumerate()
-            {
+            for (i, value) in energies.values[..columns * rows].iter_mut().enumerate() {
                 *value = energy(i);
             }
             for (j, found) in energies.scales(5.0).enumerate() {
