@@ -71,8 +71,8 @@ const PAPER: Params = Params {
 
 /// The paper's α, σ, n, K and W stay.
 const ROBUST: Params = Params {
-    // As many wide as narrow. With every place looked at beforehand, 200 find the target no better.
-    particles: 120,
+    // As many wide as narrow. With fewer a target that is half covered is lost for good by more seeds.
+    particles: 200,
     // Cells, not pixels.
     patch_width: 8,
     patch_height: 8,

@@ -282,7 +282,7 @@ mod tests {
             sought.most()
         };
         let robust = Preset::Robust.params();
-        assert_eq!(most(&robust), 300);
+        assert_eq!(most(&robust), 500);
         let large = |particles, side, background_samples| Params {
             particles,
             patch_width: side,
