@@ -3,36 +3,28 @@
 //! A window's directions are as they are on the grid, so their products with the weights are a correlation. Its gray
 //! values have its own mean taken off and are divided by its own deviation; both follow from sums, as does the length
 //! that the discriminant divides by ([`examples`](super::examples)).
+//!
+//! Windows side by side are worked on together, one a lane: so each channel of the grid is brought into a line of its own
+//! first ([`planes`](super::planes)).
 
 use pulp::{Arch, Simd, WithSimd};
 
 use super::cells::{CHANNELS, LEAST_CONTRAST};
 use super::discriminant::Discriminant;
-use super::gradients::DIRECTIONS;
+use super::gradients::{DIRECTIONS, GRAY, Lanes};
+use super::planes::{Planes, load};
 use super::view::Grid;
-use super::{Params, comparison, matrix, scan};
+use super::{Params, matrix};
 
-/// Windows whose sums are in registers at a time.
-const GROUP: usize = 4;
+/// Rows of windows whose sums are in registers at a time.
+const ROWS: usize = 4;
 /// What is left of a squared length below this share of it is rounding, as for examples.
 const LEAST_LEFT: f32 = 1e-6;
 
 /// Room for the scores of a grid.
 #[derive(Debug, Default)]
 pub(super) struct Windows {
-    /// The energies of the cells' directions.
-    energies: Vec<f32>,
-    sums: Sums,
-}
-
-/// For each window of a row a sum over its cells.
-#[derive(Debug, Default)]
-struct Sums {
-    energies: Vec<f32>,
-    grays: Vec<f32>,
-    squares: Vec<f32>,
-    of_weights: Vec<f32>,
-    of_origin: Vec<f32>,
+    planes: Planes,
 }
 
 /// [`Windows::scores`], to be compiled for the instructions that this machine has.
@@ -50,50 +42,31 @@ impl WithSimd for Scores<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            windows: Windows { energies, sums },
-            grid,
-            discriminant,
-            params,
-            cell_pixels,
-            out,
-        } = self;
-        let (width, height) = (params.patch_width as usize, params.patch_height as usize);
-        let columns = grid.columns + 1 - width;
-        comparison::empty(energies, grid.grays.capacity());
-        energies.extend(grid.values.as_chunks::<CHANNELS>().0.iter().map(|cell| {
-            let directions = cell[..DIRECTIONS].iter();
-            directions.map(|value| value * value).sum::<f32>()
-        }));
-        let (weights, origin) = (discriminant.weights(), discriminant.origin());
-        let grays = |vector: &[f32]| -> f32 {
-            let cells = vector.as_chunks::<CHANNELS>().0.iter();
-            cells.map(|cell| cell[DIRECTIONS]).sum()
-        };
-        let (gray_weights, gray_origin) = (grays(weights), grays(origin));
-        let origin_score = matrix::dot(weights, origin);
-        let origin_square = matrix::dot(origin, origin);
-        let count = (width * height) as f32;
-        let least_deviation = LEAST_CONTRAST * cell_pixels;
-        for (j, row) in out.chunks_exact_mut(columns).enumerate() {
-            sums.take(grid, energies, j, (width, height), weights, origin);
-            for first in (0..columns).step_by(GROUP) {
-                let windows = correlate(simd, grid, (first, j), height, weights, origin);
-                for (i, window) in (first..columns).zip(windows) {
-                    // The gray values of an area have its own mean and deviation.
-                    let mean = sums.grays[i] / count;
-                    let variance = (sums.squares[i] / count - mean * mean).max(0.0);
-                    let scale = params.gray_weight as f32 / variance.sqrt().max(least_deviation);
-                    let of_weights = window[0] + scale * (sums.of_weights[i] - mean * gray_weights);
-                    let of_origin = window[1] + scale * (sums.of_origin[i] - mean * gray_origin);
-                    let square = sums.energies[i] + scale * scale * variance * count;
-                    let left = square + origin_square - 2.0 * of_origin;
-                    let is_left = left > (square + origin_square) * LEAST_LEFT;
-                    row[i] = if is_left {
-                        (of_weights - origin_score) / left.sqrt()
-                    } else {
-                        0.0
-                    };
+        let size = (
+            self.params.patch_width as usize,
+            self.params.patch_height as usize,
+        );
+        let planes = &mut self.windows.planes;
+        planes.take(self.grid, size);
+        let scorer = Scorer::new(self.discriminant, self.params, self.cell_pixels);
+        let columns = self.grid.columns + 1 - size.0;
+        let last = self.out.len() / columns - 1;
+        for (block, rows) in self.out.chunks_mut(ROWS * columns).enumerate() {
+            // A block at the end has the last row more than once.
+            let mut places = [last; ROWS];
+            for (row, place) in places.iter_mut().enumerate() {
+                *place = last.min(block * ROWS + row);
+            }
+            for first in (0..columns).step_by(S::F32_LANES) {
+                let products = correlate(simd, planes, (first, places), size, self.discriminant);
+                let rows = rows.chunks_mut(columns).zip(places).zip(products);
+                for ((row, j), products) in rows {
+                    let boxes = planes.boxes(simd, (first, j), size.1);
+                    let mut scores = Lanes::ZERO;
+                    scores.load_mut::<S>()[0] = scorer.score(simd, products, boxes);
+                    for (out, score) in row[first..].iter_mut().zip(&scores.0[..S::F32_LANES]) {
+                        *out = *score;
+                    }
                 }
             }
         }
@@ -122,100 +95,150 @@ impl Windows {
     }
 }
 
-/// The products of the directions of [`GROUP`] windows, the first at (`i`, `j`), with the weights and the origin. Of
-/// windows that are not on the grid they mean nothing.
+/// The products of windows with the weights and with the origin, one window a lane.
+#[derive(Clone, Copy)]
+struct Products<S: Simd> {
+    /// Of the directions.
+    directions: [S::f32s; 2],
+    /// Of the gray values as they are on the grid.
+    grays: [S::f32s; 2],
+}
+
+/// The products of the windows from column `first` on in each of `rows`. Of windows that are not on the grid they mean
+/// nothing.
 #[inline(always)]
 fn correlate<S: Simd>(
     simd: S,
-    grid: &Grid,
-    (i, j): (usize, usize),
-    height: usize,
-    weights: &[f32],
-    origin: &[f32],
-) -> [[f32; 2]; GROUP] {
-    let stride = grid.columns * CHANNELS;
-    let row_len = weights.len() / height;
-    let most = stride - row_len;
-    let mut registers = [[simd.splat_f32s(0.0); 2]; GROUP];
-    let mut rests = [[0.0; 2]; GROUP];
-    for r in 0..height {
-        let cells = &grid.values[(j + r) * stride..][..stride];
-        let (weights, weights_rest) = S::as_simd_f32s(&weights[r * row_len..][..row_len]);
-        let (origin, origin_rest) = S::as_simd_f32s(&origin[r * row_len..][..row_len]);
-        for (window, (sums, rests)) in registers.iter_mut().zip(&mut rests).enumerate() {
-            let first = ((i + window) * CHANNELS).min(most);
-            let (cells, cells_rest) = S::as_simd_f32s(&cells[first..][..row_len]);
-            for ((&cell, &weight), &origin) in cells.iter().zip(weights).zip(origin) {
-                sums[0] = simd.mul_add_f32s(cell, weight, sums[0]);
-                sums[1] = simd.mul_add_f32s(cell, origin, sums[1]);
+    planes: &Planes,
+    (first, rows): (usize, [usize; ROWS]),
+    (width, height): (usize, usize),
+    discriminant: &Discriminant,
+) -> [Products<S>; ROWS] {
+    let row_len = width * CHANNELS;
+    let weights = discriminant.weights().chunks_exact(row_len);
+    let origin = discriminant.origin().chunks_exact(row_len);
+    let mut directions = [[simd.splat_f32s(0.0); 2]; ROWS];
+    for (r, of) in weights.clone().zip(origin.clone()).enumerate() {
+        for channel in 0..DIRECTIONS {
+            let mut lines = [&[][..]; ROWS];
+            for (line, row) in lines.iter_mut().zip(rows) {
+                *line = planes.line((first, row + r), channel);
             }
-            let shared = cells_rest.iter().zip(weights_rest).zip(origin_rest);
-            for ((cell, weight), origin) in shared {
-                rests[0] += cell * weight;
-                rests[1] += cell * origin;
-            }
+            add_products(simd, lines, of, channel, &mut directions);
         }
     }
-    let mut sums = rests;
-    for (sums, registers) in sums.iter_mut().zip(registers) {
-        for (sum, register) in sums.iter_mut().zip(registers) {
-            *sum += simd.reduce_sum_f32s(register);
+    let mut grays = [[simd.splat_f32s(0.0); 2]; ROWS];
+    for (r, of) in weights.zip(origin).enumerate() {
+        let mut lines = [&[][..]; ROWS];
+        for (line, row) in lines.iter_mut().zip(rows) {
+            *line = planes.line((first, row + r), GRAY);
         }
+        add_products(simd, lines, of, GRAY, &mut grays);
     }
-    sums
+    let mut products = [Products {
+        directions: directions[0],
+        grays: grays[0],
+    }; ROWS];
+    for (products, (directions, grays)) in products.iter_mut().zip(directions.iter().zip(&grays)) {
+        (products.directions, products.grays) = (*directions, *grays);
+    }
+    products
 }
 
-impl Sums {
-    /// Sums up the windows of row `j` of `grid`, `width` x `height` cells each.
+/// Adds the products of a channel of a row of cells, for windows from the beginning of each of `lines` on.
+#[inline(always)]
+fn add_products<S: Simd>(
+    simd: S,
+    lines: [&[f32]; ROWS],
+    (weights, origin): (&[f32], &[f32]),
+    channel: usize,
+    sums: &mut [[S::f32s; 2]; ROWS],
+) {
+    let weights = weights.as_chunks::<CHANNELS>().0;
+    let origin = origin.as_chunks::<CHANNELS>().0;
+    for (c, (weights, origin)) in weights.iter().zip(origin).enumerate() {
+        let weight = simd.splat_f32s(weights[channel]);
+        let origin = simd.splat_f32s(origin[channel]);
+        for row in 0..ROWS {
+            let values = load::<S>(&lines[row][c..]);
+            sums[row][0] = simd.mul_add_e_f32s(values, weight, sums[row][0]);
+            sums[row][1] = simd.mul_add_e_f32s(values, origin, sums[row][1]);
+        }
+    }
+}
+
+/// What scores are made with, beside the sums over windows.
+struct Scorer {
+    /// The sums of the gray channel of the weights and of the origin.
+    grays: [f32; 2],
+    /// w · origin and ‖origin‖².
+    origin_score: f32,
+    origin_square: f32,
+    /// Cells of a window.
+    count: f32,
+    gray_weight: f32,
+    least_deviation: f32,
+}
+
+impl Scorer {
     #[inline(always)]
-    fn take(
-        &mut self,
-        grid: &Grid,
-        energies: &[f32],
-        j: usize,
-        (width, height): (usize, usize),
-        weights: &[f32],
-        origin: &[f32],
-    ) {
-        let columns = grid.columns + 1 - width;
-        for sums in [
-            &mut self.energies,
-            &mut self.grays,
-            &mut self.squares,
-            &mut self.of_weights,
-            &mut self.of_origin,
-        ] {
-            comparison::empty(sums, 2 * scan::MOST_AWAY + 1);
-            sums.resize(columns, 0.0);
+    fn new(discriminant: &Discriminant, params: &Params, cell_pixels: f32) -> Self {
+        let (weights, origin) = (discriminant.weights(), discriminant.origin());
+        let grays = |vector: &[f32]| -> f32 {
+            let cells = vector.as_chunks::<CHANNELS>().0.iter();
+            cells.map(|cell| cell[GRAY]).sum()
+        };
+        Self {
+            grays: [grays(weights), grays(origin)],
+            origin_score: matrix::dot(weights, origin),
+            origin_square: matrix::dot(origin, origin),
+            count: (weights.len() / CHANNELS) as f32,
+            gray_weight: params.gray_weight as f32,
+            least_deviation: LEAST_CONTRAST * cell_pixels,
         }
-        for r in 0..height {
-            for c in 0..width {
-                let gray = (r * width + c) * CHANNELS + DIRECTIONS;
-                let (weight, origin) = (weights[gray], origin[gray]);
-                let at = (j + r) * grid.columns + c;
-                let cells = grid.grays[at..][..columns].iter();
-                let cells = cells.zip(&energies[at..][..columns]);
-                let sums = self.energies[..columns].iter_mut();
-                let sums = sums.zip(&mut self.grays[..columns]);
-                let sums = sums.zip(&mut self.squares[..columns]);
-                let sums = sums.zip(&mut self.of_weights[..columns]);
-                let sums = sums.zip(&mut self.of_origin[..columns]);
-                for (((((energy, gray), square), of_weight), of_origin), (value, more)) in
-                    sums.zip(cells)
-                {
-                    *energy += more;
-                    *gray += value;
-                    *square += value * value;
-                    *of_weight += weight * value;
-                    *of_origin += origin * value;
-                }
-            }
+    }
+
+    /// The scores of windows, from their products and their sums of energies, gray values and squares of these.
+    #[inline(always)]
+    fn score<S: Simd>(
+        &self,
+        simd: S,
+        products: Products<S>,
+        [energy, gray, square]: [S::f32s; 3],
+    ) -> S::f32s {
+        let zero = simd.splat_f32s(0.0);
+        let (count, share) = (
+            simd.splat_f32s(self.count),
+            simd.splat_f32s(1.0 / self.count),
+        );
+        // The gray values of an area have its own mean and deviation.
+        let mean = simd.mul_f32s(gray, share);
+        let variance = simd.sub_f32s(simd.mul_f32s(square, share), simd.mul_f32s(mean, mean));
+        let variance = simd.max_f32s(variance, zero);
+        let least_deviation = simd.splat_f32s(self.least_deviation);
+        let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
+        let scale = simd.div_f32s(simd.splat_f32s(self.gray_weight), deviation);
+        let mut whole = products.directions;
+        for of in 0..2 {
+            let shift = simd.mul_f32s(mean, simd.splat_f32s(self.grays[of]));
+            let grays = simd.sub_f32s(products.grays[of], shift);
+            whole[of] = simd.mul_add_e_f32s(scale, grays, whole[of]);
         }
+        let [of_weights, of_origin] = whole;
+        let contrast = simd.mul_f32s(simd.mul_f32s(scale, scale), variance);
+        let square = simd.mul_add_e_f32s(contrast, count, energy);
+        let both = simd.add_f32s(square, simd.splat_f32s(self.origin_square));
+        let left = simd.sub_f32s(both, simd.add_f32s(of_origin, of_origin));
+        let is_left = simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(LEAST_LEFT)), left);
+        let above = simd.sub_f32s(of_weights, simd.splat_f32s(self.origin_score));
+        let score = simd.div_f32s(above, simd.sqrt_f32s(left));
+        simd.select_f32s(is_left, score, zero)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::scan;
     use super::*;
     use crate::tracker::motion::{Particle, Reach};
     use crate::tracker::view::View;
