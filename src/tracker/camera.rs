@@ -13,6 +13,8 @@ use super::GrayFrame;
 pub(super) const FURTHEST: usize = 48;
 /// A shift must fit this much better than none.
 const BETTER: f32 = 0.7;
+/// Parts of a sum, so that no addition waits for the last one.
+const PARTS: usize = 4;
 
 /// The profiles of the last frame.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -46,8 +48,8 @@ impl WithSimd for Shift<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
-        shift(self.before, self.after)
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        shift(simd, self.before, self.after)
     }
 }
 
@@ -73,11 +75,24 @@ impl Camera {
         self.columns.clear();
         self.columns.resize(width, 0.0);
         self.rows.clear();
-        for row in frame.pixels().chunks_exact(width) {
+        let mut bands = frame.pixels().chunks_exact(4 * width);
+        for band in &mut bands {
+            let (upper, lower) = band.split_at(2 * width);
+            let (upper, lower) = (upper.split_at(width), lower.split_at(width));
+            let upper = upper.0.iter().zip(upper.1);
+            let lower = lower.0.iter().zip(lower.1);
             // Sums of gray values of a frame are below 2^24, so exact in single precision.
+            for ((column, (&a, &b)), (&c, &d)) in self.columns.iter_mut().zip(upper).zip(lower) {
+                let sum = u16::from(a) + u16::from(b) + u16::from(c) + u16::from(d);
+                *column += f32::from(sum);
+            }
+        }
+        for row in bands.remainder().chunks_exact(width) {
             for (column, &gray) in self.columns.iter_mut().zip(row) {
                 *column += f32::from(gray);
             }
+        }
+        for row in frame.pixels().chunks_exact(width) {
             let sum: u32 = row.iter().map(|&gray| u32::from(gray)).sum();
             self.rows.push(sum as f32 / width as f32);
         }
@@ -106,25 +121,42 @@ impl Camera {
     }
 }
 
-/// The mean of a function of pairs, in eight parts so that the loop vectorises.
+/// The mean of after - before - `light`, as it is or without its sign.
 #[inline(always)]
-fn mean(after: &[f32], before: &[f32], of: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut parts = [0.0_f32; 8];
-    let (after_chunks, after_rest) = after.as_chunks::<8>();
-    let (before_chunks, before_rest) = before.as_chunks::<8>();
-    for (after, before) in after_chunks.iter().zip(before_chunks) {
-        for lane in 0..8 {
-            parts[lane] += of(after[lane], before[lane]);
+fn mean<S: Simd, const UNSIGNED: bool>(simd: S, after: &[f32], before: &[f32], light: f32) -> f32 {
+    let (after_lanes, after_rest) = S::as_simd_f32s(after);
+    let (before_lanes, before_rest) = S::as_simd_f32s(before);
+    let mut total = 0.0;
+    for (after, before) in after_rest.iter().zip(before_rest) {
+        let off = after - before - light;
+        total += if UNSIGNED { off.abs() } else { off };
+    }
+    let (after_groups, after_lanes) = after_lanes.as_chunks::<PARTS>();
+    let (before_groups, before_lanes) = before_lanes.as_chunks::<PARTS>();
+    let light = simd.splat_f32s(light);
+    let mut parts = [simd.splat_f32s(0.0); PARTS];
+    for (after, before) in after_groups.iter().zip(before_groups) {
+        for i in 0..PARTS {
+            let off = simd.sub_f32s(simd.sub_f32s(after[i], before[i]), light);
+            let off = if UNSIGNED { simd.abs_f32s(off) } else { off };
+            parts[i] = simd.add_f32s(parts[i], off);
         }
     }
-    let rest = after_rest.iter().zip(before_rest);
-    let rest = rest.map(|(&after, &before)| of(after, before));
-    (parts.iter().sum::<f32>() + rest.sum::<f32>()) / after.len().min(before.len()) as f32
+    for (i, (after, before)) in after_lanes.iter().zip(before_lanes).enumerate() {
+        let off = simd.sub_f32s(simd.sub_f32s(*after, *before), light);
+        let off = if UNSIGNED { simd.abs_f32s(off) } else { off };
+        parts[i] = simd.add_f32s(parts[i], off);
+    }
+    let mut sum = parts[0];
+    for part in &parts[1..] {
+        sum = simd.add_f32s(sum, *part);
+    }
+    (total + simd.reduce_sum_f32s(sum)) / after.len().min(before.len()) as f32
 }
 
 /// The shift at which `after` fits `before` best, 0 where that is not clear. A change of the light is taken off.
 #[inline(always)]
-fn shift(before: &[f32], after: &[f32]) -> f64 {
+fn shift<S: Simd>(simd: S, before: &[f32], after: &[f32]) -> f64 {
     // So that two thirds of the profiles always overlap.
     let furthest = FURTHEST.min(before.len() / 3);
     let mut best = (0, f32::INFINITY);
@@ -133,10 +165,8 @@ fn shift(before: &[f32], after: &[f32]) -> f64 {
         let (forward, back) = (step.saturating_sub(furthest), furthest.saturating_sub(step));
         let overlap = before.len() - forward - back;
         let (after, before) = (&after[forward..][..overlap], &before[back..][..overlap]);
-        let light = mean(after, before, |after, before| after - before);
-        let misfit = mean(after, before, |after, before| {
-            (after - before - light).abs()
-        });
+        let light = mean::<S, false>(simd, after, before, 0.0);
+        let misfit = mean::<S, true>(simd, after, before, light);
         if step == furthest {
             unshifted = misfit;
         }
@@ -162,6 +192,25 @@ mod tests {
             (110.0 + 25.0 * waves) as u8 + brighter
         };
         GrayFrame::from_luma(120, 100, (0..120 * 100).map(gray).collect()).expect("a frame")
+    }
+
+    #[test]
+    fn profiles_are_the_means_of_columns_and_rows() {
+        for (width, height) in [(33, 8), (75, 21), (320, 240)] {
+            let luma = (0..width * height).map(|i| 255 - (i * i / 31 % 97) as u8);
+            let frame = GrayFrame::from_luma(width, height, luma.collect()).expect("a frame");
+            let camera = Camera::new(&frame);
+            let (width, height) = (width as usize, height as usize);
+            let gray = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
+            for (x, found) in camera.columns.iter().enumerate() {
+                let sum: f64 = (0..height).map(|y| gray(x, y)).sum();
+                assert!((f64::from(*found) - sum / height as f64).abs() < 1e-4);
+            }
+            for (y, found) in camera.rows.iter().enumerate() {
+                let sum: f64 = (0..width).map(|x| gray(x, y)).sum();
+                assert!((f64::from(*found) - sum / width as f64).abs() < 1e-4);
+            }
+        }
     }
 
     #[test]

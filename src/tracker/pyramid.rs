@@ -5,6 +5,8 @@
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
+use pulp::Simd;
+
 use super::motion::Particle;
 use super::{Params, matrix};
 
@@ -101,20 +103,15 @@ pub(super) static WAVES: LazyLock<Waves> = LazyLock::new(|| {
 
 impl Room {
     /// Brings the pyramid's vectors to length 1 and transforms them along the scale. Returns D.
-    pub fn transform(&mut self) -> usize {
+    #[inline(always)]
+    pub fn transform<S: Simd>(&mut self, simd: S) -> usize {
         let len = self.features.len() / LEVELS;
         self.features
             .chunks_exact_mut(len)
             .for_each(matrix::normalize);
-        self.spectrum.clear();
         self.spectrum.resize(FREQUENCIES * 2 * len, 0.0);
-        matrix::add_combinations(
-            &mut self.spectrum,
-            1.0,
-            &WAVES.windowed,
-            &self.features,
-            len,
-        );
+        let spectrum = &mut self.spectrum;
+        matrix::become_combinations(simd, spectrum, &WAVES.windowed, &self.features, len);
         len
     }
 }

@@ -14,6 +14,7 @@
 //! The height of the response y tells how sure that is: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
 //! covered, turned or missed. There the scale stays, or it would wander off within a few frames.
 
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::pyramid::{self, FREQUENCIES, LEVELS, MIDDLE, Room, STEP, WAVES};
@@ -47,6 +48,37 @@ pub(super) struct Found {
     pub response: f64,
 }
 
+/// [`ScaleFilter::learn`], to be compiled for the instructions that this machine has.
+struct Learn<'a> {
+    filter: &'a mut ScaleFilter,
+    room: &'a mut Room,
+    rate: f64,
+}
+
+impl WithSimd for Learn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.filter.learn_all(simd, self.room, self.rate);
+    }
+}
+
+/// [`ScaleFilter::respond`], to be compiled for the instructions that this machine has.
+struct Respond<'a> {
+    filter: &'a ScaleFilter,
+    room: &'a mut Room,
+}
+
+impl WithSimd for Respond<'_> {
+    type Output = [f64; LEVELS];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; LEVELS] {
+        self.filter.respond_all(simd, self.room)
+    }
+}
+
 impl ScaleFilter {
     /// Whether there is something to find by.
     pub fn has_learned(&self) -> bool {
@@ -61,7 +93,16 @@ impl ScaleFilter {
 
     /// Learns the pyramid in `room`, whose middle is the target; `rate` is the share η of it.
     pub fn learn(&mut self, room: &mut Room, rate: f64) {
-        let len = room.transform();
+        Arch::new().dispatch(Learn {
+            filter: self,
+            room,
+            rate,
+        });
+    }
+
+    #[inline(always)]
+    fn learn_all<S: Simd>(&mut self, simd: S, room: &mut Room, rate: f64) {
+        let len = room.transform(simd);
         let rate = if self.has_learned() { rate as f32 } else { 1.0 };
         self.numerators.resize(FREQUENCIES * 2 * len, 0.0);
         self.energies.resize(FREQUENCIES, 0.0);
@@ -109,7 +150,12 @@ impl ScaleFilter {
     }
 
     fn respond(&self, room: &mut Room) -> [f64; LEVELS] {
-        let len = room.transform();
+        Arch::new().dispatch(Respond { filter: self, room })
+    }
+
+    #[inline(always)]
+    fn respond_all<S: Simd>(&self, simd: S, room: &mut Room) -> [f64; LEVELS] {
+        let len = room.transform(simd);
         let mut spectrum = [(0.0, 0.0); FREQUENCIES];
         let numerators = self.numerators.chunks_exact(2 * len);
         let seen = room.spectrum.chunks_exact(2 * len);
@@ -201,9 +247,9 @@ mod tests {
         let found = filter.respond(&mut seen);
         // The same by definition, with complex sums over all frequencies.
         let mut learned = pyramid(0.0);
-        learned.transform();
+        learned.transform(pulp::Scalar);
         seen = pyramid(1.0);
-        seen.transform();
+        seen.transform(pulp::Scalar);
         let window =
             |level: usize| 0.5 - 0.5 * (TAU * (level + 1) as f64 / (LEVELS + 1) as f64).cos();
         let fourier = |signal: &dyn Fn(usize) -> f64, frequency: usize| {

@@ -221,8 +221,8 @@ pub(super) fn average(
     };
     let mut total = 0.0;
     for (particle, &weight) in particles.iter().zip(weights) {
-        let distance = (particle.x - center.x).hypot(particle.y - center.y);
-        if distance < radius {
+        let squared = (particle.x - center.x).powi(2) + (particle.y - center.y).powi(2);
+        if squared < radius * radius {
             mean.x += weight * particle.x;
             mean.y += weight * particle.y;
             mean.scale += weight * particle.scale.ln();
