@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn profiles_are_the_means_of_columns_and_rows() {
         for (width, height) in [(33, 8), (75, 21), (320, 240)] {
-            let luma = (0..width * height).map(|i| 255 - (i * i / 31 % 97) as u8);
+            let luma = (0..width * height).map(|i| 255 - (i * 7919 / 31 % 97) as u8);
             let frame = GrayFrame::from_luma(width, height, luma.collect()).expect("a frame");
             let camera = Camera::new(&frame);
             let (width, height) = (width as usize, height as usize);

@@ -3,7 +3,8 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::energies::Energies;
-use super::gradients::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, Place, registers};
+use super::gradients::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, registers};
+use super::places::Places;
 use super::{Params, Rect};
 
 /// Values of a cell: the directions, then its gray value.
@@ -33,20 +34,29 @@ const LIMITS: Lanes = {
     limits
 };
 
-/// Room for the cells of one area.
+/// Columns of cells that are worked on together: as many as a usual area has.
+const STRIP: usize = 8;
+
+/// Room for the cells of areas.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
     columns: usize,
     rows: usize,
-    /// Where the corners of the cells are among the columns of the sums.
-    places: Vec<Place>,
-    /// For each column of cells the sum at its right corner less that at its left one, in the last row of corners.
-    edges: Vec<Lanes>,
+    /// The corners of the cells among the columns and the rows of the sums.
+    places: [Places; 2],
+    /// Of two areas, so that the one is summed up while the other is still divided.
+    areas: [Area; 2],
+}
+
+/// The cells of one area.
+#[derive(Debug, Clone, Default)]
+struct Area {
     /// The channels of each cell, row by row.
     cells: Vec<Lanes>,
-    /// The squares of each cell's directions, in one register of this machine.
-    squares: Vec<f32>,
     energies: Energies,
+    grays: Grays,
+    /// The mean number of pixels of a cell.
+    pixels: f32,
 }
 
 /// [`Cells::describe`], to be compiled for the instructions that this machine has.
@@ -63,17 +73,29 @@ impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let len = self.cells.cells.len() * CHANNELS;
+        let Cells {
+            columns,
+            rows,
+            places,
+            areas: [now, before],
+        } = self.cells;
+        let size = (*columns, *rows);
+        let (mut now, mut before) = (now, before);
+        let len = size.0 * size.1 * CHANNELS;
+        let mut last = &mut [][..];
         for (area, out) in self.areas.zip(self.out.chunks_exact_mut(len)) {
-            let grays = self.cells.sum_up(simd, self.sums, &area);
-            self.cells
-                .normalize(simd, &area, grays, self.gray_weight, out);
+            now.sum_up(simd, self.sums, &area, size, places);
+            // Of the area before: what it reads was written long enough ago to have come to the cache.
+            before.normalize(simd, size.0, self.gray_weight, last);
+            last = out;
+            (now, before) = (before, now);
         }
+        before.normalize(simd, size.0, self.gray_weight, last);
     }
 }
 
 /// The sum of the gray values of all cells, and that of their squares.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Grays {
     sum: f32,
     squares: f32,
@@ -102,14 +124,14 @@ impl Cells {
         });
     }
 
-    /// The gray values of the cells of the last area, summed over their pixels.
+    /// The gray values of the cells of an area that was described alone, summed over their pixels.
     pub fn grays(&self) -> impl Iterator<Item = f32> {
-        self.cells.iter().map(|cell| cell.0[GRAY])
+        self.areas[0].cells.iter().map(|cell| cell.0[GRAY])
     }
 
     /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
     pub fn reserve(&mut self, columns: usize, rows: usize) {
-        if self.cells.capacity() < columns * rows {
+        if self.areas[0].cells.capacity() < columns * rows {
             self.prepare(columns, rows);
         }
     }
@@ -120,90 +142,117 @@ impl Cells {
             return;
         }
         (self.columns, self.rows) = (columns, rows);
-        self.places.resize(columns + 1, Place::default());
-        self.edges.resize(columns, Lanes::ZERO);
-        self.cells.resize(columns * rows, Lanes::ZERO);
-        // Whole groups of registers, whatever their length.
-        let groups = (columns * rows).next_multiple_of(LANES);
-        self.squares.clear();
-        self.squares.resize(groups * LANES, 0.0);
-        self.energies.prepare(columns, rows);
+        self.places[0].prepare(columns + 1);
+        self.places[1].prepare(rows + 1);
+        for area in &mut self.areas {
+            area.cells.resize(columns * rows, Lanes::ZERO);
+            area.energies.prepare(columns, rows);
+        }
+    }
+}
+
+impl Area {
+    /// Becomes the cells of `area`, and their energies.
+    #[inline(always)]
+    fn sum_up<S: Simd>(
+        &mut self,
+        simd: S,
+        sums: &GradientSums,
+        area: &Rect,
+        (columns, rows): (usize, usize),
+        places: &mut [Places; 2],
+    ) {
+        let width = (area.width / columns as f64) as f32;
+        let height = (area.height / rows as f64) as f32;
+        sums.columns((area.x as f32, width), &mut places[0]);
+        sums.rows((area.y as f32, height), &mut places[1]);
+        let mut grays = [Lanes::ZERO; 2];
+        let mut first = 0;
+        while first + STRIP <= columns {
+            self.sum_strip::<S, STRIP>(simd, sums, places, (first, columns), &mut grays);
+            first += STRIP;
+        }
+        while first < columns {
+            self.sum_strip::<S, 1>(simd, sums, places, (first, columns), &mut grays);
+            first += 1;
+        }
+        self.energies.sum_columns();
+        self.grays = Grays {
+            sum: grays[0].0[GRAY],
+            squares: grays[1].0[GRAY],
+        };
+        self.pixels = (area.width * area.height) as f32 / self.cells.len() as f32;
     }
 
-    /// The cells of `area`, each the sum at its lower right corner, less those at the two beside it, and that at its
-    /// upper left one; and their energies.
+    /// The cells of `N` columns from `first` on, each the sum at its lower right corner, less those at the two beside it,
+    /// and that at its upper left one; and their energies. Adds the cells and their squares to `total`.
     #[inline(always)]
-    fn sum_up<S: Simd>(&mut self, simd: S, sums: &GradientSums, area: &Rect) -> Grays {
-        let (x, y) = (area.x as f32, area.y as f32);
-        let width = (area.width / self.columns as f64) as f32;
-        let height = (area.height / self.rows as f64) as f32;
-        for (i, place) in self.places.iter_mut().enumerate() {
-            *place = sums.column(x + i as f32 * width);
-        }
+    fn sum_strip<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        sums: &GradientSums,
+        places: &[Places; 2],
+        (first, columns): (usize, usize),
+        total: &mut [Lanes; 2],
+    ) {
         let energy_shares = ENERGY_SHARES;
         let energy_shares = energy_shares.load::<S>();
         let zero = simd.splat_f32s(0.0);
-        let (mut total, mut squares) = ([zero; LANES], [zero; LANES]);
-        // The first row of corners makes no cells.
-        let row = sums.row(y);
-        let mut left = row.at(simd, self.places[0]);
-        for (edge, &place) in self.edges.iter_mut().zip(&self.places[1..]) {
-            let right = row.at(simd, place);
-            for (register, edge) in edge.load_mut::<S>().iter_mut().enumerate() {
-                *edge = simd.sub_f32s(right[register], left[register]);
+        let (mut cells_sum, mut squares_sum) = ([zero; LANES], [zero; LANES]);
+        let [column_places, row_places] = places;
+        let mut places = [column_places.get(first); N];
+        for (i, place) in places.iter_mut().enumerate() {
+            *place = column_places.get(first + 1 + i);
+        }
+        let first_place = column_places.get(first);
+        // For each column the sum at its right corner less that at its left one, in the last row of corners. The first row
+        // makes no cells.
+        let mut edges = [[zero; LANES]; N];
+        let row = sums.row(row_places.get(0));
+        let mut left = row.at(simd, first_place);
+        for i in 0..N {
+            let right = row.at(simd, places[i]);
+            for register in 0..registers::<S>() {
+                edges[i][register] = simd.sub_f32s(right[register], left[register]);
             }
             left = right;
         }
-        let registers_of_squares = S::as_mut_simd_f32s(&mut self.squares).0;
-        let rows = self.cells.chunks_exact_mut(self.columns);
-        let rows = rows.zip(registers_of_squares.chunks_mut(self.columns));
-        for (j, (cells, energies)) in rows.enumerate() {
-            let row = sums.row(y + (j + 1) as f32 * height);
-            let mut left = row.at(simd, self.places[0]);
-            let columns = self.edges.iter_mut().zip(&self.places[1..]);
-            for (((edge, &place), cell), out) in columns.zip(cells).zip(energies) {
-                let right = row.at(simd, place);
-                let (edge, cell) = (edge.load_mut::<S>(), cell.load_mut::<S>());
-                let mut energy = zero;
+        for (j, cells) in self.cells.chunks_exact_mut(columns).enumerate() {
+            let cells = &mut cells[first..][..N];
+            let row = sums.row(row_places.get(j + 1));
+            let mut energies = [zero; N];
+            let mut left = row.at(simd, first_place);
+            for i in 0..N {
+                let right = row.at(simd, places[i]);
+                let cell = cells[i].load_mut::<S>();
                 for register in 0..registers::<S>() {
                     let across = simd.sub_f32s(right[register], left[register]);
-                    let inside = simd.sub_f32s(across, edge[register]);
-                    (edge[register], cell[register]) = (across, inside);
+                    let inside = simd.sub_f32s(across, edges[i][register]);
+                    (edges[i][register], cell[register]) = (across, inside);
                     let square = simd.mul_f32s(inside, inside);
-                    total[register] = simd.add_f32s(total[register], inside);
-                    squares[register] = simd.add_f32s(squares[register], square);
-                    energy = simd.mul_add_e_f32s(square, energy_shares[register], energy);
+                    cells_sum[register] = simd.add_f32s(cells_sum[register], inside);
+                    squares_sum[register] = simd.add_f32s(squares_sum[register], square);
+                    energies[i] = simd.mul_add_e_f32s(square, energy_shares[register], energies[i]);
                 }
-                *out = energy;
                 left = right;
             }
+            self.energies.take(simd, (first, j), energies);
         }
-        self.energies.take(simd, &self.squares);
-        let gray = |sums: [S::f32s; LANES]| {
-            let mut lanes = Lanes::ZERO;
-            lanes
-                .load_mut::<S>()
-                .copy_from_slice(&sums[..registers::<S>()]);
-            lanes.0[GRAY]
-        };
-        Grays {
-            sum: gray(total),
-            squares: gray(squares),
+        for (total, sums) in total.iter_mut().zip([cells_sum, squares_sum]) {
+            let total = total.load_mut::<S>();
+            for register in 0..registers::<S>() {
+                total[register] = simd.add_f32s(total[register], sums[register]);
+            }
         }
     }
 
-    /// The feature vector of the cells.
+    /// Writes the feature vector of the cells to `out`, if there is room.
     #[inline(always)]
-    fn normalize<S: Simd>(
-        &mut self,
-        simd: S,
-        area: &Rect,
-        grays: Grays,
-        gray_weight: f32,
-        out: &mut [f32],
-    ) {
-        let count = self.cells.len() as f32;
-        let pixels = (area.width * area.height) as f32 / count;
+    fn normalize<S: Simd>(&mut self, simd: S, columns: usize, gray_weight: f32, out: &mut [f32]) {
+        if out.is_empty() {
+            return;
+        }
+        let (count, pixels, grays) = (self.cells.len() as f32, self.pixels, self.grays);
         let mean = grays.sum / count;
         let variance = (grays.squares / count - mean * mean).max(0.0);
         let gray_scale = gray_weight / variance.sqrt().max(LEAST_CONTRAST * pixels);
@@ -216,7 +265,7 @@ impl Cells {
         let (directions, limits) = (directions.load::<S>(), limits.load::<S>());
         let scales = self.energies.scales(floor);
         let mut first = 0;
-        for (cells, scales) in self.cells.chunks_exact(self.columns).zip(scales) {
+        for (cells, scales) in self.cells.chunks_exact(columns).zip(scales) {
             for (cell, &scale) in cells.iter().zip(scales) {
                 let (scale, cell) = (simd.splat_f32s(scale), cell.load::<S>());
                 let mut values = Lanes::ZERO;
@@ -293,13 +342,14 @@ mod tests {
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
             sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
-            cells.sum_up(pulp::Scalar, &sums, &area);
+            let Cells { places, areas, .. } = &mut cells;
+            areas[0].sum_up(pulp::Scalar, &sums, &area, (4, 4), places);
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
                 let x = area.x + (index % 4) as f64 * width;
                 let y = area.y + (index / 4) as f64 * height;
                 let expected = cell(&frame, &Rect::new(x, y, width, height));
-                let found = &cells.cells[index].0;
+                let found = &cells.areas[0].cells[index].0;
                 for (found, expected) in found.iter().zip(&expected[..DIRECTIONS]) {
                     assert!(
                         (f64::from(*found) - expected).abs() < 4.0,

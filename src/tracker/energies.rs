@@ -5,7 +5,6 @@
 
 use pulp::Simd;
 
-use super::gradients::LANES;
 use super::kernel::Element;
 use super::sums;
 
@@ -16,7 +15,7 @@ const GROUP: usize = 8;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Energies {
     columns: usize,
-    /// Row by row, with room for whole registers.
+    /// Row by row.
     values: Vec<f32>,
     /// The sums of each cell and those above and below it, row by row: a zero, those of the cells of a row, and zeros up
     /// to a whole number of groups and one more.
@@ -37,7 +36,7 @@ impl Energies {
             values.clear();
             values.resize(count, 0.0);
         };
-        zeros(&mut self.values, (columns * rows).next_multiple_of(LANES));
+        zeros(&mut self.values, columns * rows);
         zeros(&mut self.columns_of_three, (padded + 2) * rows);
         zeros(&mut self.scales, padded * rows);
         let share = |i: usize, count: usize| {
@@ -52,29 +51,36 @@ impl Energies {
         self.row_shares.extend((0..rows).map(|j| share(j, rows)));
     }
 
-    /// Takes the energies, from the squares of the directions of each cell: a register of this machine each, row by row, and
-    /// some more up to a whole number of groups.
+    /// Takes the energies of the cells from column `first` of row `row` on, each the sum of a register.
     #[inline(always)]
-    pub fn take<S: Simd>(&mut self, simd: S, squares: &[f32]) {
-        let squares = S::as_simd_f32s(squares).0.as_chunks().0;
-        let energies = self.values.as_chunks_mut().0;
-        let together = sums::can_sum::<S, f32>(simd);
-        for (squares, energies) in squares.iter().zip(energies) {
-            *energies = if together {
-                f32::sum_each(simd, *squares)
-            } else {
-                squares.map(|squares| simd.reduce_sum_f32s(squares))
-            };
+    pub fn take<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        (first, row): (usize, usize),
+        energies: [S::f32s; N],
+    ) {
+        let out = &mut self.values[row * self.columns + first..][..N];
+        if sums::can_sum::<S, f32>(simd) {
+            let groups = energies.as_chunks::<{ sums::TOGETHER }>();
+            let out = out.as_chunks_mut::<{ sums::TOGETHER }>();
+            for (energies, out) in groups.0.iter().zip(out.0) {
+                *out = f32::sum_each(simd, *energies);
+            }
+            for (energies, out) in groups.1.iter().zip(out.1) {
+                *out = simd.reduce_sum_f32s(*energies);
+            }
+        } else {
+            for (energies, out) in energies.iter().zip(out) {
+                *out = simd.reduce_sum_f32s(*energies);
+            }
         }
     }
 
-    /// What the directions of each cell are multiplied by, a row after the other: one over three times the root of the
-    /// mean energy around, `floor` added to it.
+    /// Adds to each energy those above and below it, once all are taken.
     #[inline(always)]
-    pub fn scales(&mut self, floor: f32) -> impl Iterator<Item = &[f32]> {
+    pub fn sum_columns(&mut self) {
         let (columns, last) = (self.columns, self.row_shares.len() - 1);
         let padded = self.column_shares.len();
-        // Each step for all rows before the next, so that nothing is read just after it was written in another width.
         let sums = self.columns_of_three.chunks_exact_mut(padded + 2);
         for (row, sums) in sums.enumerate() {
             // A row at the edge has itself in place of what is beyond, times nothing.
@@ -95,6 +101,14 @@ impl Energies {
                 *sum = here + has_above * above + has_below * below;
             }
         }
+    }
+
+    /// What the directions of each cell are multiplied by, a row after the other: one over three times the root of the
+    /// mean energy around, `floor` added to it. Reads the sums in another width than they are written in, which is slow
+    /// just after that.
+    #[inline(always)]
+    pub fn scales(&mut self, floor: f32) -> impl Iterator<Item = &[f32]> {
+        let (columns, padded) = (self.columns, self.column_shares.len());
         let rows = self.scales.chunks_exact_mut(padded).zip(&self.row_shares);
         let sums = self.columns_of_three.chunks_exact(padded + 2);
         for ((scales, &row_share), sums) in rows.zip(sums) {
@@ -142,6 +156,7 @@ mod tests {
             for (i, value) in energies.values[..columns * rows].iter_mut().enumerate() {
                 *value = energy(i);
             }
+            energies.sum_columns();
             for (j, found) in energies.scales(5.0).enumerate() {
                 assert_eq!(found.len(), columns);
                 for (i, found) in found.iter().enumerate() {

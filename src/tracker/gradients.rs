@@ -12,6 +12,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::directions::GradientRow;
+use super::places::{Place, Places};
 use super::{GrayFrame, Rect};
 
 /// Directions, from 0 to 180 degrees.
@@ -126,26 +127,6 @@ impl WithSimd for Compute<'_> {
     }
 }
 
-/// A coordinate among the corners of a window: the corner before it, and how far it is beyond that, 0 to 1.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Place {
-    corner: usize,
-    beyond: f32,
-}
-
-impl Place {
-    /// Where `value` is among `count` pixels. Outside the window there is nothing: its edge is as good.
-    #[inline(always)]
-    fn of(value: f32, count: usize) -> Self {
-        let value = value.clamp(0.0, count as f32);
-        let corner = (value as usize).min(count - 1);
-        Self {
-            corner,
-            beyond: value - corner as f32,
-        }
-    }
-}
-
 impl GradientSums {
     /// Sums up the channels over the part of `frame` that `window` (working pixels) touches. Where a cell is at least
     /// [`COARSE`] pixels wide and high, there is a corner at every second pixel only.
@@ -189,20 +170,29 @@ impl GradientSums {
         }
     }
 
-    /// Where `x`, in working pixels, is among the columns of corners.
+    /// Makes `places` those of evenly spaced `x`, in working pixels, among the columns of corners.
     #[inline(always)]
-    pub fn column(&self, x: f32) -> Place {
-        Place::of((x - self.left as f32) / self.grain as f32, self.columns)
+    pub fn columns(&self, (x, step): (f32, f32), places: &mut Places) {
+        let share = 1.0 / self.grain as f32;
+        places.take((x - self.left as f32) * share, step * share, self.columns);
     }
 
-    /// The sums along a line at `y`, in working pixels.
+    /// Makes `places` those of evenly spaced `y`, in working pixels, among the rows of corners.
     #[inline(always)]
-    pub fn row(&self, y: f32) -> SumsRow<'_> {
-        let place = Place::of((y - self.top as f32) / self.grain as f32, self.rows);
+    pub fn rows(&self, (y, step): (f32, f32), places: &mut Places) {
+        let share = 1.0 / self.grain as f32;
+        places.take((y - self.top as f32) * share, step * share, self.rows);
+    }
+
+    /// The sums along a line.
+    #[inline(always)]
+    pub fn row(&self, place: Place) -> SumsRow<'_> {
         let stride = self.columns + 1;
+        let rows = &self.sums[place.corner * stride..][..2 * stride];
+        let (upper, lower) = rows.split_at(stride);
         SumsRow {
-            upper: &self.sums[place.corner * stride..][..stride],
-            lower: &self.sums[(place.corner + 1) * stride..][..stride],
+            upper,
+            lower,
             down: place.beyond,
         }
     }
@@ -328,9 +318,13 @@ mod tests {
                         at.next_multiple_of(2)
                     }
                 };
-                let row = sums.row((top + corner(down)) as f32);
-                let column = sums.column((left + corner(across)) as f32);
-                let found = row.at(pulp::Scalar, column);
+                let (mut rows, mut columns) = (Places::default(), Places::default());
+                rows.prepare(1);
+                columns.prepare(1);
+                sums.rows(((top + corner(down)) as f32, 0.0), &mut rows);
+                sums.columns(((left + corner(across)) as f32, 0.0), &mut columns);
+                let row = sums.row(rows.get(0));
+                let found = row.at(pulp::Scalar, columns.get(0));
                 for (found, expected) in found.iter().zip(&expected) {
                     assert!((found - expected).abs() < 1.0, "{found} {expected}");
                 }

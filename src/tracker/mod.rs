@@ -73,6 +73,7 @@ mod params;
 mod patch;
 #[cfg(target_arch = "x86_64")]
 mod permute;
+mod places;
 mod planes;
 mod posterior;
 mod presets;

@@ -58,7 +58,7 @@ impl WithSimd for Scores<'_> {
                 *place = last.min(block * ROWS + row);
             }
             for first in (0..columns).step_by(S::F32_LANES) {
-                let products = correlate(simd, planes, (first, places), size, self.discriminant);
+                let products = correlate(simd, planes, (first, places), size.0, self.discriminant);
                 let rows = rows.chunks_mut(columns).zip(places).zip(products);
                 for ((row, j), products) in rows {
                     let boxes = planes.boxes(simd, (first, j), size.1);
@@ -111,7 +111,7 @@ fn correlate<S: Simd>(
     simd: S,
     planes: &Planes,
     (first, rows): (usize, [usize; ROWS]),
-    (width, height): (usize, usize),
+    width: usize,
     discriminant: &Discriminant,
 ) -> [Products<S>; ROWS] {
     let row_len = width * CHANNELS;
