@@ -5,7 +5,7 @@
 //! looks' Gram matrix, its eigenvectors the coefficients, and with the shadows of the combinations (see
 //! [`metric`](super::metric)) a change of the background costs small matrices.
 
-use pulp::Simd;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::background::Background;
 use super::eigen::Spectrum;
@@ -42,10 +42,53 @@ pub(super) struct Room {
     spectrum: Spectrum,
 }
 
+/// [`Room::take`], to be compiled for the instructions that this machine has.
+struct Take<'a> {
+    room: &'a mut Room,
+    background: &'a Background,
+}
+
+impl WithSimd for Take<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.background.samples_into(&mut self.room.samples);
+    }
+}
+
+/// [`Combination::become_of`], to be compiled for the instructions that this machine has.
+struct BecomeOf<'a> {
+    combination: &'a mut Combination,
+    looks: &'a [Look],
+    background: &'a Background,
+    params: &'a Params,
+    room: &'a mut Room,
+}
+
+impl WithSimd for BecomeOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            combination,
+            looks,
+            background,
+            params,
+            room,
+        } = self;
+        combination.become_all(simd, looks, background, params, room);
+    }
+}
+
 impl Room {
     /// Takes the samples of `background`, which all combinations are made with from here on.
     pub fn take(&mut self, background: &Background) {
-        background.samples_into(&mut self.samples);
+        Arch::new().dispatch(Take {
+            room: self,
+            background,
+        });
     }
 }
 
@@ -58,26 +101,37 @@ impl Combination {
         params: &Params,
         room: &mut Room,
     ) {
+        Arch::new().dispatch(BecomeOf {
+            combination: self,
+            looks,
+            background,
+            params,
+            room,
+        });
+    }
+
+    #[inline(always)]
+    fn become_all<S: Simd>(
+        &mut self,
+        simd: S,
+        looks: &[Look],
+        background: &Background,
+        params: &Params,
+        room: &mut Room,
+    ) {
         let (len, count) = (params.feature_len(), looks.len());
         let metric = background.metric();
         let samples = metric.count();
-        room.vectors.clear();
         room.vectors.resize(count * len, 0.0);
         for (look, vector) in looks.iter().zip(room.vectors.chunks_exact_mut(len)) {
-            matrix::add(vector, -1.0, background.mean());
-            look.add_to(vector, 1.0);
+            look.write(background.mean(), vector);
         }
-        room.products.resize(count * samples, 0.0);
-        kernel::inner_products(
-            &room.vectors,
-            &room.samples,
-            len,
-            samples,
-            &mut room.products,
-        );
+        let (vectors, products) = (&room.vectors, &mut room.products);
+        products.resize(count * samples, 0.0);
+        kernel::multiply(simd, vectors, &room.samples, len, samples, products);
         room.shadows.resize(count * samples, 0.0);
         room.gram.resize(count * count, 0.0);
-        kernel::inner_products(&room.vectors, &room.vectors, len, count, &mut room.gram);
+        kernel::multiply(simd, vectors, vectors, len, count, &mut room.gram);
         let shadow = |i: usize| i * samples..(i + 1) * samples;
         for i in 0..count {
             metric.shadow(&room.products[shadow(i)], &mut room.shadows[shadow(i)]);
@@ -153,12 +207,7 @@ impl Combination {
         let len = out.len() / (1 + self.dim);
         room.resize(looks.len() * len, 0.0);
         for (look, vector) in looks.iter().zip(room.chunks_exact_mut(len)) {
-            if background.mean().is_empty() {
-                vector.fill(0.0);
-                look.add_to(vector, 1.0);
-            } else {
-                look.write_without(background.mean(), vector);
-            }
+            look.write(background.mean(), vector);
         }
         matrix::become_combinations(simd, out, &self.coefficients, room, len);
     }

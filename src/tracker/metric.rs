@@ -32,6 +32,7 @@ pub(super) struct Room {
 impl Metric {
     /// Becomes the metric of centred `samples` of length `len`; `ridge` is a multiple of the covariance's mean
     /// eigenvalue.
+    #[inline(always)]
     pub fn become_of(&mut self, samples: &[f32], len: usize, ridge: f64, room: &mut Room) {
         let count = samples.len() / len;
         self.count = count;
@@ -71,6 +72,7 @@ impl Metric {
     }
 
     /// The shadow of a vector, of length n, from its inner products with the samples.
+    #[inline(always)]
     pub fn shadow(&self, products: &[f32], out: &mut [f32]) {
         let rows = self.inverse.chunks_exact(self.count.max(1));
         for (value, row) in out.iter_mut().zip(rows) {
@@ -81,6 +83,7 @@ impl Metric {
 
 /// Cholesky's factorisation of a matrix of `count` rows, of which the upper triangle is read: the upper triangle becomes
 /// Lᵀ. No pivot is less than `least` but by rounding.
+#[inline(always)]
 fn factorize(matrix: &mut [f64], count: usize, least: f64) {
     for k in 0..count {
         let (done, rest) = matrix.split_at_mut((k + 1) * count);
@@ -102,6 +105,7 @@ fn factorize(matrix: &mut [f64], count: usize, least: f64) {
 }
 
 /// L⁻¹ from Lᵀ, both of `count` rows.
+#[inline(always)]
 fn invert(factor: &[f64], count: usize, inverse: &mut [f64]) {
     for i in 0..count {
         let (done, row) = inverse.split_at_mut(i * count);
