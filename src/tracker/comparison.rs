@@ -47,10 +47,10 @@ impl WithSimd for Center<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         for vector in self.vectors.chunks_exact_mut(self.len) {
             matrix::add(vector, -1.0, self.mean);
-            self.squares.push(matrix::dot(vector, vector));
+            self.squares.push(matrix::product(simd, vector, vector));
         }
     }
 }
@@ -265,9 +265,8 @@ impl Comparison {
     /// discriminant's score. Returns the most likely one (equation 12).
     pub fn weigh(&mut self, sought: &Sought<'_>, discriminant: &Discriminant) -> usize {
         let params = sought.params;
-        let priors = self.particles.iter().map(|particle| sought.prior(particle));
         self.weights.clear();
-        self.weights.extend(priors);
+        self.weights.extend(sought.priors(&self.particles));
         if discriminant.is_on() {
             let factor = params.discriminant_weight;
             let scores = self.examples.scores();

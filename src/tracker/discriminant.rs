@@ -125,8 +125,15 @@ impl Discriminant {
         product.resize(gradient.len(), 0.0);
         let mut squared = matrix::dot(gradient, gradient);
         let enough = (squared * 1e-10).max(NOTHING);
-        for _ in 0..steps {
+        for step in 1..=steps {
             if squared <= enough {
+                break;
+            }
+            if step == steps {
+                // Nothing is asked of the gradient after it.
+                let along = examples.energy(vectors, direction);
+                let along = along + damping * matrix::dot(direction, direction);
+                matrix::add(&mut self.weights, squared / along, direction);
                 break;
             }
             product.fill(0.0);

@@ -92,6 +92,15 @@ impl Examples {
         });
     }
 
+    /// Σ (uᵢ · d)².
+    pub fn energy(&self, vectors: &[f32], direction: &[f32]) -> f32 {
+        Arch::new().dispatch(Energy {
+            examples: self,
+            vectors,
+            direction,
+        })
+    }
+
     /// Adds Σ (uᵢ · d) uᵢ to `sum`.
     pub fn add_products(&self, vectors: &[f32], direction: &[f32], sum: &mut [f32]) {
         Arch::new().dispatch(Sum {
@@ -100,6 +109,37 @@ impl Examples {
             coefficients: Coefficients::ProductsWith(direction),
             sum,
         });
+    }
+}
+
+/// [`Examples::energy`], to be compiled for the instructions that this machine has.
+struct Energy<'a> {
+    examples: &'a Examples,
+    vectors: &'a [f32],
+    direction: &'a [f32],
+}
+
+impl WithSimd for Energy<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f32 {
+        let (len, scales) = (self.direction.len(), &self.examples.scales);
+        let of_origin = matrix::dot(&self.examples.origin, self.direction);
+        let mut energy = 0.0;
+        for first in (0..scales.len()).step_by(GROUP) {
+            let mut group = [self.vectors; GROUP];
+            for (i, vector) in group.iter_mut().enumerate() {
+                // A group at the end has the last vector more than once, which is not counted.
+                *vector = &self.vectors[(first + i).min(scales.len() - 1) * len..][..len];
+            }
+            let products = kernel::tile(simd, group, [self.direction]);
+            for ([product], scale) in products.iter().zip(&scales[first..]) {
+                let product = scale * (product - of_origin);
+                energy += product * product;
+            }
+        }
+        energy
     }
 }
 

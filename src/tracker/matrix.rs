@@ -206,6 +206,34 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     parts.iter().sum::<f32>() + rest.sum::<f32>()
 }
 
+/// The inner product, within what is compiled for this machine's instructions: summed in several registers, so that no
+/// addition waits for the last one.
+#[inline(always)]
+pub(super) fn product<S: Simd>(simd: S, a: &[f32], b: &[f32]) -> f32 {
+    let (a_lanes, a_rest) = S::as_simd_f32s(a);
+    let (b_lanes, b_rest) = S::as_simd_f32s(b);
+    let (a_groups, a_lanes) = a_lanes.as_chunks::<TILE>();
+    let (b_groups, b_lanes) = b_lanes.as_chunks::<TILE>();
+    let mut parts = [simd.splat_f32s(0.0); TILE];
+    for (x, y) in a_groups.iter().zip(b_groups) {
+        for i in 0..TILE {
+            parts[i] = simd.mul_add_e_f32s(x[i], y[i], parts[i]);
+        }
+    }
+    for (i, (x, y)) in a_lanes.iter().zip(b_lanes).enumerate() {
+        parts[i] = simd.mul_add_e_f32s(*x, *y, parts[i]);
+    }
+    let mut sum = parts[0];
+    for part in &parts[1..] {
+        sum = simd.add_f32s(sum, *part);
+    }
+    let mut total = simd.reduce_sum_f32s(sum);
+    for (x, y) in a_rest.iter().zip(b_rest) {
+        total += x * y;
+    }
+    total
+}
+
 /// `target += factor * vector`.
 #[inline(always)]
 pub(super) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
@@ -217,7 +245,13 @@ pub(super) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
 /// Brings a vector to length 1; a vector of zeros stays.
 #[inline(always)]
 pub(super) fn normalize(vector: &mut [f32]) {
-    let length = dot(vector, vector).sqrt();
+    normalize_with(dot(vector, vector), vector);
+}
+
+/// As [`normalize`], a vector whose squared length is known.
+#[inline(always)]
+pub(super) fn normalize_with(square: f32, vector: &mut [f32]) {
+    let length = square.sqrt();
     if length > 1e-9 {
         let scale = 1.0 / length;
         vector.iter_mut().for_each(|value| *value *= scale);
@@ -269,6 +303,7 @@ mod tests {
             let (a, b) = (numbers(len, 4), numbers(len, 5));
             let plain: f32 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
             assert!((dot(&a, &b) - plain).abs() < 1e-4);
+            assert!((product(pulp::Scalar, &a, &b) - plain).abs() < 1e-4);
         }
     }
 }

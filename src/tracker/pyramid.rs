@@ -106,9 +106,9 @@ impl Room {
     #[inline(always)]
     pub fn transform<S: Simd>(&mut self, simd: S) -> usize {
         let len = self.features.len() / LEVELS;
-        self.features
-            .chunks_exact_mut(len)
-            .for_each(matrix::normalize);
+        for vector in self.features.chunks_exact_mut(len) {
+            matrix::normalize_with(matrix::product(simd, vector, vector), vector);
+        }
         self.spectrum.resize(FREQUENCIES * 2 * len, 0.0);
         let spectrum = &mut self.spectrum;
         matrix::become_combinations(simd, spectrum, &WAVES.windowed, &self.features, len);

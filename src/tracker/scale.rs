@@ -112,7 +112,7 @@ impl ScaleFilter {
             numerators.zip(&mut self.energies).zip(spectrum).enumerate()
         {
             let (real, imaginary) = parts.split_at(len);
-            let total = matrix::dot(real, real) + matrix::dot(imaginary, imaginary);
+            let total = matrix::product(simd, parts, parts);
             *energy += rate * (total - *energy);
             let (wanted_real, wanted_imaginary) = WAVES.wanted[frequency];
             let (cos, sin) = (wanted_real as f32 * rate, wanted_imaginary as f32 * rate);
@@ -169,9 +169,11 @@ impl ScaleFilter {
             let (seen_real, seen_imaginary) = seen.split_at(len);
             let energy = f64::from(energy + DAMPING);
             *product = (
-                f64::from(matrix::dot(numerator, seen)) / energy,
-                f64::from(matrix::dot(real, seen_imaginary) - matrix::dot(imaginary, seen_real))
-                    / energy,
+                f64::from(matrix::product(simd, numerator, seen)) / energy,
+                f64::from(
+                    matrix::product(simd, real, seen_imaginary)
+                        - matrix::product(simd, imaginary, seen_real),
+                ) / energy,
             );
         }
         std::array::from_fn(|level| {

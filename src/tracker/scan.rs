@@ -62,20 +62,22 @@ impl Scan {
         let values = &mut self.values;
         self.windows
             .scores(&self.grid, discriminant, params, cell_pixels, values);
-        let place = |index: usize| Particle {
-            x: center.x + ((index % columns) as f64 - across as f64) * cell_width,
-            y: center.y + ((index / columns) as f64 - down as f64) * cell_height,
+        let place = |column: usize, row: usize| Particle {
+            x: center.x + (column as f64 - across as f64) * cell_width,
+            y: center.y + (row as f64 - down as f64) * cell_height,
             ..center
         };
-        for (index, value) in self.values.iter_mut().enumerate() {
-            let likely = params.discriminant_weight * f64::from(*value);
-            *value = (likely + sought.log_displacement(&place(index))) as f32;
+        for (row, values) in self.values.chunks_exact_mut(columns).enumerate() {
+            for (column, value) in values.iter_mut().enumerate() {
+                let likely = params.discriminant_weight * f64::from(*value);
+                *value = (likely + sought.log_displacement(&place(column, row))) as f32;
+            }
         }
         for _ in 0..params.scan_peaks {
             let Some(best) = take_peak(&mut self.values, columns) else {
                 break;
             };
-            self.peaks.push(place(best));
+            self.peaks.push(place(best % columns, best / columns));
         }
     }
 }
@@ -93,11 +95,18 @@ fn places(away: f64, (cell_width, cell_height): (f64, f64), params: &Params) -> 
 
 /// The index of the greatest value; it and those beside it count no more.
 fn take_peak(values: &mut [f32], columns: usize) -> Option<usize> {
-    let indices = 0..values.len();
-    let best = indices.reduce(|best, i| if values[i] > values[best] { i } else { best })?;
-    if values[best] == f32::NEG_INFINITY {
+    // In parts so that the loop vectorises.
+    let mut parts = [f32::NEG_INFINITY; 16];
+    for chunk in values.chunks(parts.len()) {
+        for (most, value) in parts.iter_mut().zip(chunk) {
+            *most = if *value > *most { *value } else { *most };
+        }
+    }
+    let most = parts.into_iter().fold(f32::NEG_INFINITY, f32::max);
+    if most == f32::NEG_INFINITY {
         return None;
     }
+    let best = values.iter().position(|&value| value == most)?;
     let (column, row) = (best % columns, best / columns);
     let rows = values.chunks_exact_mut(columns);
     for row in rows.skip(row.saturating_sub(1)).take(3.min(row + 2)) {

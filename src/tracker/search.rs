@@ -178,19 +178,26 @@ impl Sought<'_> {
         -0.5 * nearest / variance.max(f64::MIN_POSITIVE)
     }
 
-    /// The logarithm of the prior of a particle, 0 at the last answer and where it was carried to.
-    pub fn prior(&self, particle: &Particle) -> f64 {
+    /// The logarithms of the priors of `particles`: 0 at the last answer and where it was carried to.
+    pub fn priors(&self, particles: &[Particle]) -> impl Iterator<Item = f64> {
+        let last_scale = self.last.scale.ln();
+        particles
+            .iter()
+            .map(move |particle| self.prior(particle, last_scale))
+    }
+
+    fn prior(&self, particle: &Particle, last_scale: f64) -> f64 {
         if self.params.search == Search::Resampled {
             return 0.0;
         }
         let mut exponent = -2.0 * self.log_displacement(particle);
+        let scale = particle.scale.ln();
         if self.params.scale_change_std > 0.0 {
-            let change = (particle.scale / self.last.scale).ln();
+            let change = scale - last_scale;
             exponent += (change / self.widening / self.params.scale_change_std).powi(2);
         }
         if self.params.scale_std > 0.0 {
-            exponent +=
-                particle.scale.ln().powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
+            exponent += scale.powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
         }
         -0.5 * exponent
     }
@@ -334,13 +341,14 @@ mod tests {
                 params: &params,
                 reach: &reach,
             };
-            assert_eq!(sought.prior(&last), 0.0, "{std}");
+            let prior = |particle| sought.priors(&[particle]).next().expect("one of one");
+            assert_eq!(prior(last), 0.0, "{std}");
             let beside = Particle {
                 x: 53.0,
                 scale: 1.01,
                 ..last
             };
-            let prior = sought.prior(&beside);
+            let prior = prior(beside);
             let falls = if std > 0.0 { prior < 0.0 } else { prior == 0.0 };
             assert!(falls, "{std}: {prior}");
         }
