@@ -2,61 +2,21 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::energies::Energies;
-use super::gradients::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, registers};
-use super::places::Places;
+use super::area::Area;
+use super::centering::Centering;
+use super::gradients::{DIRECTIONS, GRAY, GradientSums};
 use super::{Params, Rect};
 
 /// Values of a cell: the directions, then its gray value.
 pub(super) const CHANNELS: usize = DIRECTIONS + 1;
-
-/// The greatest normalised value of a direction, so that one strong edge does not outweigh all else.
-const GREATEST: f32 = 0.4;
-/// Gradients of flat cells are noise: this much, in gray levels a pixel, is added to what they are divided by.
-const FLAT: f32 = 2.0;
-/// The least standard deviation of gray values, in gray levels, that theirs are divided by.
-pub(super) const LEAST_CONTRAST: f32 = 4.0;
-
-/// The share of each channel in a cell's energy.
-const ENERGY_SHARES: Lanes = {
-    let mut shares = Lanes::ZERO;
-    let mut lane = 0;
-    while lane < DIRECTIONS {
-        shares.0[lane] = 1.0;
-        lane += 1;
-    }
-    shares
-};
-/// The greatest value of each channel.
-const LIMITS: Lanes = {
-    let mut limits = Lanes([GREATEST; LANES]);
-    limits.0[GRAY] = f32::INFINITY;
-    limits
-};
-
-/// Columns of cells that are worked on together: as many as a usual area has.
-const STRIP: usize = 8;
 
 /// Room for the cells of areas.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
     columns: usize,
     rows: usize,
-    /// The corners of the cells among the columns and the rows of the sums.
-    places: [Places; 2],
     /// Of two areas, so that the one is summed up while the other is still divided.
     areas: [Area; 2],
-}
-
-/// The cells of one area.
-#[derive(Debug, Clone, Default)]
-struct Area {
-    /// The channels of each cell, row by row.
-    cells: Vec<Lanes>,
-    energies: Energies,
-    grays: Grays,
-    /// The mean number of pixels of a cell.
-    pixels: f32,
 }
 
 /// [`Cells::describe`], to be compiled for the instructions that this machine has.
@@ -66,6 +26,7 @@ struct Describe<'a, A> {
     areas: A,
     gray_weight: f32,
     out: &'a mut [f32],
+    centering: Option<Centering<'a>>,
 }
 
 impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
@@ -73,32 +34,49 @@ impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Cells {
-            columns,
-            rows,
-            places,
-            areas: [now, before],
-        } = self.cells;
-        let size = (*columns, *rows);
+        let Self {
+            cells,
+            sums,
+            mut areas,
+            gray_weight,
+            out,
+            mut centering,
+        } = self;
+        let size = (cells.columns, cells.rows);
+        let [now, before] = &mut cells.areas;
         let (mut now, mut before) = (now, before);
-        let len = size.0 * size.1 * CHANNELS;
-        let mut last = &mut [][..];
-        for (area, out) in self.areas.zip(self.out.chunks_exact_mut(len)) {
-            now.sum_up(simd, self.sums, &area, size, places);
-            // Of the area before: what it reads was written long enough ago to have come to the cache.
-            before.normalize(simd, size.0, self.gray_weight, last);
-            last = out;
+        let mut coming = areas.next();
+        if let Some(area) = &coming {
+            now.locate(sums, area, size);
+        }
+        let mut vectors = out.chunks_exact_mut(size.0 * size.1 * CHANNELS);
+        let (mut last, mut one_before) = (&mut [][..], &mut [][..]);
+        // What is read was written one area ago: it has come to the cache meanwhile, which takes longer than to compute it.
+        while let Some(area) = coming {
+            coming = areas.next();
+            if let Some(area) = &coming {
+                before.locate(sums, area, size);
+            }
+            now.sum_up(simd, sums, &area, size.0);
+            before.normalize(simd, size.0, gray_weight, last);
+            center(simd, &mut centering, one_before);
+            (one_before, last) = (last, vectors.next().expect("a vector for each area"));
             (now, before) = (before, now);
         }
-        before.normalize(simd, size.0, self.gray_weight, last);
+        before.normalize(simd, size.0, gray_weight, last);
+        center(simd, &mut centering, one_before);
+        center(simd, &mut centering, last);
     }
 }
 
-/// The sum of the gray values of all cells, and that of their squares.
-#[derive(Debug, Clone, Copy, Default)]
-struct Grays {
-    sum: f32,
-    squares: f32,
+/// Centers a vector, if there is one and that is asked for.
+#[inline(always)]
+fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut [f32]) {
+    if let Some(centering) = centering
+        && !vector.is_empty()
+    {
+        centering.apply(simd, vector);
+    }
 }
 
 impl Cells {
@@ -106,13 +84,15 @@ impl Cells {
     /// each of length D: cell by cell, row by row, the nine directions and the gray value.
     ///
     /// Each cell's directions are divided by the root of the mean energy of the 3 x 3 cells around it and clipped.
-    /// Gray values have the area's mean taken off and are divided by its standard deviation.
+    /// Gray values have the area's mean taken off and are divided by its standard deviation. The vectors are centered, if
+    /// that is asked for.
     pub fn describe(
         &mut self,
         sums: &GradientSums,
         areas: impl Iterator<Item = Rect>,
         params: &Params,
         out: &mut [f32],
+        centering: Option<Centering<'_>>,
     ) {
         self.prepare(params.patch_width as usize, params.patch_height as usize);
         Arch::new().dispatch(Describe {
@@ -121,6 +101,7 @@ impl Cells {
             areas,
             gray_weight: params.gray_weight as f32,
             out,
+            centering,
         });
     }
 
@@ -142,154 +123,15 @@ impl Cells {
             return;
         }
         (self.columns, self.rows) = (columns, rows);
-        self.places[0].prepare(columns + 1);
-        self.places[1].prepare(rows + 1);
         for area in &mut self.areas {
-            area.cells.resize(columns * rows, Lanes::ZERO);
-            area.energies.prepare(columns, rows);
-        }
-    }
-}
-
-impl Area {
-    /// Becomes the cells of `area`, and their energies.
-    #[inline(always)]
-    fn sum_up<S: Simd>(
-        &mut self,
-        simd: S,
-        sums: &GradientSums,
-        area: &Rect,
-        (columns, rows): (usize, usize),
-        places: &mut [Places; 2],
-    ) {
-        let width = (area.width / columns as f64) as f32;
-        let height = (area.height / rows as f64) as f32;
-        sums.columns((area.x as f32, width), &mut places[0]);
-        sums.rows((area.y as f32, height), &mut places[1]);
-        let mut grays = [Lanes::ZERO; 2];
-        let mut first = 0;
-        while first + STRIP <= columns {
-            self.sum_strip::<S, STRIP>(simd, sums, places, (first, columns), &mut grays);
-            first += STRIP;
-        }
-        while first < columns {
-            self.sum_strip::<S, 1>(simd, sums, places, (first, columns), &mut grays);
-            first += 1;
-        }
-        self.energies.sum_columns();
-        self.grays = Grays {
-            sum: grays[0].0[GRAY],
-            squares: grays[1].0[GRAY],
-        };
-        self.pixels = (area.width * area.height) as f32 / self.cells.len() as f32;
-    }
-
-    /// The cells of `N` columns from `first` on, each the sum at its lower right corner, less those at the two beside it,
-    /// and that at its upper left one; and their energies. Adds the cells and their squares to `total`.
-    #[inline(always)]
-    fn sum_strip<S: Simd, const N: usize>(
-        &mut self,
-        simd: S,
-        sums: &GradientSums,
-        places: &[Places; 2],
-        (first, columns): (usize, usize),
-        total: &mut [Lanes; 2],
-    ) {
-        let energy_shares = ENERGY_SHARES;
-        let energy_shares = energy_shares.load::<S>();
-        let zero = simd.splat_f32s(0.0);
-        let (mut cells_sum, mut squares_sum) = ([zero; LANES], [zero; LANES]);
-        let [column_places, row_places] = places;
-        let mut places = [column_places.get(first); N];
-        for (i, place) in places.iter_mut().enumerate() {
-            *place = column_places.get(first + 1 + i);
-        }
-        let first_place = column_places.get(first);
-        // For each column the sum at its right corner less that at its left one, in the last row of corners. The first row
-        // makes no cells.
-        let mut edges = [[zero; LANES]; N];
-        let row = sums.row(row_places.get(0));
-        let mut left = row.at(simd, first_place);
-        for i in 0..N {
-            let right = row.at(simd, places[i]);
-            for register in 0..registers::<S>() {
-                edges[i][register] = simd.sub_f32s(right[register], left[register]);
-            }
-            left = right;
-        }
-        for (j, cells) in self.cells.chunks_exact_mut(columns).enumerate() {
-            let cells = &mut cells[first..][..N];
-            let row = sums.row(row_places.get(j + 1));
-            let mut energies = [zero; N];
-            let mut left = row.at(simd, first_place);
-            for i in 0..N {
-                let right = row.at(simd, places[i]);
-                let cell = cells[i].load_mut::<S>();
-                for register in 0..registers::<S>() {
-                    let across = simd.sub_f32s(right[register], left[register]);
-                    let inside = simd.sub_f32s(across, edges[i][register]);
-                    (edges[i][register], cell[register]) = (across, inside);
-                    let square = simd.mul_f32s(inside, inside);
-                    cells_sum[register] = simd.add_f32s(cells_sum[register], inside);
-                    squares_sum[register] = simd.add_f32s(squares_sum[register], square);
-                    energies[i] = simd.mul_add_e_f32s(square, energy_shares[register], energies[i]);
-                }
-                left = right;
-            }
-            self.energies.take(simd, (first, j), energies);
-        }
-        for (total, sums) in total.iter_mut().zip([cells_sum, squares_sum]) {
-            let total = total.load_mut::<S>();
-            for register in 0..registers::<S>() {
-                total[register] = simd.add_f32s(total[register], sums[register]);
-            }
-        }
-    }
-
-    /// Writes the feature vector of the cells to `out`, if there is room.
-    #[inline(always)]
-    fn normalize<S: Simd>(&mut self, simd: S, columns: usize, gray_weight: f32, out: &mut [f32]) {
-        if out.is_empty() {
-            return;
-        }
-        let (count, pixels, grays) = (self.cells.len() as f32, self.pixels, self.grays);
-        let mean = grays.sum / count;
-        let variance = (grays.squares / count - mean * mean).max(0.0);
-        let gray_scale = gray_weight / variance.sqrt().max(LEAST_CONTRAST * pixels);
-        let floor = (FLAT * pixels) * (FLAT * pixels);
-        // A value is min(cell * factor + offset, limit).
-        let (mut gray_factors, mut offsets) = (Lanes::ZERO, Lanes::ZERO);
-        (gray_factors.0[GRAY], offsets.0[GRAY]) = (gray_scale, -mean * gray_scale);
-        let (gray_factors, offsets) = (gray_factors.load::<S>(), offsets.load::<S>());
-        let (directions, limits) = (ENERGY_SHARES, LIMITS);
-        let (directions, limits) = (directions.load::<S>(), limits.load::<S>());
-        let scales = self.energies.scales(floor);
-        let mut first = 0;
-        for (cells, scales) in self.cells.chunks_exact(columns).zip(scales) {
-            for (cell, &scale) in cells.iter().zip(scales) {
-                let (scale, cell) = (simd.splat_f32s(scale), cell.load::<S>());
-                let mut values = Lanes::ZERO;
-                for (register, value) in values.load_mut::<S>().iter_mut().enumerate() {
-                    let factor =
-                        simd.mul_add_e_f32s(directions[register], scale, gray_factors[register]);
-                    let scaled = simd.mul_add_e_f32s(cell[register], factor, offsets[register]);
-                    *value = simd.min_f32s(scaled, limits[register]);
-                }
-                // What is beyond the channels is written over by the next cell.
-                let out = &mut out[first..];
-                if let Some(out) = out.first_chunk_mut::<LANES>() {
-                    *out = values.0;
-                } else {
-                    out.copy_from_slice(&values.0[..CHANNELS]);
-                }
-                first += CHANNELS;
-            }
+            area.prepare(columns, rows);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::area::{FLAT, GREATEST};
     use super::*;
     use crate::tracker::{GrayFrame, Preset};
 
@@ -342,8 +184,8 @@ mod tests {
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
             sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
-            let Cells { places, areas, .. } = &mut cells;
-            areas[0].sum_up(pulp::Scalar, &sums, &area, (4, 4), places);
+            cells.areas[0].locate(&sums, &area, (4, 4));
+            cells.areas[0].sum_up(pulp::Scalar, &sums, &area, 4);
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
                 let x = area.x + (index % 4) as f64 * width;
@@ -366,7 +208,7 @@ mod tests {
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
         sums.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
         let mut out = vec![1.0; params.feature_len()];
-        Cells::default().describe(&sums, std::iter::once(area), params, &mut out);
+        Cells::default().describe(&sums, std::iter::once(area), params, &mut out, None);
         out
     }
 

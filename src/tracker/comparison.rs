@@ -6,9 +6,8 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use pulp::{Arch, Simd, WithSimd};
-
 use super::camera::Camera;
+use super::centering::Centering;
 use super::discriminant::Discriminant;
 use super::examples::Examples;
 use super::motion::Particle;
@@ -20,7 +19,7 @@ use super::solitary::Solitary;
 use super::state::State;
 use super::trust::Trust;
 use super::view::View;
-use super::{Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood, matrix};
+use super::{Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood};
 
 /// P at most.
 const GREATEST_HISTORY: usize = 10;
@@ -31,27 +30,6 @@ fn offset(state: &State) -> &[f32] {
         state.background.mean()
     } else {
         &[]
-    }
-}
-
-/// Takes the mean off vectors and appends their squared lengths; to be compiled for the instructions that this machine
-/// has.
-struct Center<'a> {
-    vectors: &'a mut [f32],
-    mean: &'a [f32],
-    len: usize,
-    squares: &'a mut Vec<f32>,
-}
-
-impl WithSimd for Center<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        for vector in self.vectors.chunks_exact_mut(self.len) {
-            matrix::add(vector, -1.0, self.mean);
-            self.squares.push(matrix::product(simd, vector, vector));
-        }
     }
 }
 
@@ -177,14 +155,12 @@ impl Comparison {
         let (first, range) = (batch.start, self.places(&batch));
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors[range.clone()];
-        self.view
-            .describe(frame, particles, &state.reach, params, vectors);
-        Arch::new().dispatch(Center {
-            vectors,
+        let centering = Some(Centering {
             mean: offset(state),
-            len: self.len,
             squares: &mut self.squares,
         });
+        self.view
+            .describe(frame, particles, &state.reach, params, vectors, centering);
         let vectors = &self.vectors[range.clone()];
         let squares = &self.squares[first..];
         if params.candidate_alone {

@@ -42,11 +42,13 @@
 
 mod abreast;
 mod angle;
+mod area;
 mod background;
 mod bag;
 mod camera;
 mod candidate;
 mod cells;
+mod centering;
 mod combination;
 mod comparison;
 mod directions;

@@ -3,6 +3,7 @@
 //! A view is open on one frame, around one place: what lies further off is not there.
 
 use super::cells::{CHANNELS, Cells};
+use super::centering::Centering;
 use super::gradients::{DIRECTIONS, GradientSums};
 use super::motion::{Particle, Reach};
 use super::patch::PatchCutter;
@@ -81,10 +82,11 @@ impl View {
         out: &mut Vec<f32>,
     ) {
         out.resize(particles.len() * params.feature_len(), 0.0);
-        self.describe(frame, particles, reach, params, out);
+        self.describe(frame, particles, reach, params, out, None);
     }
 
-    /// Writes the feature vectors, of length D, of `particles` to `out`, which is as long as they are.
+    /// Writes the feature vectors, of length D, of `particles` to `out`, which is as long as they are; centered, if that is
+    /// asked for.
     pub fn describe(
         &mut self,
         frame: &GrayFrame,
@@ -92,16 +94,21 @@ impl View {
         reach: &Reach,
         params: &Params,
         out: &mut [f32],
+        centering: Option<Centering<'_>>,
     ) {
         match params.features {
             Features::Gray => {
                 self.cut(frame, particles, reach, params, out);
+                if let Some(centering) = centering {
+                    centering.apply_to_all(out, params.feature_len());
+                }
             }
             Features::Gradients => {
                 let areas = particles
                     .iter()
                     .map(|particle| seen(particle, reach, params));
-                self.cells.describe(&self.gradients, areas, params, out);
+                self.cells
+                    .describe(&self.gradients, areas, params, out, centering);
             }
         }
     }
@@ -149,7 +156,7 @@ impl View {
         let cells = &mut self.grid_cells;
         cells.reserve(most_columns as usize, most_rows as usize);
         let areas = std::iter::once(area);
-        cells.describe(&self.gradients, areas, &params, &mut grid.values);
+        cells.describe(&self.gradients, areas, &params, &mut grid.values, None);
         grid.grays.extend(cells.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
             cell[DIRECTIONS] = 0.0;

@@ -9,7 +9,8 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::cells::{CHANNELS, LEAST_CONTRAST};
+use super::area::LEAST_CONTRAST;
+use super::cells::CHANNELS;
 use super::discriminant::Discriminant;
 use super::gradients::{DIRECTIONS, GRAY, Lanes};
 use super::planes::{Planes, load};
