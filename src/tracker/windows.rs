@@ -220,10 +220,9 @@ impl Scorer {
         let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
         let scale = simd.div_f32s(simd.splat_f32s(self.gray_weight), deviation);
         let mut whole = products.directions;
-        for of in 0..2 {
-            let shift = simd.mul_f32s(mean, simd.splat_f32s(self.grays[of]));
-            let grays = simd.sub_f32s(products.grays[of], shift);
-            whole[of] = simd.mul_add_e_f32s(scale, grays, whole[of]);
+        for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
+            let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
+            *whole = simd.mul_add_e_f32s(scale, simd.sub_f32s(grays, shift), *whole);
         }
         let [of_weights, of_origin] = whole;
         let contrast = simd.mul_f32s(simd.mul_f32s(scale, scale), variance);
