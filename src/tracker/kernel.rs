@@ -169,14 +169,14 @@ element!(
 /// [`Element::sum_each`] in single precision.
 #[inline(always)]
 fn sum_each_single<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [f32; 4] {
-    // Pairs of neighbours stay together first, for it takes half as many shuffles to move these.
-    let pair = |a: S::f32s, b: S::f32s| -> S::f32s {
-        let pairs: [S::f64s; 2] = [bytemuck::cast(a), bytemuck::cast(b)];
-        let [even, odd] = simd.deinterleave_shfl_f64s(pairs);
-        simd.add_f32s(bytemuck::cast(even), bytemuck::cast(odd))
+    let pair = |a, b| -> S::f64s {
+        let [even, odd] = simd.deinterleave_shfl_f32s([a, b]);
+        bytemuck::cast(simd.add_f32s(even, odd))
     };
-    let [even, odd] = simd.deinterleave_shfl_f32s([pair(a, c), pair(b, d)]);
-    sums::fold::<f32, 4>(bytemuck::cast_slice(&[simd.add_f32s(even, odd)]))
+    // Two neighbours, of the one and of the other, move together now.
+    let [even, odd] = simd.deinterleave_shfl_f64s([pair(a, b), pair(c, d)]);
+    let sum = simd.add_f32s(bytemuck::cast(even), bytemuck::cast(odd));
+    sums::fold::<f32, 4>(bytemuck::cast_slice(&[sum]))
 }
 
 /// [`Element::sum_each`] in double precision: of two.

@@ -30,11 +30,9 @@ impl Planes {
     pub fn take(&mut self, grid: &Grid, (width, height): (usize, usize)) {
         let most_columns = width + 2 * MOST_AWAY + LANES;
         let most = most_columns * (height + 2 * MOST_AWAY) * PLANES;
-        if self.lines.len() < most {
-            self.lines.resize(most, 0.0);
-            self.energies.resize(most_columns, 0.0);
-            self.squares.resize(most_columns, 0.0);
-        }
+        hold(&mut self.lines, most);
+        hold(&mut self.energies, most_columns);
+        hold(&mut self.squares, most_columns);
         self.stride = grid.columns + LANES;
         let cells = grid.values.chunks_exact(grid.columns * CHANNELS);
         let rows = cells.zip(grid.grays.chunks_exact(grid.columns));
@@ -92,6 +90,13 @@ impl Planes {
             }
         }
         sums
+    }
+}
+
+/// Makes `values` hold at least `count` of them, whatever they are.
+fn hold(values: &mut Vec<f32>, count: usize) {
+    if values.len() < count {
+        values.resize(count, 0.0);
     }
 }
 

@@ -33,13 +33,8 @@ pub(super) fn can_sum<S: Simd, T: Element>(simd: S) -> bool {
 /// The parts of 128 bits of a register, added up.
 #[inline(always)]
 pub(super) fn fold<T: Element, const N: usize>(values: &[T]) -> [T; TOGETHER] {
-    let (parts, _) = values.as_chunks::<N>();
     let mut sums = [T::default(); TOGETHER];
-    let Some((first, others)) = parts.split_first() else {
-        return sums;
-    };
-    sums[..N].copy_from_slice(first);
-    for part in others {
+    for part in values.as_chunks::<N>().0 {
         for (sum, value) in sums.iter_mut().zip(part) {
             *sum += *value;
         }
