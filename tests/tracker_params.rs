@@ -66,6 +66,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         scan_peaks: seed as u32 % 17,
         scan_reach: 4.0 * share(),
         averaging_radius: 100.0 * share(),
+        pose_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: 100.0 * share(),
         trusted_ratio: 100.0 * (seed % 3) as f64 / 2.0,
         discriminant_weight: 100.0 * (seed % 5) as f64 / 4.0,

@@ -40,6 +40,7 @@ const ROWS: &[Row] = &[
     ("no prior on the scale", &[("scale_std", "0")]),
     ("no filter for the scale", &[("scale_rate", "0")]),
     ("no look at every place", &[("scan_peaks", "0")]),
+    ("no poses of the first look", &[("pose_angle", "0")]),
     ("a pinned subspace as any other", &[("pinned_weight", "1")]),
     ("never out of sight", &[("lost_below", "0")]),
     ("no camera shift", &[("camera_shift", "false")]),

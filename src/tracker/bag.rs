@@ -8,6 +8,7 @@ use super::background::Background;
 use super::combination::{self, Combination};
 use super::eigen::Spectrum;
 use super::look::Look;
+use super::poses;
 use super::{AffineSubspace, Params};
 
 /// One affine subspace of the bag.
@@ -107,7 +108,7 @@ impl Entry {
     /// Whether this may be an entry of a tracker with `params`, but for its subspace.
     pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
         let counts = if params.keeps_looks() {
-            1..=params.history as usize + 1
+            1..=(params.history as usize).max(poses::MOST) + 1
         } else {
             0..=0
         };

@@ -13,6 +13,7 @@ use super::camera::Camera;
 use super::comparison::{self, Comparison};
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
+use super::poses;
 use super::pyramid;
 use super::scale::ScaleFilter;
 use super::score::Usual;
@@ -32,6 +33,7 @@ const FIRST_EXAMPLE_SCALES: f64 = 0.3;
 pub(super) struct Room {
     areas: Vec<Particle>,
     features: Vec<f32>,
+    pose: Vec<f32>,
     pub background: background::Room,
     pub bag: bag::Room,
     fit: discriminant::Room,
@@ -81,6 +83,7 @@ impl State {
         };
         state.gather(answer);
         state.survey(frame, 0, room);
+        state.look_at_poses(frame, room);
         let Room { features, bag, .. } = &mut room.learning;
         state
             .bag
@@ -100,6 +103,7 @@ impl State {
             *camera = Camera::new(frame);
         }
         self.survey(frame, number, room);
+        self.look_at_poses(frame, room);
         let Room { features, bag, .. } = &mut room.learning;
         self.bag.renew(&self.background, &self.params, bag);
         self.history.clear();
@@ -227,6 +231,19 @@ impl State {
         let answer = [self.answer];
         room.view
             .features(frame, &answer, &self.reach, &self.params, features);
+    }
+
+    /// Appends the feature vectors of the answer in other poses. The view is of the last of these then.
+    fn look_at_poses(&self, frame: &GrayFrame, room: &mut Comparison) {
+        let (answer, params) = ([self.answer], &self.params);
+        let Room { features, pose, .. } = &mut room.learning;
+        for angle in poses::angles(params) {
+            let turned = poses::turned(frame, &self.answer, angle);
+            room.view.open(&turned, &answer, 0.0, &self.reach, params);
+            room.view
+                .features(&turned, &answer, &self.reach, params, pose);
+            features.extend_from_slice(pose);
+        }
     }
 
     fn sample_background(

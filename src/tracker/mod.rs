@@ -77,6 +77,7 @@ mod patch;
 mod permute;
 mod places;
 mod planes;
+mod poses;
 mod posterior;
 mod presets;
 mod products;

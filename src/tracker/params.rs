@@ -120,6 +120,9 @@ pub struct Params {
     /// How many of the oldest subspaces never leave the bag, 0 to 16, fewer than K. What the user pointed at is the
     /// one look that is known to be right. Off: 0.
     pub pinned: u32,
+    /// By how many degrees, either way, the look that the user pointed at is turned to make its subspace, 0 to 90: what a
+    /// target that tilts a little looks like is known from the first frame on then. Off: 0.
+    pub pose_angle: f64,
     /// The weight of a pinned subspace in the sum rule (equation 9), 0 to 100. Off: 1.
     pub pinned_weight: f64,
     /// The tracker learns from a frame only while the answer's distance to the first subspace is below this multiple

@@ -61,6 +61,7 @@ const PAPER: Params = Params {
     camera_shift: false,
     averaging_radius: 0.0,
     pinned: 0,
+    pose_angle: 0.0,
     pinned_weight: 1.0,
     trusted_ratio: 0.0,
     discriminant_weight: 0.0,
@@ -105,6 +106,8 @@ const ROBUST: Params = Params {
     camera_shift: true,
     averaging_radius: 3.0,
     pinned: 1,
+    // 5 to 15 are alike: a head that nods, a bottle that is lifted to drink.
+    pose_angle: 10.0,
     pinned_weight: 6.0,
     trusted_ratio: 1.5,
     discriminant_weight: 12.0,

@@ -137,6 +137,7 @@ impl Params {
             0.0..=100.0,
             "from 0 to 100",
         )?;
+        real("pose_angle", self.pose_angle, 0.0..=90.0, "from 0 to 90")?;
         real(
             "pinned_weight",
             self.pinned_weight,

@@ -16,7 +16,7 @@ use super::{Params, TrackerError, comparison};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
