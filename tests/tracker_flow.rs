@@ -196,7 +196,7 @@ fn every_parameter_out_of_range_is_named() {
 #[test]
 fn every_parameter_of_a_mend_out_of_range_is_named() {
     type Change = fn(&mut Params);
-    let cases: [(&str, Change); 26] = [
+    let cases: [(&str, Change); 27] = [
         ("background_samples", |p| p.background_samples = 257),
         ("background_every", |p| p.background_every = 0),
         ("background_ridge", |p| p.background_ridge = 0.0),
@@ -211,6 +211,7 @@ fn every_parameter_of_a_mend_out_of_range_is_named() {
         ("scale_rate", |p| p.scale_rate = 1.1),
         ("scan_peaks", |p| p.scan_peaks = 17),
         ("scan_reach", |p| p.scan_reach = 4.1),
+        ("arrival_weight", |p| p.arrival_weight = 100.5),
         ("averaging_radius", |p| p.averaging_radius = f64::NAN),
         ("pose_angle", |p| p.pose_angle = 90.1),
         ("pinned", |p| p.pinned = 17),

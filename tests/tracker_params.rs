@@ -65,6 +65,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         scale_rate: if on(3) { share() } else { 0.0 },
         scan_peaks: seed as u32 % 17,
         scan_reach: 4.0 * share(),
+        arrival_weight: if on(5) { 100.0 * share() } else { 0.0 },
         averaging_radius: 100.0 * share(),
         pose_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: 100.0 * share(),

@@ -42,6 +42,7 @@ const ROWS: &[Row] = &[
     ("no look at every place", &[("scan_peaks", "0")]),
     ("no poses of the first look", &[("pose_angle", "0")]),
     ("a pinned subspace as any other", &[("pinned_weight", "1")]),
+    ("nothing has to arrive", &[("arrival_weight", "0")]),
     ("never out of sight", &[("lost_below", "0")]),
     ("no camera shift", &[("camera_shift", "false")]),
     ("arg max, not averaged", &[("averaging_radius", "0")]),

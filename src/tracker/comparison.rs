@@ -6,6 +6,7 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
+use super::arrival::Arrival;
 use super::camera::Camera;
 use super::centering::Centering;
 use super::discriminant::Discriminant;
@@ -71,6 +72,8 @@ pub(super) struct Comparison {
     pub learning: learning::Room,
     /// For the profiles of a frame.
     pub camera: Camera,
+    /// For what has come to the places of particles.
+    pub arrival: Arrival,
     /// For the places that are looked at before particles are drawn.
     pub scan: Scan,
 }
@@ -243,6 +246,12 @@ impl Comparison {
         let params = sought.params;
         self.weights.clear();
         self.weights.extend(sought.priors(&self.particles));
+        if params.arrival_weight > 0.0 {
+            for (weight, particle) in self.weights.iter_mut().zip(&self.particles) {
+                let unchanged = self.arrival.unchanged(particle, sought.reach);
+                *weight -= params.arrival_weight * unchanged;
+            }
+        }
         if discriminant.is_on() {
             let factor = params.discriminant_weight;
             let scores = self.examples.scores();

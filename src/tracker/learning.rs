@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::arrival::LastSeen;
 use super::background::{self, Background};
 use super::bag::{self, Bag};
 use super::camera::Camera;
@@ -77,6 +78,7 @@ impl State {
             discriminant: Discriminant::default(),
             camera,
             scale_filter: ScaleFilter::default(),
+            last_seen: LastSeen::default(),
             trust: Trust::default(),
             usual: Usual::default(),
             frames_lost: 0,
@@ -128,6 +130,8 @@ impl State {
         self.scale_filter.forget();
         self.learn_scale(frame, room);
         self.look_at_answer(frame, room);
+        room.arrival.take(frame);
+        self.see(&room.arrival);
     }
 
     /// How far from the answer frame `number` is looked at for the sake of learning, in working pixels.

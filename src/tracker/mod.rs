@@ -43,6 +43,7 @@
 mod abreast;
 mod angle;
 mod area;
+mod arrival;
 mod background;
 mod bag;
 mod camera;
@@ -234,6 +235,13 @@ impl Tracker {
             }
         }
 
+        if params.arrival_weight > 0.0 {
+            let carried = sought.carried();
+            room.arrival.take(frame);
+            room.arrival
+                .compare(&state.last_seen, &carried, furthest, reach);
+        }
+
         // (B) What is seen there, and (D) how that compares with what is known.
         room.extend(frame, 0, state);
         let mut best = room.weigh(&sought, &state.discriminant);
@@ -265,6 +273,9 @@ impl Tracker {
         // (C) What is to be remembered of it.
         state.answer = answer;
         state.keep_particles(&room.particles, &room.weights);
+        if !lost {
+            state.see(&room.arrival);
+        }
         if trusted {
             state.learn(frame, number, room);
         }

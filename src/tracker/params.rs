@@ -110,6 +110,10 @@ pub struct Params {
     /// How far around the last answer it looks at every place, as a multiple of the box's longer side, 0 to 4; at least
     /// as far as particles come, at most 24 cells.
     pub scan_reach: f64,
+    /// How much less likely a particle is whose place looks as it did when the target was last seen elsewhere: the logarithm,
+    /// where all of its box is beside the last one and nothing in it has changed, 0 to 100. What comes to a place changes
+    /// it. Off: 0.
+    pub arrival_weight: f64,
     /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
     /// moves a target further than targets move. Off: false.
     pub camera_shift: bool,

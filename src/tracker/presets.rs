@@ -58,6 +58,7 @@ const PAPER: Params = Params {
     scale_rate: 0.0,
     scan_peaks: 0,
     scan_reach: 0.0,
+    arrival_weight: 0.0,
     camera_shift: false,
     averaging_radius: 0.0,
     pinned: 0,
@@ -103,6 +104,8 @@ const ROBUST: Params = Params {
     scan_peaks: 6,
     // A target that moves by all of its own length is still seen.
     scan_reach: 1.0,
+    // Half of what the discriminant can say: it is wrong about background that resembles the target.
+    arrival_weight: 6.0,
     camera_shift: true,
     averaging_radius: 3.0,
     pinned: 1,

@@ -132,6 +132,12 @@ impl Params {
         real("scale_rate", self.scale_rate, 0.0..=1.0, "from 0 to 1")?;
         real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(
+            "arrival_weight",
+            self.arrival_weight,
+            0.0..=100.0,
+            "from 0 to 100",
+        )?;
+        real(
             "averaging_radius",
             self.averaging_radius,
             0.0..=100.0,

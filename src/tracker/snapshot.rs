@@ -161,6 +161,9 @@ fn check_mends(state: &State) -> bool {
             .camera
             .as_ref()
             .is_none_or(|camera| camera.is_sound(width as usize, height as usize))
+        && state
+            .last_seen
+            .is_sound((width, height), params.arrival_weight > 0.0)
         && (0.0..=1e6).contains(&state.trust.usual)
 }
 

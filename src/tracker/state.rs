@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::arrival::{Arrival, LastSeen};
 use super::background::Background;
 use super::bag::Bag;
 use super::camera::Camera;
@@ -45,6 +46,7 @@ pub(super) struct State {
     /// Where a shift of the picture is looked for.
     pub camera: Option<Camera>,
     pub scale_filter: ScaleFilter,
+    pub last_seen: LastSeen,
     pub trust: Trust,
     pub usual: Usual,
     /// For how many frames the target has been out of sight.
@@ -116,6 +118,13 @@ impl State {
             return score < below;
         }
         score < below + FOUND_MARGIN || !self.trust.recognizes(evidence.first, &self.params)
+    }
+
+    /// The target is at the answer in the frame that `arrival` has taken.
+    pub fn see(&mut self, arrival: &Arrival) {
+        if self.params.arrival_weight > 0.0 {
+            self.last_seen.see(self.answer, arrival);
+        }
     }
 
     /// Makes the first vector of `features` the newest of the history.

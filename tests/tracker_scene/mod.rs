@@ -172,7 +172,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each mend of the preset `robust`, switched off.
-const MENDS_OFF: [(&str, Change); 15] = [
+const MENDS_OFF: [(&str, Change); 16] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
@@ -184,6 +184,7 @@ const MENDS_OFF: [(&str, Change); 15] = [
     ("no filter of the scale", |p| p.scale_rate = 0.0),
     ("no look at every place", |p| p.scan_peaks = 0),
     ("no poses", |p| p.pose_angle = 0.0),
+    ("nothing has to arrive", |p| p.arrival_weight = 0.0),
     ("nothing pinned", |p| p.pinned = 0),
     ("all trusted", |p| p.trusted_ratio = 0.0),
     ("any length", |p| p.unit_length = false),
