@@ -196,7 +196,7 @@ fn every_parameter_out_of_range_is_named() {
 #[test]
 fn every_parameter_of_a_mend_out_of_range_is_named() {
     type Change = fn(&mut Params);
-    let cases: [(&str, Change); 27] = [
+    let cases: [(&str, Change); 28] = [
         ("background_samples", |p| p.background_samples = 257),
         ("background_every", |p| p.background_every = 0),
         ("background_ridge", |p| p.background_ridge = 0.0),
@@ -217,6 +217,7 @@ fn every_parameter_of_a_mend_out_of_range_is_named() {
         ("pinned", |p| p.pinned = 17),
         ("pinned", |p| p.pinned = p.bag_size),
         ("pinned_weight", |p| p.pinned_weight = -1.0),
+        ("learn_above", |p| p.learn_above = -0.1),
         ("trusted_ratio", |p| p.trusted_ratio = f64::NAN),
         ("discriminant_weight", |p| p.discriminant_weight = 101.0),
         ("discriminant_damping", |p| p.discriminant_damping = 0.0),

@@ -69,6 +69,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         averaging_radius: 100.0 * share(),
         pose_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: 100.0 * share(),
+        learn_above: share(),
         trusted_ratio: 100.0 * (seed % 3) as f64 / 2.0,
         discriminant_weight: 100.0 * (seed % 5) as f64 / 4.0,
         features: if on(0) {

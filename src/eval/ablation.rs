@@ -48,6 +48,7 @@ const ROWS: &[Row] = &[
     ("arg max, not averaged", &[("averaging_radius", "0")]),
     ("no pinned subspace", &[("pinned", "0")]),
     ("learns from every frame", &[("trusted_ratio", "0")]),
+    ("learns what it hardly believes", &[("learn_above", "0")]),
     ("no discriminant", &[("discriminant_weight", "0")]),
 ];
 

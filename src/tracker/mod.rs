@@ -276,7 +276,7 @@ impl Tracker {
         if !lost {
             state.see(&room.arrival);
         }
-        if trusted {
+        if trusted && state.believes(score, number) {
             state.learn(frame, number, room);
         }
         state.estimate = Estimate {

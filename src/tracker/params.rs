@@ -133,6 +133,10 @@ pub struct Params {
     /// of what is usual, 0 to 100. Off: 0.
     pub trusted_ratio: f64,
 
+    /// The tracker learns only from frames with this score or a greater one, 0 to 1, where there is a discriminant, but for the first
+    /// twenty. Off: 0.
+    pub learn_above: f64,
+
     /// Weight of a linear score that is learned from all candidates of the past frames and tells the target from what
     /// is beside it; the likelihood is multiplied by exp(weight · score), 0 to 100. Off: 0.
     pub discriminant_weight: f64,

@@ -156,6 +156,7 @@ impl Params {
             0.0..=100.0,
             "from 0 to 100",
         )?;
+        real("learn_above", self.learn_above, 0.0..=1.0, "from 0 to 1")?;
         real(
             "discriminant_weight",
             self.discriminant_weight,

@@ -13,7 +13,7 @@ use super::frame::working_size;
 use super::motion::{Particle, Reach};
 use super::scale::ScaleFilter;
 use super::score::{Evidence, Usual};
-use super::trust::Trust;
+use super::trust::{self, Trust};
 use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
 
 /// The shortest side of a box, in pixels of the uploaded frame.
@@ -118,6 +118,12 @@ impl State {
             return score < below;
         }
         score < below + FOUND_MARGIN || !self.trust.recognizes(evidence.first, &self.params)
+    }
+
+    /// Whether frame `number`, whose answer has `score`, is believed enough to be learned from. Without a discriminant a
+    /// score is no chance.
+    pub fn believes(&self, score: f32, number: u64) -> bool {
+        !self.discriminant.is_on() || trust::believes(f64::from(score), number, &self.params)
     }
 
     /// The target is at the answer in the frame that `arrival` has taken.

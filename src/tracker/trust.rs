@@ -5,6 +5,8 @@
 //! covered, and creeps when the target turns. A frame is trusted while that distance is below a multiple of what is
 //! usual. What is usual follows slowly in frames that are not trusted, too, so that a lasting change is accepted in
 //! the end.
+//!
+//! Where such a jump is usual the score tells: a frame is learned from only if its box is rather right than not.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +24,12 @@ const RECOGNIZED: f64 = 1.15;
 /// The share of the newest frame in the running mean, when trusted and when not.
 const RENEWAL: f64 = 0.1;
 const RENEWAL_UNTRUSTED: f64 = 0.02;
+
+/// Whether frame `number`, whose answer overlaps the target by half or more with the chance `score`, may be learned from. A
+/// box that is half off is learned as what the target looks like otherwise, and the next one is further off.
+pub(super) fn believes(score: f64, number: u64, params: &Params) -> bool {
+    number < UNTIL_USUAL || score >= params.learn_above
+}
 
 /// What distances to the first subspace have been usual.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -70,6 +78,15 @@ mod tests {
         let untrusted = (50..500).take_while(|&number| !trust.judge(0.6, number, &params));
         let untrusted = untrusted.count();
         assert!((10..100).contains(&untrusted), "{untrusted}");
+    }
+
+    #[test]
+    fn what_is_hardly_believed_is_not_learned_once_there_were_some_frames() {
+        let params = Preset::Robust.params();
+        let learned = |score, number| believes(score, number, &params);
+        assert!(learned(0.1, UNTIL_USUAL - 1) && learned(0.7, 500));
+        assert!(!learned(0.6, UNTIL_USUAL) && !learned(0.1, 500));
+        assert!(believes(0.0, 500, &Preset::Paper.params()));
     }
 
     #[test]

@@ -172,7 +172,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each mend of the preset `robust`, switched off.
-const MENDS_OFF: [(&str, Change); 16] = [
+const MENDS_OFF: [(&str, Change); 17] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
@@ -187,6 +187,7 @@ const MENDS_OFF: [(&str, Change); 16] = [
     ("nothing has to arrive", |p| p.arrival_weight = 0.0),
     ("nothing pinned", |p| p.pinned = 0),
     ("all trusted", |p| p.trusted_ratio = 0.0),
+    ("all believed", |p| p.learn_above = 0.0),
     ("any length", |p| p.unit_length = false),
     ("no prior", |p| {
         p.displacement_std = 0.0;
