@@ -14,7 +14,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
         1 => Just(5e-324),
         6 => 0.0_f64..1.0,
     ];
-    proptest::collection::vec(share, 29)
+    proptest::collection::vec(share, 32)
 }
 
 /// The parameters that `shares` make over the whole of the ranges, but for sizes: those stay small, to be quick.

@@ -253,7 +253,7 @@ mod tests {
         let gray = |x: usize, y: usize| {
             let (across, down) = (x as f64 + 0.5 - area.x, y as f64 + 0.5 - area.y);
             if (0.0..area.width).contains(&across) && (0.0..area.height).contains(&down) {
-                return if across as usize / 5 % 2 == 0 {
+                return if (across as usize / 5).is_multiple_of(2) {
                     230
                 } else {
                     20

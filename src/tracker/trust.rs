@@ -19,8 +19,8 @@ const UNTIL_USUAL: u64 = 20;
 /// those of a look that shares about half with the first.
 const FIRST_USUAL: f64 = 0.25;
 const ALWAYS_TRUSTED: f64 = 0.37;
-/// What is found again may be this many times as far from the first look as is usual: it comes back turned.
-const RECOGNIZED: f64 = 1.15;
+/// A target that has hardly changed so far may have changed this much when it comes back.
+const LEAST_USUAL: f64 = 0.15;
 /// The share of the newest frame in the running mean, when trusted and when not.
 const RENEWAL: f64 = 0.1;
 const RENEWAL_UNTRUSTED: f64 = 0.02;
@@ -51,9 +51,9 @@ impl Trust {
     }
 
     /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target:
-    /// a wide search finds the likest of all things, so it must look about as much like the first look as is usual.
+    /// a wide search finds the likest of all things, so it must look as much like the first look as is usual.
     pub fn recognizes(&self, distance: f64, params: &Params) -> bool {
-        params.trusted_ratio <= 0.0 || distance < RECOGNIZED * self.usual.max(FIRST_USUAL)
+        params.trusted_ratio <= 0.0 || distance < self.usual.max(LEAST_USUAL)
     }
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
