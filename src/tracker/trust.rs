@@ -18,7 +18,7 @@ const UNTIL_USUAL: u64 = 20;
 /// What counts as usual before anything was seen, and what is always trusted: distances are at most 1, and these are
 /// those of a look that shares about half with the first.
 const FIRST_USUAL: f64 = 0.25;
-const ALWAYS_TRUSTED: f64 = 0.37;
+const ALWAYS_TRUSTED: f64 = 0.3;
 /// A target that has hardly changed so far may have changed this much when it comes back.
 const LEAST_USUAL: f64 = 0.15;
 /// The share of the newest frame in the running mean, when trusted and when not.
