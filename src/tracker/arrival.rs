@@ -18,7 +18,7 @@ use super::motion::{Particle, Reach};
 const CELL: usize = 4;
 /// A part of fewer pixels of the small picture says nothing.
 const LEAST_PIXELS: f64 = 6.0;
-/// A correlation up to this is chance: half of what is seen of two places in one picture are smooth light and dark.
+/// A correlation up to this is chance: any two places of a scene share slopes of light.
 const BY_CHANCE: f64 = 0.4;
 /// Variance of a place, in squared gray values, below which it is noise that would be correlated: added to each.
 const NOISE: f64 = 10.0;
