@@ -7,15 +7,14 @@
 //! It errs on the side of the particle: where light or camera changed the place, nothing is said, and nothing is said of what the
 //! last box covers.
 
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::GrayFrame;
-use super::comparison;
 use super::motion::{Particle, Reach};
+use super::pair_sums::{LANES, PairSums};
+use super::thumbnail::{self, CELL};
 
-/// Working pixels, along x and along y, that are one of the small picture: noise is averaged away, and a target of the
-/// shortest side that is followed well still has some.
-const CELL: usize = 4;
 /// A part of fewer pixels of the small picture says nothing.
 const LEAST_PIXELS: f64 = 6.0;
 /// A correlation up to this is chance: any two places of a scene share slopes of light.
@@ -33,47 +32,43 @@ pub(super) struct LastSeen {
     target: Option<Particle>,
 }
 
-/// Sums of the gray values now, then, of their squares and of their products.
-type Sums = [u32; 5];
-
-/// A rectangle of the small picture: left, top, right, bottom.
-type Bounds = [usize; 4];
-
 /// The small pictures of now and then, compared.
 #[derive(Debug, Default)]
 pub(super) struct Arrival {
     /// Of this frame.
     pixels: Vec<u8>,
     width: usize,
-    /// The part of it that is compared; none where it is not.
-    part: Option<Bounds>,
-    /// Above and left of each corner of a pixel in the part.
-    sums: Vec<Sums>,
+    /// The sums of the part of it that is compared, and whether there is one.
+    sums: PairSums,
+    is_compared: bool,
     /// Where the target was then.
     was: [f64; 4],
 }
 
-/// The mean of each cell of `frame`, row by row; how many there are in a row.
-fn shrink(frame: &GrayFrame, out: &mut Vec<u8>) -> usize {
-    let width = frame.width() as usize;
-    let (columns, rows) = (width / CELL, frame.height() as usize / CELL);
-    comparison::empty(out, columns * rows);
-    out.resize(columns * rows, 0);
-    if columns == 0 {
-        return 0;
-    }
-    for (j, out) in out.chunks_exact_mut(columns).enumerate() {
-        let lines: [_; CELL] = std::array::from_fn(|line| {
-            frame.pixels()[(CELL * j + line) * width..]
-                .as_chunks::<CELL>()
-                .0
-        });
-        for (i, out) in out.iter_mut().enumerate() {
-            let sum: u16 = lines.iter().flat_map(|line| line[i]).map(u16::from).sum();
-            *out = ((sum + 8) / 16) as u8;
+/// [`Arrival::discount`], to be compiled for the instructions that this machine has.
+struct Discount<'a> {
+    arrival: &'a Arrival,
+    particles: &'a [Particle],
+    reach: &'a Reach,
+    weight: f64,
+    exponents: &'a mut [f64],
+}
+
+impl WithSimd for Discount<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let exponents = self.exponents.chunks_mut(LANES);
+        for (exponents, particles) in exponents.zip(self.particles.chunks(LANES)) {
+            // The last one stands in for those that a group lacks.
+            let group = std::array::from_fn(|lane| particles[lane.min(particles.len() - 1)]);
+            let unchanged = self.arrival.unchanged(&group, self.reach);
+            for (exponent, unchanged) in exponents.iter_mut().zip(unchanged) {
+                *exponent -= self.weight * unchanged;
+            }
         }
     }
-    columns
 }
 
 /// The box of `particle` in pixels of the small picture.
@@ -116,10 +111,10 @@ impl LastSeen {
 impl Arrival {
     /// Makes the small picture of `frame`.
     pub fn take(&mut self, frame: &GrayFrame) {
-        self.part = None;
-        self.width = shrink(frame, &mut self.pixels);
-        let corners = (self.width + 1) * (self.pixels.len() / self.width.max(1) + 1);
-        comparison::empty(&mut self.sums, corners);
+        self.is_compared = false;
+        self.width = thumbnail::shrink(frame, &mut self.pixels);
+        let rows = self.pixels.len() / self.width.max(1);
+        self.sums.prepare(self.width, rows);
     }
 
     /// Compares the small picture with the last one, `away` working pixels around the box of `carried`, which is where
@@ -149,7 +144,7 @@ impl Arrival {
         ) else {
             return;
         };
-        self.part = Some([left, top, right, bottom]);
+        self.is_compared = true;
         let was = bounds(target, reach);
         let [across, down] = [shift_x, shift_y].map(|shift| shift as f64);
         self.was = [
@@ -159,76 +154,72 @@ impl Arrival {
             was[3] + down,
         ];
 
-        let stride = right - left + 1;
-        self.sums.resize(stride, Sums::default());
-        for row in top..bottom {
-            let now = &self.pixels[row * self.width..][left..right];
-            let then = row.strict_add_signed(-shift_y) * self.width;
-            let then = &last.pixels[then..][left.strict_add_signed(-shift_x)..][..right - left];
-            let mut of_row = Sums::default();
-            self.sums.push(of_row);
-            for (&now, &then) in now.iter().zip(then) {
-                let (now, then) = (u32::from(now), u32::from(then));
-                let values = [now, then, now * now, then * then, now * then];
-                let above = self.sums[self.sums.len() - stride];
-                // At most 80 x 80 squares of 255: below 2³².
-                for (sum, value) in of_row.iter_mut().zip(values) {
-                    *sum += value;
-                }
-                self.sums
-                    .push(std::array::from_fn(|k| above[k] + of_row[k]));
+        let (width, columns, pixels) = (self.width, right - left, &self.pixels);
+        let rows = (top..bottom).map(|row| {
+            let now = &pixels[row * width + left..][..columns];
+            let row = row.strict_add_signed(-shift_y);
+            let left = left.strict_add_signed(-shift_x);
+            (now, &last.pixels[row * width + left..][..columns])
+        });
+        self.sums.compute((left, top), columns, rows);
+    }
+
+    /// Takes off the exponents of `particles` `weight` times how much of the box of each is beside the last box and looks
+    /// as it did then: a share of the box, less as it looks less so. In [0, 1]; 0 where nothing is known.
+    pub fn discount(
+        &self,
+        particles: &[Particle],
+        reach: &Reach,
+        weight: f64,
+        exponents: &mut [f64],
+    ) {
+        if self.is_compared {
+            Arch::new().dispatch(Discount {
+                arrival: self,
+                particles,
+                reach,
+                weight,
+                exponents,
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn unchanged(&self, particles: &[Particle; LANES], reach: &Reach) -> [f64; LANES] {
+        let (mut now, mut both) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
+        for lane in 0..LANES {
+            let bounds = bounds(&particles[lane], reach);
+            for side in 0..4 {
+                let (of_now, was) = (bounds[side], self.was[side]);
+                now[side][lane] = of_now;
+                let inner = if side < 2 { of_now > was } else { of_now < was };
+                both[side][lane] = if inner { of_now } else { was };
             }
         }
-    }
-
-    /// The sums over what `bounds` has of the part, and how many pixels that is.
-    fn sums(&self, [left, top, right, bottom]: Bounds, bounds: [f64; 4]) -> ([f64; 5], f64) {
-        let corner = |at: f64, first: usize, end: usize| {
-            (at.round().clamp(first as f64, end as f64)) as usize - first
-        };
-        let (x0, x1) = (
-            corner(bounds[0], left, right),
-            corner(bounds[2], left, right),
-        );
-        let (y0, y1) = (
-            corner(bounds[1], top, bottom),
-            corner(bounds[3], top, bottom),
-        );
-        if x0 >= x1 || y0 >= y1 {
-            return ([0.0; 5], 0.0);
+        let (all, covered) = (self.sums.corners(&now), self.sums.corners(&both));
+        let (pixels, fewer) = (PairSums::pixels(&all), PairSums::pixels(&covered));
+        let mut mean = [[0.0; LANES]; 5];
+        for lane in 0..LANES {
+            let (all, covered) = (self.sums.over(&all, lane), self.sums.over(&covered, lane));
+            for (mean, (all, covered)) in mean.iter_mut().zip(all.iter().zip(covered)) {
+                mean[lane] = f64::from(all - covered);
+            }
         }
-        let at = |x: usize, y: usize| &self.sums[y * (right - left + 1) + x];
-        let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-        let sums = std::array::from_fn(|k| f64::from(d[k] + a[k] - b[k] - c[k]));
-        (sums, ((x1 - x0) * (y1 - y0)) as f64)
-    }
-
-    /// How much of the box of `particle` is beside the last box and looks as it did then: a share of the box, less as
-    /// it looks less so. In [0, 1]; 0 where nothing is known.
-    pub fn unchanged(&self, particle: &Particle, reach: &Reach) -> f64 {
-        let Some(part) = self.part else { return 0.0 };
-        let now = bounds(particle, reach);
-        let both = [
-            now[0].max(self.was[0]),
-            now[1].max(self.was[1]),
-            now[2].min(self.was[2]),
-            now[3].min(self.was[3]),
-        ];
-        let (all, pixels) = self.sums(part, now);
-        let (covered, fewer) = self.sums(part, both);
-        let beside = pixels - fewer;
-        if beside < LEAST_PIXELS {
-            return 0.0;
+        let mut unchanged = [0.0; LANES];
+        for lane in 0..LANES {
+            let beside = f64::from(pixels[lane] - fewer[lane]);
+            let mean = mean.map(|mean| mean[lane] / beside);
+            let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0) + NOISE;
+            let deviations = (variance(mean[2], mean[0]) * variance(mean[3], mean[1])).sqrt();
+            // A place that became lighter or darker as a whole has changed.
+            let light = (mean[0] - mean[1]).powi(2);
+            let correlation = (mean[4] - mean[0] * mean[1]) / (deviations + light);
+            let area = (now[2][lane] - now[0][lane]) * (now[3][lane] - now[1][lane]);
+            let alike = ((correlation - BY_CHANCE) / (1.0 - BY_CHANCE)).clamp(0.0, 1.0);
+            let share = (beside / area).min(1.0) * alike;
+            unchanged[lane] = if beside < LEAST_PIXELS { 0.0 } else { share };
         }
-        let mean: [f64; 5] = std::array::from_fn(|k| (all[k] - covered[k]) / beside);
-        let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0) + NOISE;
-        let deviations = (variance(mean[2], mean[0]) * variance(mean[3], mean[1])).sqrt();
-        // A place that became lighter or darker as a whole has changed.
-        let light = (mean[0] - mean[1]).powi(2);
-        let correlation = (mean[4] - mean[0] * mean[1]) / (deviations + light);
-        let area = (now[2] - now[0]) * (now[3] - now[1]);
-        let alike = ((correlation - BY_CHANCE) / (1.0 - BY_CHANCE)).clamp(0.0, 1.0);
-        (beside / area).min(1.0) * alike
+        unchanged
     }
 }
 
@@ -277,13 +268,19 @@ mod tests {
         arrival
     }
 
+    fn unchanged(arrival: &Arrival, at: Particle) -> f64 {
+        let mut exponent = [0.0];
+        arrival.discount(&[at], &REACH, 1.0, &mut exponent);
+        -exponent[0]
+    }
+
     #[test]
     fn a_place_to_which_the_target_came_has_changed_and_any_other_has_not() {
         let (from, to) = (particle(50.0, 60.0), particle(100.0, 60.0));
         for shift in [0, 8] {
             let to = particle(to.x + shift as f64, to.y);
             let arrival = arrival(from, to, shift);
-            let unchanged = |x: f64, y: f64| arrival.unchanged(&particle(x, y), &REACH);
+            let unchanged = |x: f64, y: f64| unchanged(&arrival, particle(x, y));
             assert!(unchanged(to.x, to.y) < 0.1, "{shift}");
             for (x, y) in [(52.0, 30.0), (52.0, 92.0), (98.0, 30.0), (96.0, 92.0)] {
                 assert!(
@@ -299,19 +296,62 @@ mod tests {
         }
     }
 
-    #[test]
-    fn sums_are_those_of_the_pixels() {
-        let arrival = arrival(particle(40.0, 50.0), particle(70.0, 60.0), 12);
-        let part = arrival.part.expect("both frames have this part");
-        let (sums, count) = arrival.sums(part, [3.2, 4.0, 9.6, 8.7]);
-        assert_eq!(count, 35.0);
-        let mut expected = 0.0;
-        for row in 4..9 {
-            for column in part[0].max(3)..10 {
-                expected += f64::from(arrival.pixels[row * arrival.width + column]);
+    /// The same by its definition, pixel by pixel: `last` is the small picture of then, three pixels further left.
+    fn plain(arrival: &Arrival, last: &[u8], at: &Particle) -> f64 {
+        let (now, was) = (bounds(at, &REACH), arrival.was);
+        let within = |bounds: [f64; 4], x: usize, y: usize| {
+            let [left, top, right, bottom] = bounds.map(f64::round);
+            (left..right).contains(&(x as f64)) && (top..bottom).contains(&(y as f64))
+        };
+        let (mut sums, mut beside) = ([0.0; 5], 0.0);
+        // Compared is what is within 60 pixels of a box 30 wide around 52: up to pixel 32.
+        for index in 0..last.len() {
+            let (x, y) = (index % arrival.width, index / arrival.width);
+            if (3..32).contains(&x) && within(now, x, y) && !within(was, x, y) {
+                let (a, b) = (arrival.pixels[index], last[index - 3]);
+                let (a, b) = (f64::from(a), f64::from(b));
+                for (sum, value) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
+                    *sum += value;
+                }
+                beside += 1.0;
             }
         }
-        assert_eq!(sums[0], expected);
+        if beside < LEAST_PIXELS {
+            return 0.0;
+        }
+        let mean = sums.map(|sum| sum / beside);
+        let variance = |square: f64, mean: f64| (square - mean * mean).max(0.0) + NOISE;
+        let deviations = (variance(mean[2], mean[0]) * variance(mean[3], mean[1])).sqrt();
+        let light = (mean[0] - mean[1]).powi(2);
+        let correlation = (mean[4] - mean[0] * mean[1]) / (deviations + light);
+        let area = (now[2] - now[0]) * (now[3] - now[1]);
+        let alike = ((correlation - BY_CHANCE) / (1.0 - BY_CHANCE)).clamp(0.0, 1.0);
+        (beside / area).min(1.0) * alike
+    }
+
+    #[test]
+    fn what_is_unchanged_is_that_of_the_definition() {
+        let (from, to) = (particle(40.0, 50.0), particle(70.0, 60.0));
+        let arrival = arrival(from, to, 12);
+        let mut last = Arrival::default();
+        last.take(&frame(0, &from));
+        let particles: Vec<Particle> = (0..203)
+            .map(|i| Particle {
+                x: f64::from(i * 37 % 190) - 15.3,
+                y: f64::from(i * 53 % 150) - 14.7,
+                scale: 0.4 + f64::from(i % 17) * 0.1,
+            })
+            .collect();
+        let mut exponents: Vec<f64> = (0..203).map(|i| f64::from(i) * -0.1).collect();
+        let before = exponents.clone();
+        arrival.discount(&particles, &REACH, 6.0, &mut exponents);
+        let mut different = 0;
+        for (i, particle) in particles.iter().enumerate() {
+            let unchanged = plain(&arrival, &last.pixels, particle);
+            assert_eq!(exponents[i], before[i] - 6.0 * unchanged, "{particle:?}");
+            different += u32::from(unchanged > 0.0);
+        }
+        assert!(different > 50, "{different}");
     }
 
     #[test]
@@ -320,7 +360,7 @@ mod tests {
         let target = particle(50.0, 60.0);
         arrival.take(&frame(0, &target));
         arrival.compare(&LastSeen::default(), &target, 60.0, &REACH);
-        assert_eq!(arrival.unchanged(&particle(90.0, 60.0), &REACH), 0.0);
+        assert_eq!(unchanged(&arrival, particle(90.0, 60.0)), 0.0);
         for (width, height) in [(3, 50), (50, 3), (4, 4)] {
             let pixels = vec![7; width * height];
             let frame = GrayFrame::from_luma(width as u32, height as u32, pixels);
@@ -331,7 +371,7 @@ mod tests {
             assert!(last.is_sound((width as u32, height as u32), true));
             arrival.take(&frame);
             arrival.compare(&last, &particle(1.0, 1.0), 60.0, &REACH);
-            assert_eq!(arrival.unchanged(&particle(2.0, 2.0), &REACH), 0.0);
+            assert_eq!(unchanged(&arrival, particle(2.0, 2.0)), 0.0);
         }
     }
 }

@@ -65,6 +65,8 @@ pub(super) struct Comparison {
     evaluation: Option<(Params, Evaluation)>,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
+    /// The exponent of each particle that its place alone says.
+    places: Vec<f64>,
     posterior: Posterior,
     /// The weights of all particles; they sum to 1.
     pub weights: Vec<f64>,
@@ -104,6 +106,7 @@ impl Comparison {
         empty(&mut self.particles, most);
         empty(&mut self.squares, most);
         empty(&mut self.distances, most * entries);
+        empty(&mut self.places, most);
         self.posterior.begin(most, entries);
         empty(&mut self.weights, most);
         let mean = offset(state);
@@ -240,18 +243,26 @@ impl Comparison {
         }
     }
 
+    /// What the places say of the particles that were not looked at before: their priors, and what has come there.
+    fn look_at_places(&mut self, sought: &Sought<'_>) {
+        let known = self.places.len();
+        let particles = &self.particles[known..];
+        self.places.extend(sought.priors(particles));
+        let weight = sought.params.arrival_weight;
+        if weight > 0.0 {
+            let places = &mut self.places[known..];
+            self.arrival
+                .discount(particles, sought.reach, weight, places);
+        }
+    }
+
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11), the prior of the place, the
     /// discriminant's score. Returns the most likely one (equation 12).
     pub fn weigh(&mut self, sought: &Sought<'_>, discriminant: &Discriminant) -> usize {
         let params = sought.params;
+        self.look_at_places(sought);
         self.weights.clear();
-        self.weights.extend(sought.priors(&self.particles));
-        if params.arrival_weight > 0.0 {
-            for (weight, particle) in self.weights.iter_mut().zip(&self.particles) {
-                let unchanged = self.arrival.unchanged(particle, sought.reach);
-                *weight -= params.arrival_weight * unchanged;
-            }
-        }
+        self.weights.extend_from_slice(&self.places);
         if discriminant.is_on() {
             let factor = params.discriminant_weight;
             let scores = self.examples.scores();

@@ -72,6 +72,7 @@ mod look;
 mod matrix;
 mod metric;
 mod motion;
+mod pair_sums;
 mod params;
 mod patch;
 #[cfg(target_arch = "x86_64")]
@@ -95,6 +96,7 @@ mod solitary;
 mod state;
 mod subspace;
 mod sums;
+mod thumbnail;
 mod trust;
 mod view;
 mod whitening;
