@@ -10,6 +10,7 @@
 //! so no example is kept, and one frame can change w only so far. A few steps of conjugate gradients do: the damping
 //! makes the problem well conditioned. The unit vectors are never written out ([`examples`](super::examples)).
 
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::Params;
@@ -44,6 +45,27 @@ pub(super) struct Room {
     gradient: Vec<f32>,
     direction: Vec<f32>,
     product: Vec<f32>,
+}
+
+/// [`Discriminant::fit`], to be compiled for the instructions that this machine has.
+struct Fit<'a> {
+    discriminant: &'a mut Discriminant,
+    examples: &'a Examples,
+    vectors: &'a [f32],
+    damping: f64,
+    steps: usize,
+    room: &'a mut Room,
+}
+
+impl WithSimd for Fit<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (damping, steps) = (self.damping, self.steps);
+        self.discriminant
+            .fit_all(self.examples, self.vectors, damping, steps, self.room);
+    }
 }
 
 impl Discriminant {
@@ -100,6 +122,25 @@ impl Discriminant {
     }
 
     fn fit(
+        &mut self,
+        examples: &Examples,
+        vectors: &[f32],
+        damping: f64,
+        steps: usize,
+        room: &mut Room,
+    ) {
+        Arch::new().dispatch(Fit {
+            discriminant: self,
+            examples,
+            vectors,
+            damping,
+            steps,
+            room,
+        });
+    }
+
+    #[inline(always)]
+    fn fit_all(
         &mut self,
         examples: &Examples,
         vectors: &[f32],

@@ -2,8 +2,6 @@
 
 use std::f64::consts::LOG2_E;
 
-use pulp::{Arch, Simd, WithSimd};
-
 /// ln 2 in two parts, the first with so few digits that its product with a small whole number is exact.
 const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
 /// Added to a number below 2^51 it leaves the nearest whole number in the last bits.
@@ -27,26 +25,10 @@ const TAYLOR: [f64; 13] = [
     1.0,
 ];
 
-/// [`exp`], to be compiled for the instructions that this machine has.
-struct Exp<'a>(&'a mut [f64]);
-
-impl WithSimd for Exp<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        exp_within(self.0);
-    }
-}
-
-/// Replaces each of `values`, none above 700, by its exponential, to a few parts in 10^16.
-pub(super) fn exp(values: &mut [f64]) {
-    Arch::new().dispatch(Exp(values));
-}
-
-/// As [`exp`], within what is compiled for this machine's instructions.
+/// Replaces each of `values`, none above 700, by its exponential, to a few parts in 10^16. It is inlined into what is compiled
+/// for this machine's instructions.
 #[inline(always)]
-pub(super) fn exp_within(values: &mut [f64]) {
+pub(super) fn exp(values: &mut [f64]) {
     let (groups, rest) = values.as_chunks_mut::<16>();
     for group in groups {
         *group = exp_each(*group);

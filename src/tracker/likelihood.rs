@@ -54,7 +54,7 @@ impl WithSimd for Normalize<'_> {
                 }
             }
         }
-        exponential::exp_within(values);
+        exponential::exp(values);
         for first in (0..entries).step_by(BLOCK) {
             let block = first..entries.min(first + BLOCK);
             let mut sums = [0.0; BLOCK];

@@ -4,6 +4,8 @@
 //! There are thousands of exponentials a frame, so they are made many at a time, and a likelihood is normalised where it
 //! is summed.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::exponential;
 
 /// Room for the weights of a frame.
@@ -12,6 +14,31 @@ pub(super) struct Posterior {
     likelihoods: Vec<f64>,
     /// For each entry the least distance, and then what its likelihoods are multiplied by.
     entries: Vec<f64>,
+}
+
+/// [`Posterior::weigh`], to be compiled for the instructions that this machine has.
+struct Weigh<'a> {
+    posterior: &'a mut Posterior,
+    distances: &'a [f64],
+    sigma: f64,
+    pinned: (usize, f64),
+    weights: &'a mut [f64],
+}
+
+impl WithSimd for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            posterior,
+            distances,
+            sigma,
+            pinned,
+            weights,
+        } = self;
+        posterior.weigh_all(distances, sigma, pinned, weights);
+    }
 }
 
 impl Posterior {
@@ -25,6 +52,23 @@ impl Posterior {
     /// the entries of the particle's likelihoods, each normalised over the particles. `distances` holds for each particle
     /// its distance to each entry; the first `pinned` of these count `pinned_weight` times.
     pub fn weigh(
+        &mut self,
+        distances: &[f64],
+        sigma: f64,
+        pinned: (usize, f64),
+        weights: &mut [f64],
+    ) {
+        Arch::new().dispatch(Weigh {
+            posterior: self,
+            distances,
+            sigma,
+            pinned,
+            weights,
+        });
+    }
+
+    #[inline(always)]
+    fn weigh_all(
         &mut self,
         distances: &[f64],
         sigma: f64,

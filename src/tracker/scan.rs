@@ -8,6 +8,8 @@
 //! A score here is not quite that of a particle at the same place: a cell at the edge of an area is normalised with
 //! the cells beyond the edge as well.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::discriminant::Discriminant;
 use super::motion::Particle;
 use super::search::Sought;
@@ -28,6 +30,51 @@ pub(super) struct Scan {
     /// How likely each place is, row by row: the logarithm of what its particle's weight is multiplied with.
     values: Vec<f32>,
     peaks: Vec<Particle>,
+}
+
+/// Places in a row and above each other, around a center.
+#[derive(Debug, Clone, Copy)]
+struct Places {
+    center: Particle,
+    /// How far to the left of the center, and above it, the first of them is.
+    away: (usize, usize),
+    cell: (f64, f64),
+}
+
+impl Places {
+    #[inline(always)]
+    fn at(&self, column: usize, row: usize) -> Particle {
+        let ((across, down), (width, height)) = (self.away, self.cell);
+        Particle {
+            x: self.center.x + (column as f64 - across as f64) * width,
+            y: self.center.y + (row as f64 - down as f64) * height,
+            ..self.center
+        }
+    }
+}
+
+/// What scores of places become together with the prior, to be compiled for the instructions that this machine has.
+struct Weigh<'a> {
+    places: Places,
+    sought: &'a Sought<'a>,
+    values: &'a mut [f32],
+}
+
+impl WithSimd for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let factor = self.sought.params.discriminant_weight;
+        let columns = 2 * self.places.away.0 + 1;
+        for (row, values) in self.values.chunks_exact_mut(columns).enumerate() {
+            for (column, value) in values.iter_mut().enumerate() {
+                let likely = factor * f64::from(*value);
+                let place = self.places.at(column, row);
+                *value = (likely + self.sought.log_displacement(&place)) as f32;
+            }
+        }
+    }
 }
 
 impl Scan {
@@ -62,22 +109,21 @@ impl Scan {
         let values = &mut self.values;
         self.windows
             .scores(&self.grid, discriminant, params, cell_pixels, values);
-        let place = |column: usize, row: usize| Particle {
-            x: center.x + (column as f64 - across as f64) * cell_width,
-            y: center.y + (row as f64 - down as f64) * cell_height,
-            ..center
+        let places = Places {
+            center,
+            away: (across, down),
+            cell: (cell_width, cell_height),
         };
-        for (row, values) in self.values.chunks_exact_mut(columns).enumerate() {
-            for (column, value) in values.iter_mut().enumerate() {
-                let likely = params.discriminant_weight * f64::from(*value);
-                *value = (likely + sought.log_displacement(&place(column, row))) as f32;
-            }
-        }
+        Arch::new().dispatch(Weigh {
+            places,
+            sought,
+            values: &mut self.values,
+        });
         for _ in 0..params.scan_peaks {
             let Some(best) = take_peak(&mut self.values, columns) else {
                 break;
             };
-            self.peaks.push(place(best % columns, best / columns));
+            self.peaks.push(places.at(best % columns, best / columns));
         }
     }
 }

@@ -41,6 +41,7 @@ fn normal(generator: &mut ChaCha8Rng) -> f64 {
 
 impl Sought<'_> {
     /// Where the last answer would be had it moved with the picture.
+    #[inline(always)]
     pub fn carried(&self) -> Particle {
         Particle {
             x: self.last.x + self.shift.0,
@@ -166,6 +167,7 @@ impl Sought<'_> {
     }
 
     /// The logarithm of the prior of how far a particle is from the last answer, or from where it was carried to.
+    #[inline(always)]
     pub fn log_displacement(&self, particle: &Particle) -> f64 {
         if self.params.displacement_std <= 0.0 {
             return 0.0;
