@@ -1,8 +1,9 @@
 //! The patches of a frame by permutations, where the machine has AVX-512: a permutation looks up sixteen of 32 neighbouring pixels
 //! in an instruction, where a load of sixteen words from anywhere takes as many loads.
 //!
-//! Sixteen cells of a row are seldom more than 32 pixels wide; if they are, several permutations are put together. The
-//! values are those of [`patch`](super::patch) to the last bit.
+//! Pixels one above the other are brought together before they are looked up, which takes half of the loads and of the
+//! permutations of looking up all four. Sixteen cells of a row are seldom more than 32 pixels wide; if they are, several
+//! permutations are put together. The values are those of [`patch`](super::patch) to the last bit.
 
 use std::arch::x86_64::{__m512, __m512i};
 use std::ops::Range;
@@ -40,8 +41,9 @@ struct Block {
     at: [u32; LANES],
     /// The share of the pixel after that one.
     shares: [f32; LANES],
-    /// How many times [`REACH`] pixels they lie among.
+    /// How many times [`REACH`] pixels they lie among, and whether they lie among the first [`LANES`].
     pieces: usize,
+    is_narrow: bool,
 }
 
 impl<A: Iterator<Item = Rect> + Clone> NullaryFnOnce for PermutedCuts<'_, A> {
@@ -76,9 +78,12 @@ impl<A: Iterator<Item = Rect> + Clone> NullaryFnOnce for PermutedCuts<'_, A> {
                 let block = Block::of(&across, index, columns, region.left);
                 let cells = index * LANES..columns.min((index + 1) * LANES);
                 match block.pieces {
-                    1 => block.cut::<1>(simd, &down, patch, columns, cells),
-                    2 => block.cut::<2>(simd, &down, patch, columns, cells),
-                    _ => block.cut::<0>(simd, &down, patch, columns, cells),
+                    _ if block.is_narrow => {
+                        block.cut::<1, true>(simd, &down, patch, columns, cells);
+                    }
+                    1 => block.cut::<1, false>(simd, &down, patch, columns, cells),
+                    2 => block.cut::<2, false>(simd, &down, patch, columns, cells),
+                    _ => block.cut::<0, false>(simd, &down, patch, columns, cells),
                 }
             }
         }
@@ -102,12 +107,14 @@ impl Block {
         let cells = index * LANES;
         let last = (cells + LANES).min(columns) - 1;
         let first = across.first[cells];
+        // The pixel after the last counts too.
+        let furthest = (across.first[last] - first + 1) as usize;
         let mut block = Self {
             first: (first - left) as usize,
             at: [0; LANES],
             shares: [0.0; LANES],
-            // The pixel after the last counts too.
-            pieces: (across.first[last] - first + 1) as usize / REACH + 1,
+            pieces: furthest / REACH + 1,
+            is_narrow: furthest < LANES,
         };
         for lane in 0..LANES {
             block.at[lane] = across.first[cells + lane].wrapping_sub(first);
@@ -116,9 +123,10 @@ impl Block {
         block
     }
 
-    /// Cuts the columns `cells` of all rows of `patch`. `PIECES` is the number of pieces, or 0 for any.
+    /// Cuts the columns `cells` of all rows of `patch`. `PIECES` is the number of pieces, or 0 for any; of a narrow block
+    /// `IS_NARROW`.
     #[inline(always)]
-    fn cut<const PIECES: usize>(
+    fn cut<const PIECES: usize, const IS_NARROW: bool>(
         &self,
         simd: V4,
         down: &Rows<'_>,
@@ -135,13 +143,20 @@ impl Block {
         for (target, (&start, &share)) in patch.chunks_exact_mut(columns).zip(rows) {
             let upper = &down.pixels[start + self.first..];
             let lower = &upper[down.width..];
-            let a = look_up(simd, upper, left, pieces);
-            let b = look_up(simd, upper, right, pieces);
-            let c = look_up(simd, lower, left, pieces);
-            let d = look_up(simd, lower, right, pieces);
-            let share = x._mm512_set1_ps(share);
-            let before = between(simd, a, c, share);
-            let after = between(simd, b, d, share);
+            let rows = Pair {
+                upper,
+                lower,
+                share: x._mm512_set1_ps(share),
+            };
+            let [before, after] = if IS_NARROW {
+                let pixels = rows.between(simd, 0);
+                [
+                    x._mm512_permutexvar_ps(left, pixels),
+                    x._mm512_permutexvar_ps(right, pixels),
+                ]
+            } else {
+                rows.look_up(simd, left, right, pieces)
+            };
             let gray = between(simd, before, after, shares);
             let gray = x._mm512_mul_ps(gray, x._mm512_set1_ps(1.0 / 255.0));
             let gray = x._mm512_min_ps(gray, x._mm512_set1_ps(1.0));
@@ -165,30 +180,55 @@ fn between(simd: V4, a: __m512, b: __m512, share: __m512) -> __m512 {
     simd.avx512f._mm512_add_ps(a, part)
 }
 
-/// The pixels of `row` at the places `at`, which lie among so many `pieces`.
-#[inline(always)]
-fn look_up(simd: V4, row: &[f32], at: __m512i, pieces: usize) -> __m512 {
-    let mut pixels = look_up_near(simd, row, at);
-    for index in 1..pieces {
-        // A permutation looks at the five low bits of a place.
-        let further = look_up_near(simd, &row[index * REACH..], at);
-        let least = simd.avx512f._mm512_set1_epi32((index * REACH) as i32);
-        let is_further = simd.avx512f._mm512_cmpge_epi32_mask(at, least);
-        pixels = simd
-            .avx512f
-            ._mm512_mask_blend_ps(is_further, pixels, further);
+/// Two rows of pixels, one above the other, and the share of the lower.
+struct Pair<'a> {
+    upper: &'a [f32],
+    lower: &'a [f32],
+    share: __m512,
+}
+
+impl Pair<'_> {
+    /// Between the sixteen pixels of each from `first` on.
+    #[inline(always)]
+    fn between(&self, simd: V4, first: usize) -> __m512 {
+        let (upper, lower) = (load(&self.upper[first..]), load(&self.lower[first..]));
+        between(simd, upper, lower, self.share)
     }
-    pixels
+
+    /// What is between the rows at the places `left` and at the places `right`, which lie among so many `pieces`.
+    #[inline(always)]
+    fn look_up(&self, simd: V4, left: __m512i, right: __m512i, pieces: usize) -> [__m512; 2] {
+        let x = simd.avx512f;
+        let [mut before, mut after] = self.look_up_near(simd, left, right, 0);
+        for index in 1..pieces {
+            // A permutation looks at the five low bits of a place.
+            let further = self.look_up_near(simd, left, right, index * REACH);
+            let least = x._mm512_set1_epi32((index * REACH) as i32);
+            let is_further = x._mm512_cmpge_epi32_mask(left, least);
+            before = x._mm512_mask_blend_ps(is_further, before, further[0]);
+            let is_further = x._mm512_cmpge_epi32_mask(right, least);
+            after = x._mm512_mask_blend_ps(is_further, after, further[1]);
+        }
+        [before, after]
+    }
+
+    #[inline(always)]
+    fn look_up_near(&self, simd: V4, left: __m512i, right: __m512i, from: usize) -> [__m512; 2] {
+        let (first, second) = (self.between(simd, from), self.between(simd, from + LANES));
+        let x = simd.avx512f;
+        [
+            x._mm512_permutex2var_ps(first, left, second),
+            x._mm512_permutex2var_ps(first, right, second),
+        ]
+    }
 }
 
 #[inline(always)]
-fn look_up_near(simd: V4, row: &[f32], at: __m512i) -> __m512 {
-    let pixels: &[f32; REACH] = row
+fn load(pixels: &[f32]) -> __m512 {
+    let pixels: &[f32; LANES] = pixels
         .first_chunk()
         .expect("a window of room after the last pixel");
-    let (halves, _) = pixels.as_chunks::<LANES>();
-    let (first, second) = (pulp::cast(halves[0]), pulp::cast(halves[1]));
-    simd.avx512f._mm512_permutex2var_ps(first, at, second)
+    pulp::cast(*pixels)
 }
 
 /// Copies the pixels of the region, the last column and the last row once more, and room for a look-up at the end.
