@@ -269,8 +269,10 @@ fn multiply_tiles<S: Simd, T: Element, const A: usize, const B: usize>(
                 let products = tile(simd, rows_a, rows_b);
                 for (p, row) in products.iter().enumerate().take(count_a - i) {
                     let out = &mut out[(i + p) * stride + j..][..B.min(end - j)];
-                    for (out, product) in out.iter_mut().zip(row) {
-                        *out = *product;
+                    // A copy of a length that is not known would be a call.
+                    match out.as_mut_array::<B>() {
+                        Some(out) => *out = *row,
+                        None => out.copy_from_slice(&row[..out.len()]),
                     }
                 }
             }
