@@ -196,7 +196,7 @@ fn every_parameter_out_of_range_is_named() {
 #[test]
 fn every_parameter_of_a_mend_out_of_range_is_named() {
     type Change = fn(&mut Params);
-    let cases: [(&str, Change); 28] = [
+    let cases: [(&str, Change); 30] = [
         ("background_samples", |p| p.background_samples = 257),
         ("background_every", |p| p.background_every = 0),
         ("background_ridge", |p| p.background_ridge = 0.0),
@@ -214,6 +214,8 @@ fn every_parameter_of_a_mend_out_of_range_is_named() {
         ("arrival_weight", |p| p.arrival_weight = 100.5),
         ("averaging_radius", |p| p.averaging_radius = f64::NAN),
         ("pose_angle", |p| p.pose_angle = 90.1),
+        ("scan_margin", |p| p.scan_margin = 1000.1),
+        ("turn_step", |p| p.turn_step = -0.1),
         ("pinned", |p| p.pinned = 17),
         ("pinned", |p| p.pinned = p.bag_size),
         ("pinned_weight", |p| p.pinned_weight = -1.0),

@@ -14,7 +14,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
         1 => Just(5e-324),
         6 => 0.0_f64..1.0,
     ];
-    proptest::collection::vec(share, 32)
+    proptest::collection::vec(share, 34)
 }
 
 /// The parameters that `shares` make over the whole of the ranges, but for sizes: those stay small, to be quick.
@@ -67,6 +67,8 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         scan_reach: 4.0 * share(),
         arrival_weight: if on(5) { 100.0 * share() } else { 0.0 },
         averaging_radius: 100.0 * share(),
+        scan_margin: if on(3) { 0.0 } else { 1000.0 * share().powi(3) },
+        turn_step: if on(5) { 30.0 * share() } else { 0.0 },
         pose_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: 100.0 * share(),
         learn_above: share(),

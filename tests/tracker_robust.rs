@@ -2,8 +2,8 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
-use tracker_scene::{frame, leaping, panned, receding, robust, target};
+use bagtrack::tracker::{GrayFrame, Params, Preset, Rect, Tracker};
+use tracker_scene::{frame, leaping, panned, receding, robust, target, tilting};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
 fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
@@ -20,7 +20,7 @@ fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u
 #[test]
 fn the_default_is_robust() {
     assert_eq!(Preset::default(), Preset::Robust);
-    assert_eq!(bagtrack::tracker::Params::default(), robust(0));
+    assert_eq!(Params::default(), robust(0));
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn a_target_that_leaps_by_its_own_length_is_held() {
 #[test]
 fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     // So that the scene above tests what it says.
-    let params = bagtrack::tracker::Params {
+    let params = Params {
         scan_peaks: 0,
         ..robust(0)
     };
@@ -73,6 +73,32 @@ fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     });
     let held = held.count();
     assert!(held < 45, "{held}");
+}
+
+/// The mean distance of the answers from the target's centre, in pixels, in the last frames of `tilting`.
+fn off_when_tilted(params: Params) -> f64 {
+    let (first, given) = tilting(0);
+    let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");
+    let off = (1..90).map(|t| {
+        let (frame, truth) = tilting(t);
+        let answer = tracker.step(&frame).expect("frames of one size").target;
+        answer.center_distance(&truth)
+    });
+    off.skip(40).sum::<f64>() / 49.0
+}
+
+#[test]
+fn a_head_that_tilts_stays_in_the_middle_of_its_box() {
+    for seed in 0..3 {
+        let off = off_when_tilted(robust(seed));
+        let upright = off_when_tilted(Params {
+            turn_step: 0.0,
+            ..robust(seed)
+        });
+        println!("seed {seed}: {off:.2} px, {upright:.2} px always upright");
+        assert!(off < 2.0, "seed {seed}: {off}");
+        assert!(off < 0.6 * upright, "seed {seed}: {off} {upright}");
+    }
 }
 
 #[test]
@@ -94,7 +120,7 @@ fn a_target_is_held_through_swings_of_the_camera() {
 #[test]
 fn without_its_camera_the_swings_lose_the_target() {
     // So that the scene above tests what it says.
-    let params = bagtrack::tracker::Params {
+    let params = Params {
         camera_shift: false,
         ..robust(0)
     };

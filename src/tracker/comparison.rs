@@ -9,10 +9,10 @@ use std::ops::Range;
 use super::arrival::Arrival;
 use super::camera::Camera;
 use super::centering::Centering;
-use super::discriminant::Discriminant;
 use super::examples::Examples;
 use super::motion::Particle;
 use super::posterior::Posterior;
+use super::rotation::Rotation;
 use super::scan::Scan;
 use super::score::Evidence;
 use super::search::Sought;
@@ -20,7 +20,7 @@ use super::solitary::Solitary;
 use super::state::State;
 use super::trust::Trust;
 use super::view::View;
-use super::{Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood};
+use super::{Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood, turn};
 
 /// P at most.
 const GREATEST_HISTORY: usize = 10;
@@ -47,6 +47,10 @@ fn is_printed(params: &Params) -> bool {
 #[derive(Debug, Default)]
 pub(super) struct Comparison {
     pub view: View,
+    /// For pictures that are turned.
+    turned_view: View,
+    pub turned_pixels: Vec<u8>,
+    tried_pixels: Vec<u8>,
     pub particles: Vec<Particle>,
     /// For sums of weights.
     pub sums: Vec<f64>,
@@ -65,6 +69,9 @@ pub(super) struct Comparison {
     evaluation: Option<(Params, Evaluation)>,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
+    /// How the picture is turned that the particles are in, if it is, and where they are in the picture itself.
+    pub rotation: Option<Rotation>,
+    in_picture: Vec<Particle>,
     /// The exponent of each particle that its place alone says.
     places: Vec<f64>,
     posterior: Posterior,
@@ -100,6 +107,7 @@ impl Comparison {
     /// a lost target finds it too.
     pub fn begin(&mut self, state: &State, most: usize) {
         let params = &state.params;
+        let most = most + turn::tried(params);
         self.len = params.feature_len();
         self.first = kernel::hold_aligned(&mut self.vectors, most * self.len);
         let entries = params.bag_size as usize;
@@ -107,6 +115,11 @@ impl Comparison {
         empty(&mut self.squares, most);
         empty(&mut self.distances, most * entries);
         empty(&mut self.places, most);
+        empty(&mut self.in_picture, most);
+        if turn::is_on(params) {
+            let pixels = state.reach.frame_width * state.reach.frame_height;
+            self.turned_pixels.reserve(pixels as usize);
+        }
         self.posterior.begin(most, entries);
         empty(&mut self.weights, most);
         let mean = offset(state);
@@ -157,16 +170,28 @@ impl Comparison {
     }
 
     fn extend_batch(&mut self, frame: &GrayFrame, batch: Range<usize>, state: &State) {
+        self.describe(frame, batch.clone(), state);
+        self.compare(batch, state);
+    }
+
+    /// Writes the vectors of a batch.
+    fn describe(&mut self, frame: &GrayFrame, batch: Range<usize>, state: &State) {
         let params = &state.params;
-        let (first, range) = (batch.start, self.places(&batch));
+        let range = self.places(&batch);
         let particles = &self.particles[batch];
-        let vectors = &mut self.vectors[range.clone()];
+        let vectors = &mut self.vectors[range];
         let centering = Some(Centering {
             mean: offset(state),
             squares: &mut self.squares,
         });
         self.view
             .describe(frame, particles, &state.reach, params, vectors, centering);
+    }
+
+    /// The distances and scores of a batch.
+    fn compare(&mut self, batch: Range<usize>, state: &State) {
+        let params = &state.params;
+        let (first, range) = (batch.start, self.places(&batch));
         let vectors = &self.vectors[range.clone()];
         let squares = &self.squares[first..];
         if params.candidate_alone {
@@ -251,6 +276,13 @@ impl Comparison {
         let weight = sought.params.arrival_weight;
         if weight > 0.0 {
             let places = &mut self.places[known..];
+            let mut particles = particles;
+            if let Some(rotation) = &self.rotation {
+                self.in_picture.clear();
+                let moved = particles.iter().map(|place| rotation.in_picture(place));
+                self.in_picture.extend(moved);
+                particles = &self.in_picture;
+            }
             self.arrival
                 .discount(particles, sought.reach, weight, places);
         }
@@ -258,31 +290,71 @@ impl Comparison {
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11), the prior of the place, the
     /// discriminant's score. Returns the most likely one (equation 12).
-    pub fn weigh(&mut self, sought: &Sought<'_>, discriminant: &Discriminant) -> usize {
-        let params = sought.params;
+    pub fn weigh(&mut self, sought: &Sought<'_>) -> usize {
         self.look_at_places(sought);
-        self.weights.clear();
-        self.weights.extend_from_slice(&self.places);
-        if discriminant.is_on() {
+        let mut weights = std::mem::take(&mut self.weights);
+        weights.clear();
+        weights.extend_from_slice(&self.places);
+        self.weigh_from(0, sought.params, sought.params.sigma, &mut weights);
+        self.weights = weights;
+        likelihood::arg_max(&self.weights)
+    }
+
+    /// The same for the particles from `first` on alone: `weights` begin as what is known of them besides, as exponents.
+    fn weigh_from(&mut self, first: usize, params: &Params, sigma: f64, weights: &mut [f64]) {
+        // None where there is no discriminant.
+        if let Some(scores @ [_, ..]) = self.examples.scores().get(first..) {
             let factor = params.discriminant_weight;
-            let scores = self.examples.scores();
             let most = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            for (weight, score) in self.weights.iter_mut().zip(scores) {
+            for (weight, score) in weights.iter_mut().zip(scores) {
                 *weight += factor * f64::from(score - most);
             }
         }
         let pinned = (params.pinned as usize, params.pinned_weight);
-        self.posterior
-            .weigh(&self.distances, params.sigma, pinned, &mut self.weights);
-        let total: f64 = self.weights.iter().sum();
+        let entries = self.distances.len() / self.particles.len();
+        let distances = &self.distances[first * entries..];
+        self.posterior.weigh(distances, sigma, pinned, weights);
+        let total: f64 = weights.iter().sum();
         if total > 0.0 {
-            self.weights.iter_mut().for_each(|weight| *weight /= total);
+            weights.iter_mut().for_each(|weight| *weight /= total);
         } else {
             // Every product underflowed: nothing is known to be better.
-            let equal = 1.0 / self.weights.len() as f64;
-            self.weights.fill(equal);
+            let equal = 1.0 / weights.len() as f64;
+            weights.fill(equal);
         }
-        likelihood::arg_max(&self.weights)
+    }
+
+    /// Weighs what is at `place` in `frame` turned by each of `angles`, in radians: `weights` begin as the logarithms of their
+    /// priors. The particles of the frame stay.
+    pub fn weigh_turned(
+        &mut self,
+        frame: &GrayFrame,
+        place: &Particle,
+        angles: &[f64],
+        state: &State,
+        weights: &mut [f64],
+    ) {
+        let first = self.particles.len();
+        let entries = self.distances.len() / first;
+        let (reach, params) = (&state.reach, &state.params);
+        std::mem::swap(&mut self.view, &mut self.turned_view);
+        let window = View::window(&[*place], 0.0, reach, params);
+        for &angle in angles {
+            let pixels = std::mem::take(&mut self.tried_pixels);
+            let turned = Rotation::about(place, angle).apply(frame, &window, pixels);
+            self.view.open(&turned, &[*place], 0.0, reach, params);
+            let next = self.particles.len();
+            self.particles.push(*place);
+            self.describe(&turned, next..next + 1, state);
+            self.tried_pixels = turned.into_pixels();
+        }
+        std::mem::swap(&mut self.view, &mut self.turned_view);
+        self.compare(first..self.particles.len(), state);
+        self.weigh_from(first, params, turn::SOFTER * params.sigma, weights);
+        self.particles.truncate(first);
+        self.squares.truncate(first);
+        self.distances.truncate(first * entries);
+        self.examples.truncate(first);
     }
 
     /// What particle `index` says about itself.

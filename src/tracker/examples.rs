@@ -77,6 +77,12 @@ impl Examples {
         self.room = room;
     }
 
+    /// Forgets all examples but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        self.scales.truncate(count);
+        self.scores.truncate(count);
+    }
+
     /// The scores: about 1 on the target and 0 beside it, but not bounded.
     pub fn scores(&self) -> &[f32] {
         &self.scores

@@ -87,6 +87,12 @@ impl GrayFrame {
         }
     }
 
+    /// A frame of the same size, with other `pixels`, of which there are as many.
+    pub(super) fn with_pixels(&self, pixels: Vec<u8>) -> Self {
+        debug_assert_eq!(pixels.len(), self.pixels.len());
+        Self { pixels, ..*self }
+    }
+
     /// Width of the working image.
     pub fn width(&self) -> u32 {
         self.width

@@ -81,6 +81,7 @@ impl State {
             last_seen: LastSeen::default(),
             trust: Trust::default(),
             usual: Usual::default(),
+            turn: 0.0,
             frames_lost: 0,
         };
         state.gather(answer);
@@ -99,6 +100,7 @@ impl State {
         let number = self.estimate.frame + 1;
         let (reach, answer) = Self::aim(self.source, &target);
         self.reach = reach;
+        self.turn = 0.0;
         self.frames_lost = 0;
         self.gather(answer);
         if let Some(camera) = &mut self.camera {

@@ -86,6 +86,7 @@ mod products;
 mod pyramid;
 mod ranges;
 mod rect;
+mod rotation;
 mod scale;
 mod scan;
 mod score;
@@ -98,6 +99,7 @@ mod subspace;
 mod sums;
 mod thumbnail;
 mod trust;
+mod turn;
 mod view;
 mod whitening;
 mod windows;
@@ -114,10 +116,11 @@ pub use subspace::{AffineSubspace, RANK_TOLERANCE};
 use serde::{Deserialize, Serialize};
 
 use comparison::Comparison;
-use motion::Draws;
+use motion::{Draws, Particle};
 use score::Evidence;
 use search::Sought;
 use state::State;
+use view::View;
 
 /// Whether the tracker believes its own box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -210,9 +213,13 @@ impl Tracker {
         let mut draws = motion::generator(state.params.seed, number, Draws::Particles);
         let widening = state.widening();
         let camera = state.camera.as_mut();
+        let shift = camera.map_or((0.0, 0.0), |camera| camera.shift(frame, &mut room.camera));
+        let rotation = state.rotation();
+        let in_picture =
+            |place: Particle| rotation.map_or(place, |rotation| rotation.in_picture(&place));
         let sought = Sought {
             last: state.answer,
-            shift: camera.map_or((0.0, 0.0), |camera| camera.shift(frame, &mut room.camera)),
+            shift: rotation.map_or(shift, |rotation| rotation.turned_shift(shift)),
             widening,
             params: &state.params,
             reach: &state.reach,
@@ -220,51 +227,59 @@ impl Tracker {
 
         // (A) Where it may be.
         room.begin(state, sought.most());
+        room.rotation = rotation;
         let furthest = sought.furthest() + state.learning_radius(number);
         let furthest = furthest.max(sought.scanned());
         let (reach, params) = (&state.reach, &state.params);
+        let upright = rotation.map(|rotation| {
+            let window = View::window(&[state.answer], furthest, reach, params);
+            rotation.apply(frame, &window, std::mem::take(&mut room.turned_pixels))
+        });
+        let seen = upright.as_ref().unwrap_or(frame);
         match params.search {
             Search::Resampled => {
                 motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
                 let particles = &room.particles;
-                room.view.open(frame, particles, furthest, reach, params);
+                room.view.open(seen, particles, furthest, reach, params);
             }
             Search::Answer => {
                 let answer = [state.answer];
-                room.view.open(frame, &answer, furthest, reach, params);
+                room.view.open(seen, &answer, furthest, reach, params);
                 room.scan.look(&mut room.view, &sought, &state.discriminant);
                 sought.propose(room.scan.peaks(), &mut draws, &mut room.particles);
+                room.scan.sift(&sought, &mut room.particles);
             }
         }
 
         if params.arrival_weight > 0.0 {
-            let carried = sought.carried();
+            let carried = in_picture(sought.carried());
             room.arrival.take(frame);
             room.arrival
                 .compare(&state.last_seen, &carried, furthest, reach);
         }
 
         // (B) What is seen there, and (D) how that compares with what is known.
-        room.extend(frame, 0, state);
-        let mut best = room.weigh(&sought, &state.discriminant);
+        room.extend(seen, 0, state);
+        let mut best = room.weigh(&sought);
         let first = room.particles.len();
-        if first < sought.counts().0 {
+        if sought.refined() > 0 {
             sought.refine(&room.weights, &mut draws, &mut room.particles);
-            room.extend(frame, first, state);
-            best = room.weigh(&sought, &state.discriminant);
+            room.extend(seen, first, state);
+            best = room.weigh(&sought);
         }
         let evidence = room.evidence(best, &state.trust);
         let lost = state.is_out_of_sight(&evidence);
-        let answer = if lost {
+        let found = if lost {
             state.frames_lost = state.frames_lost.saturating_add(1);
-            state.reach.hold(sought.carried())
+            sought.carried()
         } else {
             let radius = state.params.averaging_radius;
             let found = search::average(&room.particles, &room.weights, best, radius);
-            let found = state.measure_scale(frame, found, room);
+            let found = state.measure_scale(seen, found, room);
             state.frames_lost = 0;
             found
         };
+        let answer = state.reach.hold(in_picture(found));
         let evidence = Evidence {
             scale: answer.scale,
             ..evidence
@@ -275,11 +290,20 @@ impl Tracker {
         // (C) What is to be remembered of it.
         state.answer = answer;
         state.keep_particles(&room.particles, &room.weights);
-        if !lost {
+        if lost {
+            // What is found again is looked for as it was first.
+            state.turn = 0.0;
+        } else {
             state.see(&room.arrival);
         }
         if trusted && state.believes(score, number) {
-            state.learn(frame, number, room);
+            let turn = state.measure_turn(frame, number, &evidence, room);
+            state.answer = found;
+            state.learn(seen, number, room);
+            (state.answer, state.turn) = (answer, turn);
+        }
+        if let Some(upright) = upright {
+            room.turned_pixels = upright.into_pixels();
         }
         state.estimate = Estimate {
             frame: number,

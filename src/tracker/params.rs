@@ -110,6 +110,9 @@ pub struct Params {
     /// How far around the last answer it looks at every place, as a multiple of the box's longer side, 0 to 4; at least
     /// as far as particles come, at most 24 cells.
     pub scan_reach: f64,
+    /// First particles at places that are less likely than the best one, as seen there, by more than this are not looked at: the
+    /// difference of logarithms, 0 to 1000. Off: 0.
+    pub scan_margin: f64,
     /// How much less likely a particle is whose place looks as it did when the target was last seen elsewhere: the logarithm,
     /// where all of its box is beside the last one and nothing in it has changed, 0 to 100. What comes to a place changes
     /// it. Off: 0.
@@ -127,6 +130,9 @@ pub struct Params {
     /// By how many degrees, either way, the look that the user pointed at is turned to make its subspace, 0 to 90: what a
     /// target that tilts a little looks like is known from the first frame on then. Off: 0.
     pub pose_angle: f64,
+    /// By how many degrees, either way, a target is tried turned further in the picture, 0 to 30: one that tilts is
+    /// followed as if the picture had turned around it. Where candidates stand alone. Off: 0.
+    pub turn_step: f64,
     /// The weight of a pinned subspace in the sum rule (equation 9), 0 to 100. Off: 1.
     pub pinned_weight: f64,
     /// The tracker learns from a frame only while the answer's distance to the first subspace is below this multiple

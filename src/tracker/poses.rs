@@ -5,7 +5,8 @@
 //! farther from no other look. The whole frame is turned, so the rim shows what would be there.
 
 use super::motion::Particle;
-use super::{GrayFrame, Params};
+use super::rotation::Rotation;
+use super::{GrayFrame, Params, Rect};
 
 /// Most poses beside the look as it is.
 pub(super) const MOST: usize = 2;
@@ -16,33 +17,15 @@ pub(super) fn angles(params: &Params) -> impl Iterator<Item = f64> + use<> {
     [angle, -angle].into_iter().filter(|angle| *angle != 0.0)
 }
 
-/// `frame` turned by `angle` around the centre of `target`, pixels between pixels by bilinear interpolation; beyond the
-/// edge is what is at the edge.
+/// `frame` turned by `angle` around the centre of `target`.
 pub(super) fn turned(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFrame {
-    let (width, height) = (frame.width() as usize, frame.height() as usize);
-    let (sin, cos) = angle.sin_cos();
-    // A pixel's centre is half a pixel from its edge.
-    let gray = |x: f64, y: f64| {
-        let x = (x - 0.5).clamp(0.0, (width - 1) as f64);
-        let y = (y - 0.5).clamp(0.0, (height - 1) as f64);
-        let (left, up) = (x as usize, y as usize);
-        let (right, down) = ((left + 1).min(width - 1), (up + 1).min(height - 1));
-        let (across, along) = (x.fract(), y.fract());
-        let at = |column: usize, row: usize| f64::from(frame.pixels()[row * width + column]);
-        let upper = at(left, up) + across * (at(right, up) - at(left, up));
-        let lower = at(left, down) + across * (at(right, down) - at(left, down));
-        (upper + along * (lower - upper)).round() as u8
-    };
-    let mut pixels = Vec::with_capacity(width * height);
-    for row in 0..height {
-        let y = row as f64 + 0.5 - target.y;
-        pixels.extend((0..width).map(|column| {
-            let x = column as f64 + 0.5 - target.x;
-            gray(target.x + cos * x - sin * y, target.y + sin * x + cos * y)
-        }));
-    }
-    GrayFrame::from_luma(frame.width(), frame.height(), pixels)
-        .expect("as many pixels as the frame has")
+    let everywhere = Rect::new(
+        0.0,
+        0.0,
+        f64::from(frame.width()),
+        f64::from(frame.height()),
+    );
+    Rotation::about(target, angle).apply(frame, &everywhere, Vec::new())
 }
 
 #[cfg(test)]

@@ -129,6 +129,12 @@ impl Params {
         )?;
         real("scale_std", self.scale_std, 0.0..=10.0, "from 0 to 10")?;
         real("scan_reach", self.scan_reach, 0.0..=4.0, "from 0 to 4")?;
+        real(
+            "scan_margin",
+            self.scan_margin,
+            0.0..=1000.0,
+            "from 0 to 1000",
+        )?;
         real("scale_rate", self.scale_rate, 0.0..=1.0, "from 0 to 1")?;
         real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(
@@ -144,6 +150,7 @@ impl Params {
             "from 0 to 100",
         )?;
         real("pose_angle", self.pose_angle, 0.0..=90.0, "from 0 to 90")?;
+        real("turn_step", self.turn_step, 0.0..=30.0, "from 0 to 30")?;
         real(
             "pinned_weight",
             self.pinned_weight,

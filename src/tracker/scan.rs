@@ -29,7 +29,11 @@ pub(super) struct Scan {
     windows: Windows,
     /// How likely each place is, row by row: the logarithm of what its particle's weight is multiplied with.
     values: Vec<f32>,
+    /// The same without the peaks that were taken, and those.
+    left: Vec<f32>,
     peaks: Vec<Particle>,
+    /// Where the places are; none where nothing was looked at.
+    places: Option<Places>,
 }
 
 /// Places in a row and above each other, around a center.
@@ -50,6 +54,25 @@ impl Places {
             y: self.center.y + (row as f64 - down as f64) * height,
             ..self.center
         }
+    }
+
+    /// The value at `particle`, between those of the places around it; none beyond the last of them.
+    fn value(&self, values: &[f32], particle: &Particle) -> Option<f64> {
+        let ((across, down), (width, height)) = (self.away, self.cell);
+        let x = (particle.x - self.center.x) / width + across as f64;
+        let y = (particle.y - self.center.y) / height + down as f64;
+        let (columns, rows) = (2 * across + 1, 2 * down + 1);
+        let inside = |at: f64, count: usize| (0.0..(count - 1) as f64).contains(&at);
+        if !inside(x, columns) || !inside(y, rows) {
+            return None;
+        }
+        let corner = &values[y as usize * columns + x as usize..];
+        let (right, below) = (x.fract(), y.fract());
+        let line = |from: usize| {
+            let (a, b) = (f64::from(corner[from]), f64::from(corner[from + 1]));
+            a + (b - a) * right
+        };
+        Some(line(0) + (line(columns) - line(0)) * below)
     }
 }
 
@@ -87,6 +110,7 @@ impl Scan {
     pub fn look(&mut self, view: &mut View, sought: &Sought<'_>, discriminant: &Discriminant) {
         let params = sought.params;
         self.peaks.clear();
+        self.places = None;
         if params.scan_peaks == 0 || !discriminant.is_on() || params.features != Features::Gradients
         {
             return;
@@ -104,6 +128,7 @@ impl Scan {
         );
         let (columns, rows) = (2 * across + 1, 2 * down + 1);
         comparison::empty(&mut self.values, (2 * MOST_AWAY + 1).pow(2));
+        comparison::empty(&mut self.left, (2 * MOST_AWAY + 1).pow(2));
         self.values.resize(columns * rows, 0.0);
         let cell_pixels = (cell_width * cell_height) as f32;
         let values = &mut self.values;
@@ -119,12 +144,36 @@ impl Scan {
             sought,
             values: &mut self.values,
         });
+        self.places = Some(places);
+        self.left.clone_from(&self.values);
         for _ in 0..params.scan_peaks {
-            let Some(best) = take_peak(&mut self.values, columns) else {
+            let Some(best) = take_peak(&mut self.left, columns) else {
                 break;
             };
             self.peaks.push(places.at(best % columns, best / columns));
         }
+    }
+
+    /// Leaves out those of the first `particles` that are hopeless: at places less likely than the best one by more than is
+    /// asked for. What was last seen, there or carried along, stays, and what is out of sight may be anywhere.
+    pub fn sift(&self, sought: &Sought<'_>, particles: &mut Vec<Particle>) {
+        let margin = sought.params.scan_margin;
+        let Some(places) = self.places else { return };
+        if margin <= 0.0 || sought.widening > 1.0 {
+            return;
+        }
+        let most = self
+            .values
+            .iter()
+            .copied()
+            .fold(f32::NEG_INFINITY, f32::max);
+        let least = f64::from(most) - margin;
+        let mut index = 0;
+        particles.retain(|particle| {
+            index += 1;
+            let value = places.value(&self.values, particle);
+            index <= 2 || value.is_none_or(|value| value >= least)
+        });
     }
 }
 
@@ -202,6 +251,34 @@ mod tests {
                 (gray - on_grid).abs() < 1e-2 * gray.abs().max(1.0),
                 "{gray} {on_grid}"
             );
+        }
+    }
+
+    #[test]
+    fn a_value_between_places_is_that_of_a_plane_and_there_is_none_beyond() {
+        let center = Particle {
+            x: 50.0,
+            y: 40.0,
+            scale: 1.0,
+        };
+        let places = Places {
+            center,
+            away: (3, 2),
+            cell: (4.0, 5.0),
+        };
+        let plane = |place: &Particle| 2.0 * place.x - 3.0 * place.y + 7.0;
+        let values: Vec<f32> = (0..35)
+            .map(|i| plane(&places.at(i % 7, i / 7)) as f32)
+            .collect();
+        for (x, y) in [(50.0, 40.0), (38.0, 30.0), (43.7, 48.9), (61.9, 31.2)] {
+            let particle = Particle { x, y, ..center };
+            let value = places.value(&values, &particle);
+            let value = value.expect("it is among the places");
+            assert!((value - plane(&particle)).abs() < 1e-4, "{x} {y}: {value}");
+        }
+        for (x, y) in [(37.9, 40.0), (62.1, 40.0), (50.0, 29.9), (50.0, 50.1)] {
+            let particle = Particle { x, y, ..center };
+            assert_eq!(places.value(&values, &particle), None, "{x} {y}");
         }
     }
 

@@ -72,6 +72,12 @@ impl Sought<'_> {
         (all + more, first + more)
     }
 
+    /// How many are drawn around the best of the first.
+    pub fn refined(&self) -> usize {
+        let (all, first) = self.counts();
+        all - first
+    }
+
     /// How many particles are drawn in all where the search is widest.
     pub fn most(&self) -> usize {
         let all = self.params.particles as usize;
@@ -150,7 +156,7 @@ impl Sought<'_> {
         let count = (self.params.refined_modes as usize).min(particles.len());
         let modes = &mut modes[..count];
         best(weights, modes);
-        let (all, _) = self.counts();
+        let all = self.counts().0.min(particles.len() + self.refined());
         let params = self.params;
         for &mode in modes.iter().cycle() {
             if particles.len() >= all {

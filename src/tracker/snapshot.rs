@@ -12,11 +12,11 @@ use super::bag::Bag;
 use super::frame::working_size;
 use super::motion::Particle;
 use super::state::{self, State};
-use super::{Params, TrackerError, comparison};
+use super::{Params, TrackerError, comparison, turn};
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -164,6 +164,7 @@ fn check_mends(state: &State) -> bool {
         && state
             .last_seen
             .is_sound((width, height), params.arrival_weight > 0.0)
+        && turn::is_sound(state.turn, params)
         && (0.0..=1e6).contains(&state.trust.usual)
 }
 

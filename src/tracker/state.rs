@@ -49,6 +49,8 @@ pub(super) struct State {
     pub last_seen: LastSeen,
     pub trust: Trust,
     pub usual: Usual,
+    /// By how much the target is turned in the picture against the first look, in radians.
+    pub turn: f64,
     /// For how many frames the target has been out of sight.
     pub frames_lost: u32,
 }

@@ -33,8 +33,30 @@ pub(super) struct Grid {
 }
 
 impl View {
-    /// Gets ready for the areas of `particles`, of which there is one, and for others up to `furthest` working pixels from
-    /// one of these and [`LARGER`] than the largest.
+    /// What is looked at for the areas of `particles`, of which there is one, and for others up to `furthest` working pixels
+    /// from one of these and [`LARGER`] than the largest.
+    pub fn window(particles: &[Particle], furthest: f64, reach: &Reach, params: &Params) -> Rect {
+        let mut largest = particles[0];
+        let (mut left, mut right) = (largest.x, largest.x);
+        let (mut top, mut bottom) = (largest.y, largest.y);
+        for particle in particles {
+            (left, right) = (left.min(particle.x), right.max(particle.x));
+            (top, bottom) = (top.min(particle.y), bottom.max(particle.y));
+            largest.scale = largest.scale.max(particle.scale);
+        }
+        let area = seen(&largest, reach, params);
+        // A pyramid is of the box alone, without its context.
+        let larger = LARGER.max(pyramid::largest() / params.context);
+        let (width, height) = (larger * area.width, larger * area.height);
+        Rect::new(
+            left - furthest - width / 2.0,
+            top - furthest - height / 2.0,
+            right - left + 2.0 * furthest + width,
+            bottom - top + 2.0 * furthest + height,
+        )
+    }
+
+    /// Gets ready for the areas in the [`window`](Self::window).
     pub fn open(
         &mut self,
         frame: &GrayFrame,
@@ -44,24 +66,7 @@ impl View {
         params: &Params,
     ) {
         if params.features == Features::Gradients {
-            let mut largest = particles[0];
-            let (mut left, mut right) = (largest.x, largest.x);
-            let (mut top, mut bottom) = (largest.y, largest.y);
-            for particle in particles {
-                (left, right) = (left.min(particle.x), right.max(particle.x));
-                (top, bottom) = (top.min(particle.y), bottom.max(particle.y));
-                largest.scale = largest.scale.max(particle.scale);
-            }
-            let area = seen(&largest, reach, params);
-            // A pyramid is of the box alone, without its context.
-            let larger = LARGER.max(pyramid::largest() / params.context);
-            let (width, height) = (larger * area.width, larger * area.height);
-            let window = Rect::new(
-                left - furthest - width / 2.0,
-                top - furthest - height / 2.0,
-                right - left + 2.0 * furthest + width,
-                bottom - top + 2.0 * furthest + height,
-            );
+            let window = Self::window(particles, furthest, reach, params);
             // One size of cells for all: the first particle is the last answer.
             let area = seen(&particles[0], reach, params);
             let cell = (

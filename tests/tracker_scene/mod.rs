@@ -147,6 +147,45 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
     )
 }
 
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: a head, dark hair over a light face, tilts to one side by two degrees
+/// a frame up to 50, stays there, and sways; behind it are hills.
+pub fn tilting(t: usize) -> (GrayFrame, Rect) {
+    let angle = (2.0 * (t as f64 - 10.0)).clamp(0.0, 50.0).to_radians();
+    let (sin, cos) = angle.sin_cos();
+    let (middle_x, middle_y) = (80.0 + bounce(t, 30), 80.0);
+    let luma = (0..200 * 160_usize)
+        .map(|i| {
+            let (x, y) = ((i % 200) as f64 + 0.5, (i / 200) as f64 + 0.5);
+            let (x, y) = (x - middle_x, y - middle_y);
+            let (across, down) = (cos * x + sin * y, cos * y - sin * x);
+            let within = |x: f64, y: f64, wide: f64, high: f64| {
+                ((across - x) / wide).powi(2) + ((down - y) / high).powi(2) < 1.0
+            };
+            let [eyes, mouth] = [
+                within(-6.0, -3.0, 3.0, 2.0) || within(6.0, -3.0, 3.0, 2.0),
+                within(0.0, 11.0, 6.0, 2.0),
+            ];
+            if eyes || mouth {
+                50
+            } else if within(0.0, 3.0, 14.0, 18.0) {
+                200
+            } else if within(0.0, -6.0, 17.0, 18.0) {
+                30
+            } else {
+                hills(x + middle_x, y + middle_y) as u8 + 30
+            }
+        })
+        .collect();
+    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    let target = Rect::new(middle_x - 14.0, middle_y - 15.0, 28.0, 36.0);
+    // The face's middle is three pixels from the point that it turns around.
+    let (x, y) = (-3.0 * sin, 3.0 * cos - 3.0);
+    (
+        frame,
+        Rect::new(target.x + x, target.y + y, target.width, target.height),
+    )
+}
+
 /// A frame of one gray value.
 pub fn flat(width: u32, height: u32, value: u8) -> GrayFrame {
     let pixels = vec![value; width as usize * height as usize];
@@ -172,7 +211,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each mend of the preset `robust`, switched off.
-const MENDS_OFF: [(&str, Change); 17] = [
+const MENDS_OFF: [(&str, Change); 19] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
@@ -183,7 +222,9 @@ const MENDS_OFF: [(&str, Change); 17] = [
     ("arg max", |p| p.averaging_radius = 0.0),
     ("no filter of the scale", |p| p.scale_rate = 0.0),
     ("no look at every place", |p| p.scan_peaks = 0),
+    ("no place left out", |p| p.scan_margin = 0.0),
     ("no poses", |p| p.pose_angle = 0.0),
+    ("always upright", |p| p.turn_step = 0.0),
     ("nothing has to arrive", |p| p.arrival_weight = 0.0),
     ("nothing pinned", |p| p.pinned = 0),
     ("all trusted", |p| p.trusted_ratio = 0.0),
