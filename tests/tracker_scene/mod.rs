@@ -147,43 +147,35 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
     )
 }
 
-/// Frame `t`, 200 x 160 pixels, and the target's box in it: a head, dark hair over a light face, tilts to one side by two degrees
-/// a frame up to 50, stays there, and sways; behind it are hills.
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: a face under dark hair tilts to one side around the neck, by two
+/// degrees a frame up to 50, stays there, and sways; behind it are hills.
 pub fn tilting(t: usize) -> (GrayFrame, Rect) {
     let angle = (2.0 * (t as f64 - 10.0)).clamp(0.0, 50.0).to_radians();
     let (sin, cos) = angle.sin_cos();
-    let (middle_x, middle_y) = (80.0 + bounce(t, 30), 80.0);
+    let neck = (80.0 + bounce(t, 20), 110.0);
     let luma = (0..200 * 160_usize)
         .map(|i| {
             let (x, y) = ((i % 200) as f64 + 0.5, (i / 200) as f64 + 0.5);
-            let (x, y) = (x - middle_x, y - middle_y);
-            let (across, down) = (cos * x + sin * y, cos * y - sin * x);
+            let (across, up) = (x - neck.0, neck.1 - y);
+            let (across, up) = (cos * across - sin * up, cos * up + sin * across);
             let within = |x: f64, y: f64, wide: f64, high: f64| {
-                ((across - x) / wide).powi(2) + ((down - y) / high).powi(2) < 1.0
+                ((across - x) / wide).powi(2) + ((up - y) / high).powi(2) < 1.0
             };
-            let [eyes, mouth] = [
-                within(-6.0, -3.0, 3.0, 2.0) || within(6.0, -3.0, 3.0, 2.0),
-                within(0.0, 11.0, 6.0, 2.0),
-            ];
-            if eyes || mouth {
+            let eyes = within(-6.0, 36.0, 3.0, 2.0) || within(6.0, 36.0, 3.0, 2.0);
+            if eyes || within(0.0, 20.0, 6.0, 2.0) {
                 50
-            } else if within(0.0, 3.0, 14.0, 18.0) {
+            } else if within(0.0, 28.0, 14.0, 18.0) {
                 200
-            } else if within(0.0, -6.0, 17.0, 18.0) {
+            } else if within(0.0, 39.0, 20.0, 20.0) {
                 30
             } else {
-                hills(x + middle_x, y + middle_y) as u8 + 30
+                hills(x, y) as u8 + 30
             }
         })
         .collect();
     let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
-    let target = Rect::new(middle_x - 14.0, middle_y - 15.0, 28.0, 36.0);
-    // The face's middle is three pixels from the point that it turns around.
-    let (x, y) = (-3.0 * sin, 3.0 * cos - 3.0);
-    (
-        frame,
-        Rect::new(target.x + x, target.y + y, target.width, target.height),
-    )
+    let (x, y) = (neck.0 + 28.0 * sin, neck.1 - 28.0 * cos);
+    (frame, Rect::new(x - 14.0, y - 18.0, 28.0, 36.0))
 }
 
 /// A frame of one gray value.
