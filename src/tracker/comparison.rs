@@ -223,11 +223,8 @@ impl Comparison {
         for (slice, vector) in history.iter_mut().zip(&state.history) {
             *slice = vector;
         }
-        evaluation.compute_distances(&history[..state.history.len()]);
-        for index in 0..count {
-            self.distances
-                .extend_from_slice(evaluation.distances(index));
-        }
+        let distances = evaluation.compute_distances(count, &history[..state.history.len()]);
+        self.distances.extend_from_slice(distances);
     }
 
     /// Where the vectors of so many particles are.
@@ -250,10 +247,6 @@ impl Comparison {
         for (index, vector) in self.whitened.chunks_exact(len).enumerate() {
             evaluation.candidate_mut(index).copy_from_slice(vector);
         }
-        // Candidates are diagonalised side by side: what another frame left there would change the last bits.
-        for index in count..params.particles as usize {
-            evaluation.candidate_mut(index).fill(0.0);
-        }
         self.whitened.clear();
         self.whitened.extend(state.history.iter().flatten());
         whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
@@ -261,11 +254,8 @@ impl Comparison {
         for (slice, vector) in history.iter_mut().zip(self.whitened.chunks_exact(len)) {
             *slice = vector;
         }
-        evaluation.compute_distances(&history[..state.history.len()]);
-        for index in 0..count {
-            self.distances
-                .extend_from_slice(evaluation.distances(index));
-        }
+        let distances = evaluation.compute_distances(count, &history[..state.history.len()]);
+        self.distances.extend_from_slice(distances);
     }
 
     /// What the places say of the particles that were not looked at before: their priors, and what has come there.

@@ -127,7 +127,7 @@ impl Evaluation {
     /// # Panics
     /// If no bag was set, there are more than P previous patches, or one of them is longer than D.
     pub fn compute(&mut self, history: &[&[f32]]) {
-        self.compute_distances(history);
+        self.compute_distances(self.candidates, history);
         let entries = self.entries.len();
         likelihood::normalized(
             self.distances.values(),
@@ -138,8 +138,12 @@ impl Evaluation {
         likelihood::sum_rule(&self.likelihoods, entries, (0, 1.0), &mut self.weights);
     }
 
-    /// The first half of [`compute`](Self::compute): the distances alone.
-    pub(super) fn compute_distances(&mut self, history: &[&[f32]]) {
+    /// The first half of [`compute`](Self::compute), for the first `count` candidates: the distances alone, which it returns.
+    pub(super) fn compute_distances(&mut self, count: usize, history: &[&[f32]]) -> &[f64] {
+        // Candidates are diagonalised side by side: what another frame left there would change the last bits.
+        for index in count..self.candidates {
+            self.candidate_mut(index).fill(0.0);
+        }
         let arch = Arch::new();
         arch.dispatch(ComputeProducts {
             products: &mut self.products,
@@ -156,6 +160,7 @@ impl Evaluation {
             candidates: self.candidates,
             entries: &self.entries,
         });
+        &self.distances.values()[..count * self.entries.len()]
     }
 
     /// dist(Aᵢ, B\[k\]) (equation 4), in [0, 1], of candidate `index` to each entry of the bag.
