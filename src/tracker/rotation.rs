@@ -1,11 +1,17 @@
 //! A turn of the picture around a point: where things are before and after, and what is seen then.
 
+use std::ops::Range;
+
+use pulp::{Arch, Simd, WithSimd};
+
 use super::motion::Particle;
 use super::{GrayFrame, Rect};
 
 /// Places between pixels are counted in so many parts, as a power of two, and mixed in [`SHARES`] shares.
 const PARTS: u32 = 16;
-const SHARES: i64 = 256;
+const SHARES: u32 = 256;
+/// Pixels that are mixed at once.
+const TOGETHER: usize = 16;
 
 /// A turn around a point. The picture that it makes is the *turned* one; a target that has turned by as much in the picture
 /// stands upright there.
@@ -15,6 +21,29 @@ pub(super) struct Rotation {
     y: f64,
     sin: f64,
     cos: f64,
+}
+
+/// The pixels of [`Rotation::apply`], to be compiled for the instructions that this machine has.
+struct Mix<'a> {
+    rotation: &'a Rotation,
+    frame: &'a GrayFrame,
+    columns: Range<usize>,
+    rows: Range<usize>,
+    out: &'a mut [u8],
+}
+
+impl WithSimd for Mix<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let width = self.frame.width() as usize;
+        for row in self.rows {
+            let out = &mut self.out[row * width..][self.columns.clone()];
+            self.rotation
+                .mix_row(self.frame, (self.columns.start, row), out);
+        }
+    }
 }
 
 impl Rotation {
@@ -56,51 +85,145 @@ impl Rotation {
         let rows = span(window.y, window.height, height);
         // Of one row or column there is nothing to mix.
         if width > 1 && height > 1 {
-            let parts = f64::from(1_u32 << PARTS);
-            let part = |value: f64| (value * parts).round() as i64;
-            let (step_x, step_y) = (part(self.cos), part(self.sin));
-            let [last_x, last_y] = [width, height].map(|side| side as i64 - 1);
-            for row in rows {
-                // A pixel's centre is half a pixel from its edge.
-                let (x, y) = (
-                    columns.start as f64 + 0.5 - self.x,
-                    row as f64 + 0.5 - self.y,
-                );
-                let mut from_x = part(self.x + self.cos * x - self.sin * y - 0.5);
-                let mut from_y = part(self.y + self.sin * x + self.cos * y - 0.5);
-                for out in &mut room[row * width..][columns.clone()] {
-                    let ((x, across), (y, along)) = (place(from_x, last_x), place(from_y, last_y));
-                    *out = mix(source, y * width + x, width, (across, along));
-                    from_x += step_x;
-                    from_y += step_y;
-                }
-            }
+            Arch::new().dispatch(Mix {
+                rotation: self,
+                frame,
+                columns,
+                rows,
+                out: &mut room,
+            });
         }
         frame.with_pixels(room)
     }
+
+    /// Writes the pixels of the turned picture from this `column` and `row` on to `out`.
+    #[inline(always)]
+    fn mix_row(&self, frame: &GrayFrame, (column, row): (usize, usize), out: &mut [u8]) {
+        let parts = f64::from(1_u32 << PARTS);
+        let part = |value: f64| (value * parts).round() as i32;
+        // A pixel's centre is half a pixel from its edge.
+        let (x, y) = (column as f64 + 0.5 - self.x, row as f64 + 0.5 - self.y);
+        let across = Line {
+            start: part(self.x + self.cos * x - self.sin * y - 0.5),
+            step: part(self.cos),
+            last: frame.width() as i32 - 1,
+        };
+        let along = Line {
+            start: part(self.y + self.sin * x + self.cos * y - 0.5),
+            step: part(self.sin),
+            last: frame.height() as i32 - 1,
+        };
+        // Few are beyond the edge, and only these have to be held.
+        let inside = along.inside(across.inside(0..out.len()));
+        let (source, width) = (frame.pixels(), frame.width() as usize);
+        let mut done = inside.start;
+        if inside.len() >= TOGETHER {
+            while done < inside.end {
+                // Some of the last ones twice, where they do not come out even.
+                let first = done.min(inside.end - TOGETHER);
+                let mixed =
+                    mix_several(source, width, &across.several(first), &along.several(first));
+                out[first..][..TOGETHER].copy_from_slice(&mixed);
+                done = first + TOGETHER;
+            }
+        }
+        for i in (0..inside.start).chain(done..out.len()) {
+            let ((x, to_right), (y, down)) = (across.held(i), along.held(i));
+            let upper = y * width + x;
+            let [left, right] = [upper, upper + 1].map(|at| {
+                let [above, below] = [source[at], source[at + width]].map(u32::from);
+                above * (SHARES - down) + below * down
+            });
+            out[i] = rounded(left * (SHARES - to_right) + right * to_right);
+        }
+    }
 }
 
-/// The pixel before a place, which is given in parts, and the share of the one after it: there is one, for the last pixel is all of
-/// the one after the last but one.
+/// The gray values at these places, none of which is beyond the last pixel.
 #[inline(always)]
-fn place(at: i64, last: i64) -> (usize, i64) {
-    let at = at.clamp(0, last << PARTS);
-    let before = (at >> PARTS).min(last - 1);
-    (
-        before as usize,
-        ((at - (before << PARTS)) * SHARES) >> PARTS,
-    )
+fn mix_several(
+    source: &[u8],
+    width: usize,
+    x: &[i32; TOGETHER],
+    y: &[i32; TOGETHER],
+) -> [u8; TOGETHER] {
+    let uppers: [u32; TOGETHER] =
+        std::array::from_fn(|i| ((y[i] >> PARTS) * width as i32 + (x[i] >> PARTS)) as u32);
+    let (mut above, mut below) = ([0_u16; TOGETHER], [0_u16; TOGETHER]);
+    for ((upper, above), below) in uppers.iter().zip(&mut above).zip(&mut below) {
+        let square = &source[*upper as usize..][..width + 2];
+        *above = u16::from_le_bytes([square[0], square[1]]);
+        *below = u16::from_le_bytes([square[width], square[width + 1]]);
+    }
+    std::array::from_fn(|i| {
+        let across = share(x[i]);
+        let line = |pair: u16| {
+            let (left, right) = (u32::from(pair & 0xff), u32::from(pair >> 8));
+            left * (SHARES - across) + right * across
+        };
+        let down = share(y[i]);
+        rounded(line(above[i]) * (SHARES - down) + line(below[i]) * down)
+    })
 }
 
-/// The gray value that is `across` and `along` shares from the pixel at `upper` to those right of and below it.
+/// The gray value of which these are shares of shares.
 #[inline(always)]
-fn mix(source: &[u8], upper: usize, width: usize, (across, along): (i64, i64)) -> u8 {
-    let line = |at: usize| {
-        let pair = &source[at..at + 2];
-        i64::from(pair[0]) * (SHARES - across) + i64::from(pair[1]) * across
-    };
-    let mixed = line(upper) * (SHARES - along) + line(upper + width) * along;
+fn rounded(mixed: u32) -> u8 {
     ((mixed + SHARES * SHARES / 2) / (SHARES * SHARES)) as u8
+}
+
+/// Where the pixels of a row of the turned picture are along one axis of the picture itself, in parts of a pixel.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    start: i32,
+    step: i32,
+    /// The last pixel of the picture, in pixels: at least 1.
+    last: i32,
+}
+
+impl Line {
+    #[inline(always)]
+    fn at(&self, index: usize) -> i32 {
+        self.start + index as i32 * self.step
+    }
+
+    #[inline(always)]
+    fn several(&self, first: usize) -> [i32; TOGETHER] {
+        std::array::from_fn(|i| self.at(first + i))
+    }
+
+    /// Which of the pixels in `run` are at or after the first pixel and before the last one.
+    #[inline(always)]
+    fn inside(&self, run: Range<usize>) -> Range<usize> {
+        let (start, limit) = (self.start, self.last << PARTS);
+        let (first, end) = match self.step {
+            0 if (0..limit).contains(&start) => return run,
+            0 => (0, 0),
+            step @ 1.. => (-start.div_euclid(step), -(start - limit).div_euclid(step)),
+            step => {
+                let back = |from: i32| from.div_euclid(-step) + 1;
+                (back(start - limit), back(start))
+            }
+        };
+        let held = |index: i32| (index.max(0) as usize).clamp(run.start, run.end);
+        held(first)..held(end).max(held(first))
+    }
+
+    /// The pixel before the place of pixel `index`, and the share of the one after it: there is one, for the last pixel is all of the
+    /// one after the last but one.
+    fn held(&self, index: usize) -> (usize, u32) {
+        let at = self.at(index).clamp(0, self.last << PARTS);
+        if at >> PARTS == self.last {
+            return (self.last as usize - 1, SHARES);
+        }
+        ((at >> PARTS) as usize, share(at))
+    }
+}
+
+/// The share of the pixel after a place, which is given in parts.
+#[inline(always)]
+fn share(at: i32) -> u32 {
+    ((at as u32 & ((1 << PARTS) - 1)) * SHARES) >> PARTS
 }
 
 #[cfg(test)]
