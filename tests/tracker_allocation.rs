@@ -3,7 +3,7 @@
 mod tracker_scene;
 
 use bagtrack::tracker::{GrayFrame, Params, Preset, Rect, Tracker};
-use tracker_scene::panned;
+use tracker_scene::{near, panned};
 
 /// A target that is held: the bag of one that is not is still growing when others are full.
 fn frame(t: usize) -> GrayFrame {
@@ -42,6 +42,21 @@ fn a_warm_step_allocates_nothing() {
             let counted = allocations(&mut tracker, t, t + 1);
             assert_eq!(counted, 0, "{preset:?}, frame {t}");
         }
+    }
+}
+
+/// What is seen of a large target is a picture in larger pixels.
+#[test]
+fn a_warm_step_of_a_large_target_allocates_nothing() {
+    let scene = |t| near(t, (110, 96));
+    let (first, target) = scene(0);
+    let mut tracker = Tracker::new(&first, target, Preset::Robust.params()).expect("a box inside");
+    for t in 1..110 {
+        let (frame, _) = scene(t);
+        let counted = allocation_counter::measure(|| {
+            tracker.step(&frame).expect("frames of one size");
+        });
+        assert!(t < 70 || counted.count_total == 0, "frame {t}");
     }
 }
 

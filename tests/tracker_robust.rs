@@ -3,7 +3,7 @@
 mod tracker_scene;
 
 use bagtrack::tracker::{GrayFrame, Params, Preset, Rect, Tracker};
-use tracker_scene::{frame, leaping, panned, receding, robust, target, tilting};
+use tracker_scene::{frame, leaping, near, panned, receding, robust, target, tilting};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
 fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
@@ -44,6 +44,18 @@ fn a_target_that_shrinks_while_its_background_grows_keeps_its_box() {
             assert!(ratio.abs() < 0.12, "seed {seed}, frame {t}: {ratio:+.3}");
             let overlap = answer.overlap(&truth);
             assert!(overlap > 0.75, "seed {seed}, frame {t}: {overlap:.3}");
+        }
+    }
+}
+
+/// In pixels of 1 x 1, 2 x 2 and 4 x 4: cells have six of them along a side.
+#[test]
+fn a_target_is_held_as_well_when_it_is_large() {
+    for (width, height) in [(60, 50), (110, 96), (200, 170)] {
+        for seed in 0..3 {
+            let overlap = mean_overlap(|t| near(t, (width, height)), 50, seed);
+            println!("{width} x {height}, seed {seed}: overlap {overlap:.3}");
+            assert!(overlap >= 0.9, "{width} x {height}, seed {seed}: {overlap}");
         }
     }
 }

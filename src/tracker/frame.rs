@@ -35,6 +35,8 @@ pub struct GrayFrame {
     pixels: Vec<u8>,
     source_width: u32,
     source_height: u32,
+    /// Working pixels along a side of a pixel: 1, but where the tracker made it coarser.
+    grain: u32,
 }
 
 impl GrayFrame {
@@ -84,6 +86,7 @@ impl GrayFrame {
             pixels,
             source_width: source.0,
             source_height: source.1,
+            grain: 1,
         }
     }
 
@@ -91,6 +94,24 @@ impl GrayFrame {
     pub(super) fn with_pixels(&self, pixels: Vec<u8>) -> Self {
         debug_assert_eq!(pixels.len(), self.pixels.len());
         Self { pixels, ..*self }
+    }
+
+    /// The same frame in `pixels` that are `grain` times as large, of which there are `size` = columns, rows.
+    pub(super) fn coarse(&self, grain: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
+        debug_assert_eq!(pixels.len(), (size.0 * size.1) as usize);
+        let (width, height) = size;
+        Self {
+            width,
+            height,
+            pixels,
+            grain,
+            ..*self
+        }
+    }
+
+    /// Working pixels along a side of one of these pixels.
+    pub(super) fn grain(&self) -> f64 {
+        f64::from(self.grain)
     }
 
     /// Width of the working image.

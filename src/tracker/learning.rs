@@ -11,6 +11,7 @@ use super::arrival::LastSeen;
 use super::background::{self, Background};
 use super::bag::{self, Bag};
 use super::camera::Camera;
+use super::coarse;
 use super::comparison::{self, Comparison};
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
@@ -86,7 +87,6 @@ impl State {
         };
         state.gather(answer);
         state.survey(frame, 0, room);
-        state.look_at_poses(frame, room);
         let Room { features, bag, .. } = &mut room.learning;
         state
             .bag
@@ -107,7 +107,6 @@ impl State {
             *camera = Camera::new(frame);
         }
         self.survey(frame, number, room);
-        self.look_at_poses(frame, room);
         let Room { features, bag, .. } = &mut room.learning;
         self.bag.renew(&self.background, &self.params, bag);
         self.history.clear();
@@ -120,7 +119,12 @@ impl State {
 
     /// Learns everything that a box given by the user says about the surroundings, and looks at the box.
     fn survey(&mut self, frame: &GrayFrame, number: u64, room: &mut Comparison) {
+        room.arrival.take(frame);
+        self.see(&room.arrival);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
+        let grain = coarse::grain(&self.answer, &self.reach, &self.params);
+        let coarse = (grain > 1).then(|| coarse::picture(frame, grain, Vec::new()));
+        let frame = coarse.as_ref().unwrap_or(frame);
         room.view
             .open(frame, &[self.answer], everywhere, &self.reach, &self.params);
         let mut draws = motion::generator(self.params.seed, number, Draws::Examples);
@@ -132,8 +136,7 @@ impl State {
         self.scale_filter.forget();
         self.learn_scale(frame, room);
         self.look_at_answer(frame, room);
-        room.arrival.take(frame);
-        self.see(&room.arrival);
+        self.look_at_poses(frame, room);
     }
 
     /// How far from the answer frame `number` is looked at for the sake of learning, in working pixels.

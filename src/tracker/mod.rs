@@ -50,6 +50,7 @@ mod camera;
 mod candidate;
 mod cells;
 mod centering;
+mod coarse;
 mod combination;
 mod comparison;
 mod directions;
@@ -231,11 +232,15 @@ impl Tracker {
         let furthest = sought.furthest() + state.learning_radius(number);
         let furthest = furthest.max(sought.scanned());
         let (reach, params) = (&state.reach, &state.params);
+        let grain = coarse::grain(&state.answer, reach, params);
+        let coarse = (grain > 1)
+            .then(|| coarse::picture(frame, grain, std::mem::take(&mut room.coarse_pixels)));
+        let picture = coarse.as_ref().unwrap_or(frame);
         let upright = rotation.map(|rotation| {
             let window = View::window(&[state.answer], furthest, reach, params);
-            rotation.apply(frame, &window, std::mem::take(&mut room.turned_pixels))
+            rotation.apply(picture, &window, std::mem::take(&mut room.turned_pixels))
         });
-        let seen = upright.as_ref().unwrap_or(frame);
+        let seen = upright.as_ref().unwrap_or(picture);
         match params.search {
             Search::Resampled => {
                 motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
@@ -297,13 +302,16 @@ impl Tracker {
             state.see(&room.arrival);
         }
         if trusted && state.believes(score, number) {
-            let turn = state.measure_turn(frame, number, &evidence, room);
+            let turn = state.measure_turn(picture, number, &evidence, room);
             state.answer = found;
             state.learn(seen, number, room);
             (state.answer, state.turn) = (answer, turn);
         }
         if let Some(upright) = upright {
             room.turned_pixels = upright.into_pixels();
+        }
+        if let Some(coarse) = coarse {
+            room.coarse_pixels = coarse.into_pixels();
         }
         state.estimate = Estimate {
             frame: number,

@@ -22,8 +22,8 @@ pub(super) fn turned(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFr
     let everywhere = Rect::new(
         0.0,
         0.0,
-        f64::from(frame.width()),
-        f64::from(frame.height()),
+        frame.grain() * f64::from(frame.width()),
+        frame.grain() * f64::from(frame.height()),
     );
     Rotation::about(target, angle).apply(frame, &everywhere, Vec::new())
 }

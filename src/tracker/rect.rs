@@ -34,6 +34,16 @@ impl Rect {
         Self::new(x - width / 2.0, y - height / 2.0, width, height)
     }
 
+    /// The same box in pixels that are `grain` times as large.
+    pub(crate) fn in_pixels_of(&self, grain: f64) -> Self {
+        Self::new(
+            self.x / grain,
+            self.y / grain,
+            self.width / grain,
+            self.height / grain,
+        )
+    }
+
     /// The centre `(x, y)`, in pixels.
     pub fn center(&self) -> (f64, f64) {
         (self.x + self.width / 2.0, self.y + self.height / 2.0)

@@ -25,7 +25,7 @@ pub(super) struct Rotation {
 
 /// The pixels of [`Rotation::apply`], to be compiled for the instructions that this machine has.
 struct Mix<'a> {
-    rotation: &'a Rotation,
+    rotation: Rotation,
     frame: &'a GrayFrame,
     columns: Range<usize>,
     rows: Range<usize>,
@@ -81,12 +81,17 @@ impl Rotation {
             let held = |at: f64| at.clamp(0.0, limit as f64) as usize;
             held(from.floor())..held((from + length).ceil())
         };
+        let window = window.in_pixels_of(frame.grain());
         let columns = span(window.x, window.width, width);
         let rows = span(window.y, window.height, height);
         // Of one row or column there is nothing to mix.
         if width > 1 && height > 1 {
             Arch::new().dispatch(Mix {
-                rotation: self,
+                rotation: Self {
+                    x: self.x / frame.grain(),
+                    y: self.y / frame.grain(),
+                    ..*self
+                },
                 frame,
                 columns,
                 rows,

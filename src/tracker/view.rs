@@ -16,6 +16,8 @@ const LARGER: f64 = 1.08;
 #[derive(Debug, Default)]
 pub(super) struct View {
     cutter: PatchCutter,
+    /// Working pixels along a pixel of the frame's.
+    grain: f64,
     gradients: GradientSums,
     cells: Cells,
     /// Those of a grid.
@@ -65,15 +67,14 @@ impl View {
         reach: &Reach,
         params: &Params,
     ) {
+        self.grain = frame.grain();
         if params.features == Features::Gradients {
             let window = Self::window(particles, furthest, reach, params);
             // One size of cells for all: the first particle is the last answer.
-            let area = seen(&particles[0], reach, params);
-            let cell = (
-                area.width / f64::from(params.patch_width),
-                area.height / f64::from(params.patch_height),
-            );
-            self.gradients.compute(frame, &window, cell);
+            let (width, height) = Self::cell(&particles[0], reach, params);
+            let cell = (width / self.grain, height / self.grain);
+            self.gradients
+                .compute(frame, &window.in_pixels_of(self.grain), cell);
         }
     }
 
@@ -109,9 +110,10 @@ impl View {
                 }
             }
             Features::Gradients => {
+                let grain = self.grain;
                 let areas = particles
                     .iter()
-                    .map(|particle| seen(particle, reach, params));
+                    .map(|particle| seen(particle, reach, params).in_pixels_of(grain));
                 self.cells
                     .describe(&self.gradients, areas, params, out, centering);
             }
@@ -160,7 +162,7 @@ impl View {
         };
         let cells = &mut self.grid_cells;
         cells.reserve(most_columns as usize, most_rows as usize);
-        let areas = std::iter::once(area);
+        let areas = std::iter::once(area.in_pixels_of(self.grain));
         cells.describe(&self.gradients, areas, &params, &mut grid.values, None);
         grid.grays.extend(cells.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {

@@ -67,6 +67,25 @@ pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
     (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
 }
 
+/// Frame `t`, 320 x 240 pixels, and the target's box in it, of this width and height: the same target seen from near.
+pub fn near(t: usize, (width, height): (usize, usize)) -> (GrayFrame, Rect) {
+    let (left, top) = (40 + bounce(t, 60) as usize, 20 + bounce(t, 40) as usize);
+    let luma = (0..320 * 240_usize)
+        .map(|i| {
+            let (x, y) = (i % 320, i / 320);
+            if (left..left + width).contains(&x) && (top..top + height).contains(&y) {
+                let (x, y) = ((x - left) * 24 / width, (y - top) * 20 / height);
+                128 + texture(x, y, 5) / 2
+            } else {
+                hills(x as f64, y as f64) as u8
+            }
+        })
+        .collect();
+    let frame = GrayFrame::from_luma(320, 240, luma).expect("a frame of this size");
+    let target = Rect::new(left as f64, top as f64, width as f64, height as f64);
+    (frame, target)
+}
+
 /// Frame `t`, 200 x 160 pixels, and the target's box in it: over hills that stay it leaps to and fro, every fifth frame.
 pub fn leaping(t: usize) -> (GrayFrame, Rect) {
     let (hills, _) = panned(0, (0, 0));
