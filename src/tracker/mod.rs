@@ -302,7 +302,7 @@ impl Tracker {
             state.see(&room.arrival);
         }
         if trusted && state.believes(score, number) {
-            let turn = state.measure_turn(picture, number, &evidence, room);
+            let turn = state.measure_turn(picture, &evidence, room);
             state.answer = found;
             state.learn(seen, number, room);
             (state.answer, state.turn) = (answer, turn);

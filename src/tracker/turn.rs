@@ -14,10 +14,8 @@ use super::score::Evidence;
 use super::state::State;
 use super::{GrayFrame, Params, Search};
 
-/// Angles that are tried, in steps from the last one.
-const TRIED: [f64; 3] = [-1.0, 0.0, 1.0];
-/// In every so many frames: what tilts takes some to do it, and each angle costs as much as several particles.
-const EVERY: u64 = 2;
+/// Angles that are tried, in steps from the last one. The last one itself says no more: where it is right, the two look alike.
+const TRIED: [f64; 2] = [-1.0, 1.0];
 /// The share of a change that is taken, so that noise evens out.
 const GAIN: f64 = 0.5;
 /// How many times as wide the likelihood is as that of places: players who run look turned this way and that, by little.
@@ -26,9 +24,9 @@ pub(super) const SOFTER: f64 = 3.0;
 const USUAL: f64 = 25.0;
 /// The features see little of a turn below this, in degrees, and a picture that is not turned has not to be made.
 const LEAST: f64 = 8.0;
-/// Greatest distance to the first subspace at which an angle is measured: a look that shares less with the first is nearer to
-/// it at some angle by chance.
-const ALIKE: f64 = 0.4;
+/// Greatest distance to the first subspace at which an angle is measured: a look that shares less with the first, as that of a target half
+/// covered, is nearer to it at some angle by chance.
+const ALIKE: f64 = 0.25;
 
 /// How many particles more than those of a search there are room for.
 pub(super) fn tried(params: &Params) -> usize {
@@ -52,17 +50,14 @@ impl State {
         notable.then(|| Rotation::about(&self.answer, self.turn))
     }
 
-    /// The angle by which the target, found at the answer in `frame` (of this `number`), is turned there, in radians; `evidence` is what the best
-    /// particle said.
+    /// The angle by which the target, found at the answer in `frame`, is turned there, in radians; `evidence` is what the best particle said.
     pub fn measure_turn(
         &self,
         frame: &GrayFrame,
-        number: u64,
         evidence: &Evidence,
         room: &mut Comparison,
     ) -> f64 {
-        let due = is_on(&self.params) && number.is_multiple_of(EVERY);
-        if !due || evidence.first >= ALIKE {
+        if !is_on(&self.params) || evidence.first >= ALIKE {
             return self.turn;
         }
         let changes = TRIED.map(|steps| (steps * self.params.turn_step).to_radians());
