@@ -152,7 +152,7 @@ fn frames_one_pixel_wide_or_high() {
 
 #[test]
 fn a_tiny_frame_with_the_largest_box() {
-    for (width, height) in [(1, 1), (3, 2), (17, 5)] {
+    for (width, height) in [(1, 1), (3, 2), (17, 5), (300, 3), (1, 300)] {
         let frames: Vec<GrayFrame> = (0..12_u32)
             .map(|t| {
                 let pixels = (0..width * height).map(|i| ((i + t) * 53 % 251) as u8);

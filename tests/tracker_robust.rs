@@ -87,29 +87,30 @@ fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     assert!(held < 45, "{held}");
 }
 
-/// The mean distance of the answers from the target's centre, in pixels, in the last frames of `tilting`.
-fn off_when_tilted(params: Params) -> f64 {
-    let (first, given) = tilting(0);
+/// The mean distance of the answers from the target's centre in the last frames of `tilting`, in pixels that are so many times as large.
+fn off_when_tilted(params: Params, zoom: usize) -> f64 {
+    let (first, given) = tilting(0, zoom);
     let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");
     let off = (1..90).map(|t| {
-        let (frame, truth) = tilting(t);
+        let (frame, truth) = tilting(t, zoom);
         let answer = tracker.step(&frame).expect("frames of one size").target;
         answer.center_distance(&truth)
     });
-    off.skip(40).sum::<f64>() / 49.0
+    off.skip(40).sum::<f64>() / 49.0 / zoom as f64
 }
 
 #[test]
 fn a_head_that_tilts_stays_in_the_middle_of_its_box() {
-    for seed in 0..3 {
-        let off = off_when_tilted(robust(seed));
-        let upright = off_when_tilted(Params {
+    for (seed, zoom) in [(0, 1), (1, 1), (2, 1), (0, 3), (1, 3), (2, 3)] {
+        let off = off_when_tilted(robust(seed), zoom);
+        let always_upright = Params {
             turn_step: 0.0,
             ..robust(seed)
-        });
-        println!("seed {seed}: {off:.2} px, {upright:.2} px always upright");
-        assert!(off < 0.8, "seed {seed}: {off}");
-        assert!(off < 0.5 * upright, "seed {seed}: {off} {upright}");
+        };
+        let upright = off_when_tilted(always_upright, zoom);
+        println!("seed {seed}, {zoom} times: {off:.2} px, {upright:.2} px always upright");
+        assert!(off < 0.8, "seed {seed}, {zoom}: {off}");
+        assert!(off < 0.5 * upright, "seed {seed}, {zoom}: {off} {upright}");
     }
 }
 

@@ -27,10 +27,12 @@ pub(super) fn grain(target: &Particle, reach: &Reach, params: &Params) -> usize 
     };
     let (width, height) = View::cell(&first, reach, params);
     let shorter = width.min(height);
+    // A box may be larger than the frame, which has to have a pixel.
+    let most = reach.frame_width.min(reach.frame_height);
     let mut grain = 1;
     while grain < GREATEST {
         let next = (2 * grain) as f64;
-        if shorter < FINEST * next || shorter * target.scale < SHRUNK * next {
+        if shorter < FINEST * next || shorter * target.scale < SHRUNK * next || next > most {
             break;
         }
         grain *= 2;
@@ -154,21 +156,22 @@ mod tests {
             [2.0, 1.0, 0.67, 0.66].map(|scale| of(12.1, scale)),
             [2, 2, 2, 1]
         );
+        let target = Particle {
+            x: 1.0,
+            y: 1.0,
+            scale: 1.0,
+        };
+        let thin = Reach {
+            frame_width: 300.0,
+            frame_height: 3.0,
+            box_width: 300.0,
+            box_height: 300.0,
+        };
+        assert_eq!(grain(&target, &thin, &params), 2);
         let gray = Params {
             features: Features::Gray,
             ..params
         };
-        let reach = Reach {
-            frame_width: 320.0,
-            frame_height: 240.0,
-            box_width: 300.0,
-            box_height: 200.0,
-        };
-        let target = Particle {
-            x: 160.0,
-            y: 120.0,
-            scale: 1.0,
-        };
-        assert_eq!(grain(&target, &reach, &gray), 1);
+        assert_eq!(grain(&target, &thin, &gray), 1);
     }
 }

@@ -166,15 +166,21 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
     )
 }
 
-/// Frame `t`, 200 x 160 pixels, and the target's box in it: a face under dark hair tilts to one side around the neck, by two
-/// degrees a frame up to 50, stays there, and sways; behind it are hills.
-pub fn tilting(t: usize) -> (GrayFrame, Rect) {
+/// Frame `t` and the target's box in it: a face under dark hair tilts to one side around the neck, by two degrees a frame up to 50,
+/// stays there, and sways; behind it are hills. From afar 200 x 160 pixels, from near (`zoom` 3) 320 x 240 of that three times as large.
+pub fn tilting(t: usize, zoom: usize) -> (GrayFrame, Rect) {
+    let ((width, height), (left, top)) = match zoom {
+        1 => ((200, 160), (0.0, 0.0)),
+        _ => ((320, 240), (36.0, 42.0)),
+    };
+    let larger = zoom as f64;
     let angle = (2.0 * (t as f64 - 10.0)).clamp(0.0, 50.0).to_radians();
     let (sin, cos) = angle.sin_cos();
     let neck = (80.0 + bounce(t, 20), 110.0);
-    let luma = (0..200 * 160_usize)
+    let luma = (0..width * height)
         .map(|i| {
-            let (x, y) = ((i % 200) as f64 + 0.5, (i / 200) as f64 + 0.5);
+            let (x, y) = ((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+            let (x, y) = (left + x / larger, top + y / larger);
             let (across, up) = (x - neck.0, neck.1 - y);
             let (across, up) = (cos * across - sin * up, cos * up + sin * across);
             let within = |x: f64, y: f64, wide: f64, high: f64| {
@@ -192,9 +198,10 @@ pub fn tilting(t: usize) -> (GrayFrame, Rect) {
             }
         })
         .collect();
-    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
-    let (x, y) = (neck.0 + 28.0 * sin, neck.1 - 28.0 * cos);
-    (frame, Rect::new(x - 14.0, y - 18.0, 28.0, 36.0))
+    let frame = GrayFrame::from_luma(width as u32, height as u32, luma);
+    let (x, y) = (neck.0 + 28.0 * sin - left, neck.1 - 28.0 * cos - top);
+    let target = Rect::centered(larger * x, larger * y, larger * 28.0, larger * 36.0);
+    (frame.expect("a frame of this size"), target)
 }
 
 /// A frame of one gray value.
