@@ -49,6 +49,7 @@ pub(super) struct Comparison {
     pub view: View,
     /// For pictures that are turned.
     turned_view: View,
+    /// Memory for the pixels of pictures: of larger ones, of the one turned with the target, of those that are tried.
     pub coarse_pixels: Vec<u8>,
     pub turned_pixels: Vec<u8>,
     tried_pixels: Vec<u8>,
