@@ -20,7 +20,9 @@ use super::solitary::Solitary;
 use super::state::State;
 use super::trust::Trust;
 use super::view::View;
-use super::{Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood, turn};
+use super::{
+    Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood, pictures, turn,
+};
 
 /// P at most.
 const GREATEST_HISTORY: usize = 10;
@@ -49,9 +51,8 @@ pub(super) struct Comparison {
     pub view: View,
     /// For pictures that are turned.
     turned_view: View,
-    /// Memory for the pixels of pictures: of larger ones, of the one turned with the target, of those that are tried.
-    pub coarse_pixels: Vec<u8>,
-    pub turned_pixels: Vec<u8>,
+    /// For the pictures in which the target is looked for, and the pixels of those that are turned further.
+    pub pictures: pictures::Room,
     tried_pixels: Vec<u8>,
     pub particles: Vec<Particle>,
     /// For sums of weights.
@@ -119,8 +120,7 @@ impl Comparison {
         empty(&mut self.places, most);
         empty(&mut self.in_picture, most);
         if turn::is_on(params) {
-            let pixels = state.reach.frame_width * state.reach.frame_height;
-            self.turned_pixels.reserve(pixels as usize);
+            self.pictures.begin(&state.reach);
         }
         self.posterior.begin(most, entries);
         empty(&mut self.weights, most);

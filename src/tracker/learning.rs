@@ -11,10 +11,10 @@ use super::arrival::LastSeen;
 use super::background::{self, Background};
 use super::bag::{self, Bag};
 use super::camera::Camera;
-use super::coarse;
 use super::comparison::{self, Comparison};
 use super::discriminant::{self, Discriminant};
 use super::motion::{self, Draws, Particle, Reach};
+use super::pictures::Pictures;
 use super::poses;
 use super::pyramid;
 use super::scale::ScaleFilter;
@@ -122,9 +122,8 @@ impl State {
         room.arrival.take(frame);
         self.see(&room.arrival);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
-        let grain = coarse::grain(&self.answer, &self.reach, &self.params);
-        let coarse = (grain > 1).then(|| coarse::picture(frame, grain, Vec::new()));
-        let frame = coarse.as_ref().unwrap_or(frame);
+        let pictures = Pictures::of(frame, self, &mut room.pictures);
+        let frame = pictures.unturned();
         room.view
             .open(frame, &[self.answer], everywhere, &self.reach, &self.params);
         let mut draws = motion::generator(self.params.seed, number, Draws::Examples);
@@ -137,6 +136,7 @@ impl State {
         self.learn_scale(frame, room);
         self.look_at_answer(frame, room);
         self.look_at_poses(frame, room);
+        pictures.give_back(&mut room.pictures);
     }
 
     /// How far from the answer frame `number` is looked at for the sake of learning, in working pixels.

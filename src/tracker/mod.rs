@@ -63,6 +63,7 @@ mod energies;
 mod evaluation;
 mod examples;
 mod exponential;
+mod find;
 mod frame;
 mod gradients;
 mod history;
@@ -78,6 +79,7 @@ mod params;
 mod patch;
 #[cfg(target_arch = "x86_64")]
 mod permute;
+mod pictures;
 mod places;
 mod planes;
 mod poses;
@@ -116,12 +118,7 @@ pub use subspace::{AffineSubspace, RANK_TOLERANCE};
 
 use serde::{Deserialize, Serialize};
 
-use comparison::Comparison;
-use motion::{Draws, Particle};
-use score::Evidence;
-use search::Sought;
 use state::State;
-use view::View;
 
 /// Whether the tracker believes its own box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -205,121 +202,7 @@ impl Tracker {
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
         state::check_frame(self.state.source, frame)?;
-        Ok(comparison::with(|room| self.find(frame, room)))
-    }
-
-    fn find(&mut self, frame: &GrayFrame, room: &mut Comparison) -> Estimate {
-        let state = &mut self.state;
-        let number = state.estimate.frame + 1;
-        let mut draws = motion::generator(state.params.seed, number, Draws::Particles);
-        let widening = state.widening();
-        let camera = state.camera.as_mut();
-        let shift = camera.map_or((0.0, 0.0), |camera| camera.shift(frame, &mut room.camera));
-        let rotation = state.rotation();
-        let in_picture =
-            |place: Particle| rotation.map_or(place, |rotation| rotation.in_picture(&place));
-        let sought = Sought {
-            last: state.answer,
-            shift: rotation.map_or(shift, |rotation| rotation.turned_shift(shift)),
-            widening,
-            params: &state.params,
-            reach: &state.reach,
-        };
-
-        // (A) Where it may be.
-        room.begin(state, sought.most());
-        room.rotation = rotation;
-        let furthest = sought.furthest() + state.learning_radius(number);
-        let furthest = furthest.max(sought.scanned());
-        let (reach, params) = (&state.reach, &state.params);
-        let grain = coarse::grain(&state.answer, reach, params);
-        let coarse = (grain > 1)
-            .then(|| coarse::picture(frame, grain, std::mem::take(&mut room.coarse_pixels)));
-        let picture = coarse.as_ref().unwrap_or(frame);
-        let upright = rotation.map(|rotation| {
-            let window = View::window(&[state.answer], furthest, reach, params);
-            rotation.apply(picture, &window, std::mem::take(&mut room.turned_pixels))
-        });
-        let seen = upright.as_ref().unwrap_or(picture);
-        match params.search {
-            Search::Resampled => {
-                motion::propose(state, &mut draws, &mut room.sums, &mut room.particles);
-                let particles = &room.particles;
-                room.view.open(seen, particles, furthest, reach, params);
-            }
-            Search::Answer => {
-                let answer = [state.answer];
-                room.view.open(seen, &answer, furthest, reach, params);
-                room.scan.look(&mut room.view, &sought, &state.discriminant);
-                sought.propose(room.scan.peaks(), &mut draws, &mut room.particles);
-                room.scan.sift(&sought, &mut room.particles);
-            }
-        }
-
-        if params.arrival_weight > 0.0 {
-            let carried = in_picture(sought.carried());
-            room.arrival.take(frame);
-            room.arrival
-                .compare(&state.last_seen, &carried, furthest, reach);
-        }
-
-        // (B) What is seen there, and (D) how that compares with what is known.
-        room.extend(seen, 0, state);
-        let mut best = room.weigh(&sought);
-        let first = room.particles.len();
-        if sought.refined() > 0 {
-            sought.refine(&room.weights, &mut draws, &mut room.particles);
-            room.extend(seen, first, state);
-            best = room.weigh(&sought);
-        }
-        let evidence = room.evidence(best, &state.trust);
-        let lost = state.is_out_of_sight(&evidence);
-        let found = if lost {
-            state.frames_lost = state.frames_lost.saturating_add(1);
-            sought.carried()
-        } else {
-            let radius = state.params.averaging_radius;
-            let found = search::average(&room.particles, &room.weights, best, radius);
-            let found = state.measure_scale(seen, found, room);
-            state.frames_lost = 0;
-            found
-        };
-        let answer = state.reach.hold(in_picture(found));
-        let evidence = Evidence {
-            scale: answer.scale,
-            ..evidence
-        };
-        let trusted = !lost && state.trust.judge(evidence.first, number, &state.params);
-        let (score, status) = state.usual.judge(&evidence, lost, trusted);
-
-        // (C) What is to be remembered of it.
-        state.answer = answer;
-        state.keep_particles(&room.particles, &room.weights);
-        if lost {
-            // What is found again is looked for as it was first.
-            state.turn = 0.0;
-        } else {
-            state.see(&room.arrival);
-        }
-        if trusted && state.believes(score, number) {
-            let turn = state.measure_turn(picture, &evidence, room);
-            state.answer = found;
-            state.learn(seen, number, room);
-            (state.answer, state.turn) = (answer, turn);
-        }
-        if let Some(upright) = upright {
-            room.turned_pixels = upright.into_pixels();
-        }
-        if let Some(coarse) = coarse {
-            room.coarse_pixels = coarse.into_pixels();
-        }
-        state.estimate = Estimate {
-            frame: number,
-            target: state.target_of(&answer),
-            score,
-            status,
-        };
-        state.estimate
+        Ok(comparison::with(|room| self.state.find(frame, room)))
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
