@@ -119,7 +119,8 @@ impl State {
         if self.frames_lost == 0 {
             return score < below;
         }
-        score < below + FOUND_MARGIN || !self.trust.recognizes(evidence.first, &self.params)
+        let (trust, params) = (&self.trust, &self.params);
+        score < below + FOUND_MARGIN || !trust.recognizes(evidence.first, self.widening(), params)
     }
 
     /// Whether frame `number`, whose answer has `score`, is believed enough to be learned from. Without a discriminant a

@@ -50,10 +50,13 @@ impl Trust {
         params.trusted_ratio <= 0.0 || distance < limit
     }
 
-    /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target:
-    /// a wide search finds the likest of all things, so it must look as much like the first look as is usual.
-    pub fn recognizes(&self, distance: f64, params: &Params) -> bool {
-        params.trusted_ratio <= 0.0 || distance < self.usual.max(LEAST_USUAL)
+    /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target. The
+    /// search was `widening` times as wide as usual: one that is hardly wider finds what it lost a frame or two before, and
+    /// that is trusted as ever; a wide one finds the likest of all things, so it must look as much like the first look
+    /// as is usual.
+    pub fn recognizes(&self, distance: f64, widening: f64, params: &Params) -> bool {
+        let limit = self.usual.max(LEAST_USUAL) * (1.0 + (params.trusted_ratio - 1.0) / widening);
+        params.trusted_ratio <= 0.0 || distance < limit
     }
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
@@ -87,6 +90,16 @@ mod tests {
         assert!(learned(0.1, UNTIL_USUAL - 1) && learned(0.7, 500));
         assert!(!learned(0.6, UNTIL_USUAL) && !learned(0.1, 500));
         assert!(believes(0.0, 500, &Preset::Paper.params()));
+    }
+
+    /// A player who bent down for a moment was not recognised for six hundred frames.
+    #[test]
+    fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
+        let params = Preset::Robust.params();
+        let trust = Trust { usual: 0.57 };
+        assert!(trust.recognizes(0.6, 1.5, &params));
+        assert!(!trust.recognizes(0.6, 11.0, &params));
+        assert!(trust.recognizes(0.55, 11.0, &params));
     }
 
     #[test]
