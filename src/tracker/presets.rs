@@ -102,8 +102,7 @@ const ROBUST: Params = Params {
     displacement_std: 12.0,
     scale_change_std: 0.04,
     scale_std: 0.5,
-    // A look of seventy frames ago still counts a third. With looks forgotten sooner a box that is drawn a little too large
-    // on a car grows away from it.
+    // A look of seventy frames ago still counts a third. With looks forgotten sooner some runs lose the scale of a car.
     scale_rate: 0.015,
     scan_peaks: 6,
     // A target that moves by all of its own length is still seen.

@@ -92,7 +92,7 @@ mod tests {
         assert!(believes(0.0, 500, &Preset::Paper.params()));
     }
 
-    /// A player who bent down for a moment was not recognised for six hundred frames.
+    /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
     #[test]
     fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
         let params = Preset::Robust.params();
