@@ -16,14 +16,14 @@ annotations; they come from what is easy to see in these films:
 Frames on which that finds nothing, or jumps, get 0,0,0,0, which is not scored.
 """
 
+import argparse
 import pathlib
 import subprocess
 import sys
 
-import numpy
-
 try:
     import cv2
+    import numpy
 except ImportError:
     sys.exit("unseen_clips: OpenCV is missing; pip install opencv-contrib-python-headless")
 
@@ -116,12 +116,10 @@ def purple(hue, saturation, value):
     return (hue > 120) & (hue < 150) & (saturation > 70) & (value > 30)
 
 
-def parts(mask, closed, opened):
-    """The bounds and areas of the connected parts of a mask whose gaps are closed and whose specks are gone."""
-    mask = mask.astype(numpy.uint8)
-    steps = [(cv2.MORPH_OPEN, opened), (cv2.MORPH_CLOSE, closed)]
-    for operation, (width, height) in steps:
-        mask = cv2.morphologyEx(mask, operation, numpy.ones((height, width)))
+def parts(mask, gap_width, gap_height):
+    """The bounds and areas of the connected parts of a mask without its specks, gaps of up to that size closed."""
+    mask = cv2.morphologyEx(mask.astype(numpy.uint8), cv2.MORPH_OPEN, numpy.ones((3, 3)))
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, numpy.ones((gap_height, gap_width)))
     return [tuple(map(int, part)) for part in cv2.connectedComponentsWithStats(mask)[2][1:]]
 
 
@@ -132,7 +130,7 @@ def colour_boxes(frames, has_colour):
         hsv = cv2.cvtColor(frame, cv2.COLOR_BGR2HSV).astype(int)
         mask = has_colour(*numpy.moveaxis(hsv, 2, 0))
         mask[:20] = mask[-20:] = False
-        largest = max(parts(mask, (15, 15), (3, 3)), key=lambda part: part[4], default=None)
+        largest = max(parts(mask, 15, 15), key=lambda part: part[4], default=None)
         boxes.append(largest[:4] if largest and largest[4] > 300 else None)
     return smoothed(boxes, 2)
 
@@ -146,7 +144,7 @@ def walkers(frames):
         changed = numpy.abs(frame.astype(numpy.int16) - still).max(axis=2) > 35
         free = [
             (x, y, w, h)
-            for x, y, w, h, area in parts(changed, (7, 15), (3, 3))
+            for x, y, w, h, area in parts(changed, 7, 15)
             if area > 150 and h > max(30, 1.3 * w) and x > 2 and x + w < width - 2 and y + h < height - 2
         ]
         followed = []
@@ -187,9 +185,9 @@ def save(folder, frames, boxes):
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        sys.exit(__doc__)
-    out = pathlib.Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="DIR", type=pathlib.Path, help="the clips' folder; it is made")
+    out = parser.parse_args().out
     packages = out.absolute().with_name(out.name + "-packages")
     fetch(packages)
 
