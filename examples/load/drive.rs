@@ -1,13 +1,11 @@
 //! The clients: one task a session, each with a connection of its own.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use bagtrack::tracker::Rect;
 use bytes::Bytes;
 use hdrhistogram::Histogram;
 use reqwest::{Client, StatusCode};
-use tokio::sync::Barrier;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until};
 
@@ -16,14 +14,27 @@ use crate::Outcome;
 /// A failure that can pass between tasks.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// What a run came to.
+/// What runs came to.
 pub struct Done {
-    /// Frames that were answered.
-    pub frames: u64,
-    /// Of them in a second.
-    pub per_second: f64,
-    /// In microseconds; in an open loop from when the frame was due.
+    /// Of each frame that was answered, in microseconds; in an open loop from when the frame was due.
     pub latencies: Histogram<u64>,
+    /// Seconds that the runs took.
+    pub seconds: f64,
+}
+
+impl Done {
+    /// Nothing yet.
+    pub fn new() -> Outcome<Self> {
+        Ok(Self {
+            latencies: Histogram::new(3)?,
+            seconds: 0.0,
+        })
+    }
+
+    /// Frames that were answered in a second.
+    pub fn per_second(&self) -> f64 {
+        self.latencies.len() as f64 / self.seconds
+    }
 }
 
 /// Sends pictures to a server.
@@ -52,100 +63,112 @@ impl Driver {
         }
     }
 
-    /// Opens `sessions` sessions, sends `frames` frames over all of them, ends the sessions. With a `rate`, that many
-    /// frames fall due a second; otherwise each session sends its next when the last is answered. Stops after `limit`.
-    pub async fn run(
-        &self,
-        sessions: u32,
-        frames: u32,
-        rate: Option<f64>,
-        limit: Duration,
-    ) -> Outcome<Done> {
-        let ready = Arc::new(Barrier::new(sessions as usize));
-        let mut tasks = JoinSet::new();
-        for index in 0..sessions {
-            let client = ClientSession {
-                http: Client::builder().pool_max_idle_per_host(1).build()?,
-                url: self.url.clone(),
-                create: self.create.clone(),
+    /// Opens so many sessions.
+    pub async fn open(&self, sessions: u32) -> Outcome<Clients> {
+        let mut clients = Vec::new();
+        for _ in 0..sessions {
+            let http = Client::builder().pool_max_idle_per_host(1).build()?;
+            let created = http.post(&self.create).body(self.pictures[0].clone());
+            let created = created.send().await?.error_for_status()?;
+            let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
+            let id = session["id"].as_str().ok_or("a session without an id")?;
+            clients.push(ClientSession {
+                http,
+                session: format!("{}/sessions/{id}", self.url),
                 pictures: self.pictures.clone(),
-                ready: ready.clone(),
-            };
-            let own = (frames + sessions - 1 - index) / sessions;
-            let schedule = rate.map(|rate| Schedule {
-                first: Duration::from_secs_f64(f64::from(index) / rate),
-                every: Duration::from_secs_f64(f64::from(sessions) / rate),
+                next: 1,
             });
-            tasks.spawn(client.run(own, schedule, limit));
         }
-        let mut latencies = Histogram::new(3)?;
-        let (mut first, mut last) = (None::<Instant>, None::<Instant>);
-        while let Some(session) = tasks.join_next().await {
-            let (own, from, until) = session?.map_err(|failure| failure.to_string())?;
-            latencies.add(&own)?;
-            first = Some(first.map_or(from, |first| first.min(from)));
-            last = Some(last.map_or(until, |last| last.max(until)));
-        }
-        let (first, last) = first.zip(last).ok_or("no session ran")?;
-        Ok(Done {
-            frames: latencies.len(),
-            per_second: latencies.len() as f64 / (last - first).as_secs_f64(),
-            latencies,
-        })
+        Ok(Clients(clients))
     }
 }
 
-/// When the frames of a session are due, from the start.
+/// Open sessions.
+pub struct Clients(Vec<ClientSession>);
+
+impl Clients {
+    /// Sends `frames` frames over all sessions and adds what comes of it to `done`. With a `rate`, that many frames fall due
+    /// a second; otherwise each session sends its next when the last is answered. Stops after `limit`.
+    pub async fn run(
+        &mut self,
+        frames: u32,
+        rate: Option<f64>,
+        limit: Duration,
+        done: &mut Done,
+    ) -> Outcome<()> {
+        let sessions = self.0.len() as u32;
+        let mut tasks = JoinSet::new();
+        let start = Instant::now();
+        for (index, client) in (0..sessions).zip(self.0.drain(..)) {
+            let own = (frames + sessions - 1 - index) / sessions;
+            let schedule = rate.map(|rate| Schedule {
+                first: start + Duration::from_secs_f64(f64::from(index) / rate),
+                every: Duration::from_secs_f64(f64::from(sessions) / rate),
+            });
+            tasks.spawn(client.run(own, schedule, start + limit));
+        }
+        while let Some(client) = tasks.join_next().await {
+            let (client, latencies) = client?.map_err(|failure| failure.to_string())?;
+            done.latencies.add(&latencies)?;
+            self.0.push(client);
+        }
+        done.seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Ends the sessions.
+    pub async fn close(self) -> Outcome<()> {
+        for client in self.0 {
+            let ended = client.http.delete(&client.session).send().await?;
+            ended.error_for_status()?;
+        }
+        Ok(())
+    }
+}
+
+/// When the frames of a session are due.
 #[derive(Clone, Copy)]
 struct Schedule {
-    first: Duration,
+    first: Instant,
     every: Duration,
 }
 
 struct ClientSession {
     http: Client,
-    url: String,
-    create: String,
+    session: String,
     pictures: Vec<Bytes>,
-    ready: Arc<Barrier>,
+    /// The picture that is sent next.
+    next: usize,
 }
 
 impl ClientSession {
     async fn run(
-        self,
+        mut self,
         frames: u32,
         schedule: Option<Schedule>,
-        limit: Duration,
-    ) -> Result<(Histogram<u64>, Instant, Instant), Failure> {
-        let created = self.http.post(&self.create).body(self.pictures[0].clone());
-        let created = created.send().await?.error_for_status()?;
-        let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
-        let id = session["id"].as_str().ok_or("a session without an id")?;
-        let session = format!("{}/sessions/{id}", self.url);
-        let post = format!("{session}/frames");
-        self.ready.wait().await;
-
+        end: Instant,
+    ) -> Result<(Self, Histogram<u64>), Failure> {
+        let post = format!("{}/frames", self.session);
         let mut latencies = Histogram::new(3)?;
-        let start = Instant::now();
-        for (index, picture) in (0..frames).zip(self.pictures.iter().cycle().skip(1)) {
+        for index in 0..frames {
             let due = match schedule {
-                Some(schedule) => start + schedule.first + schedule.every * index,
+                Some(schedule) => schedule.first + schedule.every * index,
                 None => Instant::now(),
             };
             sleep_until(due).await;
-            let answer = self.http.post(&post).body(picture.clone()).send().await?;
+            let picture = self.pictures[self.next].clone();
+            self.next = (self.next + 1) % self.pictures.len();
+            let answer = self.http.post(&post).body(picture).send().await?;
             let status = answer.status();
             let body = answer.bytes().await?;
             if status != StatusCode::OK {
                 return Err(format!("{status}: {}", String::from_utf8_lossy(&body)).into());
             }
             latencies.record(due.elapsed().as_micros() as u64)?;
-            if start.elapsed() > limit {
+            if Instant::now() > end {
                 break;
             }
         }
-        let end = Instant::now();
-        self.http.delete(&session).send().await?;
-        Ok((latencies, start, end))
+        Ok((self, latencies))
     }
 }

@@ -1,18 +1,20 @@
 //! A load generator: `cargo build --release && cargo run --release --example load -- --help`.
 //!
 //! It starts a server of its own on a free loopback port and prints, from one run:
-//! - the processor time of decoding and tracking a frame in this process, one thread, before and after each measurement: of
-//!   one session over and over, all of whose data stays in the caches, and of as many sessions as are measured, in turns;
+//! - the processor time of decoding and tracking a frame in this process, one thread: of one session over and over, all of
+//!   whose data stays in the caches, and of as many sessions as are measured, in turns;
 //! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
 //! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
 //!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
-//! - the processor time of the server process for a frame against that of decoding and tracking.
+//! - the processor time of the server process for a frame against that of decoding and tracking. A machine that others use is
+//!   now fast and now slow, so a measurement has parts, and the two are measured in turns.
 //!
 //! With `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
 //!
 //! Frames, sessions and time are bounded. Linux only: processor time is read from `/proc`.
 
 mod drive;
+mod in_process;
 mod memory;
 mod pictures;
 mod process;
@@ -20,10 +22,15 @@ mod process;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Preset, Rect, Tracker};
+use bagtrack::tracker::Preset;
 use clap::Parser;
+use drive::{Done, Driver};
+use in_process::InProcess;
 use process::{Server, cpu_seconds};
+use tokio::runtime::Runtime;
+
+/// Parts of a measurement.
+const PARTS: u32 = 10;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -72,43 +79,70 @@ fn main() -> Outcome<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
-    let driver = drive::Driver::new(server.url(), pictures.clone(), target, &options.preset);
+    let driver = Driver::new(server.url(), pictures.clone(), target, &options.preset);
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
     }
-    let mut one = InProcess::new(pictures.clone(), target, preset, 1)?;
-    let mut several = InProcess::new(pictures, target, preset, options.sessions)?;
-    let limit = Duration::from_secs(options.seconds);
-    let mut measure = |name: &str, sessions: u32, rate: Option<f64>| -> Outcome<f64> {
-        // On a machine that others use too, before and after may differ much.
-        let mut work = || -> Outcome<(f64, f64)> {
-            let one = one.seconds_a_frame(options.frames / 8)?;
-            match sessions {
-                1 => Ok((one, one)),
-                _ => Ok((one, several.seconds_a_frame(options.frames / 8)?)),
+    let mut load = Load {
+        one: InProcess::new(pictures.clone(), target, preset, 1)?,
+        several: InProcess::new(pictures, target, preset, options.sessions)?,
+        runtime,
+        driver,
+        server,
+        frames: options.frames,
+        limit: Duration::from_secs(options.seconds) / PARTS,
+    };
+    let one = load.measure("1 session, closed loop", 1, None)?;
+    let name = format!("{} sessions, closed loop", options.sessions);
+    let many = load.measure(&name, options.sessions, None)?;
+    println!("    throughput {:.2} × that of 1 session", many / one);
+    let rate = options.rate.unwrap_or(many / 2.0);
+    let name = format!(
+        "{} sessions, open loop, {rate:.0} due a second",
+        options.sessions
+    );
+    load.measure(&name, options.sessions, Some(rate))?;
+    println!("server: {} MiB resident", load.server.resident()? >> 20);
+    Ok(())
+}
+
+/// What is measured, and what with.
+struct Load {
+    one: InProcess,
+    several: InProcess,
+    runtime: Runtime,
+    driver: Driver,
+    server: Server,
+    frames: u32,
+    limit: Duration,
+}
+
+impl Load {
+    /// Prints what `sessions` sessions come to; returns how many frames they get through in a second.
+    fn measure(&mut self, name: &str, sessions: u32, rate: Option<f64>) -> Outcome<f64> {
+        let mut done = Done::new()?;
+        let (mut alone, mut in_turns) = (Vec::new(), Vec::new());
+        let mut used = 0.0;
+        let mut clients = self.runtime.block_on(self.driver.open(sessions))?;
+        let frames = self.frames.div_ceil(PARTS);
+        for _ in 0..PARTS {
+            alone.push(self.one.seconds_a_frame(frames / 2)?);
+            if sessions > 1 {
+                in_turns.push(self.several.seconds_a_frame(frames / 2)?);
             }
-        };
-        let before = work()?;
-        let used = cpu_seconds(server.pid())?;
-        let done = runtime.block_on(driver.run(sessions, options.frames, rate, limit))?;
-        let cpu = (cpu_seconds(server.pid())? - used) / done.frames as f64;
-        let after = work()?;
-        println!(
-            "{name}: {} frames, {:.0} a second",
-            done.frames, done.per_second
-        );
+            let before = cpu_seconds(self.server.pid())?;
+            let run = clients.run(frames, rate, self.limit, &mut done);
+            self.runtime.block_on(run)?;
+            used += cpu_seconds(self.server.pid())? - before;
+        }
+        self.runtime.block_on(clients.close())?;
+        let sent = done.latencies.len();
+        let cpu = used / sent as f64;
+        println!("{name}: {sent} frames, {:.0} a second", done.per_second());
         println!("    server {:.0} µs of processor time a frame", cpu * 1e6);
-        let ratio = |what: &str, before: f64, after: f64| {
-            println!(
-                "    = {:.2} × (decode + step) of {what}, which took {:.0} before and {:.0} after",
-                cpu / (before + after) * 2.0,
-                before * 1e6,
-                after * 1e6
-            );
-        };
-        ratio("one session over and over", before.0, after.0);
+        print_ratio(cpu, "one session over and over", &alone);
         if sessions > 1 {
-            ratio("as many sessions in turns", before.1, after.1);
+            print_ratio(cpu, "as many sessions in turns", &in_turns);
         }
         let quantile = |q| done.latencies.value_at_quantile(q) as f64 / 1e3;
         println!(
@@ -118,59 +152,20 @@ fn main() -> Outcome<()> {
             quantile(0.999),
             done.latencies.max() as f64 / 1e3
         );
-        Ok(done.per_second)
-    };
-    let one = measure("1 session, closed loop", 1, None)?;
-    let name = format!("{} sessions, closed loop", options.sessions);
-    let many = measure(&name, options.sessions, None)?;
-    println!("    throughput {:.2} × that of 1 session", many / one);
-    let rate = options.rate.unwrap_or(many / 2.0);
-    let name = format!(
-        "{} sessions, open loop, {rate:.0} due a second",
-        options.sessions
+        Ok(done.per_second())
+    }
+}
+
+/// The server's time for a frame against that of decoding and tracking, which took `parts`.
+fn print_ratio(cpu: f64, what: &str, parts: &[f64]) {
+    let mean = parts.iter().sum::<f64>() / parts.len() as f64;
+    let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = parts.iter().copied().fold(0.0, f64::max);
+    println!(
+        "    = {:.2} × (decode + step) of {what}, which took {:.0} (in parts {:.0} to {:.0})",
+        cpu / mean,
+        mean * 1e6,
+        least * 1e6,
+        most * 1e6
     );
-    measure(&name, options.sessions, Some(rate))?;
-    println!("server: {} MiB resident", server.resident()? >> 20);
-    Ok(())
-}
-
-/// The work of a frame without a service.
-struct InProcess {
-    pictures: Vec<Vec<u8>>,
-    trackers: Vec<Tracker>,
-    done: usize,
-}
-
-impl InProcess {
-    fn new(pictures: Vec<Vec<u8>>, target: Rect, preset: Preset, sessions: u32) -> Outcome<Self> {
-        let first = ingest::decode(&pictures[0], &Limits::default())?;
-        let tracker = Tracker::new(&first, target, preset.params())?;
-        let mut work = Self {
-            trackers: vec![tracker; sessions as usize],
-            pictures,
-            done: 0,
-        };
-        work.run(100 * sessions)?;
-        Ok(work)
-    }
-
-    /// The next picture for each session in turn.
-    fn run(&mut self, frames: u32) -> Outcome<()> {
-        for _ in 0..frames {
-            let sessions = self.trackers.len();
-            let picture = &self.pictures[(self.done / sessions + 1) % self.pictures.len()];
-            let frame = ingest::decode(picture, &Limits::default())?;
-            self.trackers[self.done % sessions].step(&frame)?;
-            ingest::recycle(frame);
-            self.done += 1;
-        }
-        Ok(())
-    }
-
-    /// Seconds of processor time to decode and track a frame.
-    fn seconds_a_frame(&mut self, frames: u32) -> Outcome<f64> {
-        let before = cpu_seconds(std::process::id())?;
-        self.run(frames)?;
-        Ok((cpu_seconds(std::process::id())? - before) / f64::from(frames))
-    }
 }
