@@ -81,15 +81,19 @@ pub fn print(plot: Option<&str>) {
         rows.push(row);
     };
     use Order::Power;
-    let paper: [(&str, &[u32], Order, Change); 4] = [
+    let particles: (&str, &[u32], Order, Change) =
         ("N", &[50, 100, 200, 400, 800], Power(1), |p, n| {
             p.particles = n;
-        }),
+        });
+    let entries: (&str, &[u32], Order, Change) =
+        ("K", &[2, 4, 8, 16, 32], Power(1), |p, k| p.bag_size = k);
+    let paper: [(&str, &[u32], Order, Change); 4] = [
+        particles,
         // D = H₁ H₂.
         ("H", &[8, 16, 32, 64], Power(2), |p, side| {
             (p.patch_width, p.patch_height) = (side, side);
         }),
-        ("K", &[2, 4, 8, 16, 32], Power(1), |p, k| p.bag_size = k),
+        entries,
         ("P", &[1, 2, 5, 10], Power(3), |p, history| {
             p.history = history;
         }),
@@ -103,10 +107,8 @@ pub fn print(plot: Option<&str>) {
         ));
     }
     let robust: [(&str, &[u32], Order, Change); 3] = [
-        ("N", &[50, 100, 200, 400, 800], Power(1), |p, n| {
-            p.particles = n;
-        }),
-        ("K", &[2, 4, 8, 16, 32], Power(1), |p, k| p.bag_size = k),
+        particles,
+        entries,
         (
             "background samples",
             &[16, 32, 64, 128],
@@ -162,76 +164,28 @@ fn steps(
 
 /// What comes before a step grows with the pixels of the frame, the step does not.
 fn frame_sizes() -> [Row; 4] {
-    let zooms = [1_usize, 2, 4, 6, 8];
-    let mut times = [const { Vec::new() }; 4];
-    for zoom in zooms {
-        let (width, height) = (scene::WIDTH * zoom, scene::HEIGHT * zoom);
-        let luma = scene::luma(1, zoom);
-        let frame = |luma: &[u8]| {
-            GrayFrame::from_luma(width as u32, height as u32, luma.to_vec())
-                .expect("a frame of this size")
-        };
-        let mut jpeg = Vec::new();
-        Encoder::new(&mut jpeg, 85)
-            .encode(
-                &scene::wall(width, height),
-                width as u16,
-                height as u16,
-                ColorType::Luma,
-            )
-            .expect("the sides fit a JPEG");
-        let limits = Limits::default();
-        let target = scene::target(0).scaled(zoom as f64, zoom as f64);
-        let (first, second) = (frame(&scene::luma(0, zoom)), frame(&luma));
-        let tracker = |preset: Preset| {
-            let mut tracker =
-                Tracker::new(&first, target, preset.params()).expect("a box inside the frame");
-            for _ in 0..60 {
-                tracker.step(&second).expect("frames of one size");
-            }
-            tracker
-        };
-        let (mut paper, mut robust) = (tracker(Preset::Paper), tracker(Preset::Robust));
-        // By themselves: a large frame empties the caches of a step.
-        let before = clock::cycles(
-            ROUNDS,
-            PERIOD,
-            vec![
-                Box::new(|| {
-                    black_box(ingest::decode(&jpeg, &limits)).expect("a whole JPEG");
-                }),
-                Box::new(|| {
-                    black_box(frame(&luma));
-                }),
-            ],
-        );
-        let steps = clock::cycles(
-            ROUNDS,
-            PERIOD,
-            vec![
-                Box::new(|| {
-                    black_box(paper.step(&second)).expect("frames of one size");
-                }),
-                Box::new(|| {
-                    black_box(robust.step(&second)).expect("frames of one size");
-                }),
-            ],
-        );
-        for (times, taken) in times.iter_mut().zip(before.into_iter().chain(steps)) {
-            times.push(taken);
-        }
-    }
-    let [decode, downscale, paper, robust] = times;
+    let mut sizes = [1, 2, 4, 6, 8].map(FrameSize::new);
+    let limits = Limits::default();
+    let decode = timed(&mut sizes, |size| {
+        black_box(ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
+    });
+    let downscale = timed(&mut sizes, |size| {
+        black_box(frame(size.zoom, &size.luma));
+    });
+    let [paper, robust] = [0, 1].map(|preset| {
+        timed(&mut sizes, |size| {
+            black_box(size.trackers[preset].step(&size.seen)).expect("frames of one size");
+        })
+    });
     let row = |what, order, from: usize, times: Vec<f64>| {
-        let zooms = &zooms[from..];
-        let pixels = |zoom: &usize| (zoom * zoom * scene::WIDTH * scene::HEIGHT) as f64 / 1e6;
-        let label = |zoom: &usize| format!("{} × {}", scene::WIDTH * zoom, scene::HEIGHT * zoom);
-        let sizes = zooms.iter().map(pixels).collect();
+        let sizes = &sizes[from..];
+        let pixels = |size: &FrameSize| (size.width() * size.height()) as f64 / 1e6;
+        let label = |size: &FrameSize| format!("{} × {}", size.width(), size.height());
         Row {
-            labels: zooms.iter().map(label).collect(),
+            labels: sizes.iter().map(label).collect(),
             ..Row::new(
                 (what, "million pixels"),
-                sizes,
+                sizes.iter().map(pixels).collect(),
                 order,
                 times[from..].to_vec(),
             )
@@ -245,4 +199,69 @@ fn frame_sizes() -> [Row; 4] {
         row("step, `paper`", constant, 0, paper),
         row("step, `robust`", constant, 0, robust),
     ]
+}
+
+/// What frames of one size are timed with.
+struct FrameSize {
+    zoom: usize,
+    jpeg: Vec<u8>,
+    luma: Vec<u8>,
+    seen: GrayFrame,
+    /// Of both presets.
+    trackers: [Tracker; 2],
+}
+
+fn frame(zoom: usize, luma: &[u8]) -> GrayFrame {
+    let (width, height) = (scene::WIDTH * zoom, scene::HEIGHT * zoom);
+    GrayFrame::from_luma(width as u32, height as u32, luma.to_vec()).expect("a frame of this size")
+}
+
+impl FrameSize {
+    fn new(zoom: usize) -> Self {
+        let (width, height) = (scene::WIDTH * zoom, scene::HEIGHT * zoom);
+        let mut jpeg = Vec::new();
+        Encoder::new(&mut jpeg, 85)
+            .encode(
+                &scene::wall(width, height),
+                width as u16,
+                height as u16,
+                ColorType::Luma,
+            )
+            .expect("the sides fit a JPEG");
+        let luma = scene::luma(1, zoom);
+        let (first, seen) = (frame(zoom, &scene::luma(0, zoom)), frame(zoom, &luma));
+        let target = scene::target(0).scaled(zoom as f64, zoom as f64);
+        let trackers = [Preset::Paper, Preset::Robust].map(|preset| {
+            let mut tracker =
+                Tracker::new(&first, target, preset.params()).expect("a box inside the frame");
+            for _ in 0..60 {
+                tracker.step(&seen).expect("frames of one size");
+            }
+            tracker
+        });
+        Self {
+            zoom,
+            jpeg,
+            luma,
+            seen,
+            trackers,
+        }
+    }
+
+    fn width(&self) -> usize {
+        scene::WIDTH * self.zoom
+    }
+
+    fn height(&self) -> usize {
+        scene::HEIGHT * self.zoom
+    }
+}
+
+/// Seconds that `work` takes at each of `sizes`, which take turns.
+fn timed(sizes: &mut [FrameSize], work: impl Fn(&mut FrameSize)) -> Vec<f64> {
+    let work = &work;
+    let actions = sizes
+        .iter_mut()
+        .map(|size| Box::new(move || work(size)) as Action);
+    clock::cycles(ROUNDS, PERIOD, actions.collect())
 }
