@@ -2,18 +2,18 @@
 //! or two vector instructions, and what one candidate would wait for (roots, divisions) is waited for together.
 
 /// How many candidates are worked on together: a register of single-precision numbers where registers are longest.
-pub(super) const ABREAST: usize = 16;
+pub(crate) const ABREAST: usize = 16;
 
 /// A number of each of [`ABREAST`] candidates.
-pub(super) type Singles = [f32; ABREAST];
+pub(crate) type Singles = [f32; ABREAST];
 
 /// A number of each of [`ABREAST`] candidates, where single precision does not do.
-pub(super) type Doubles = [f64; ABREAST];
+pub(crate) type Doubles = [f64; ABREAST];
 
 /// 1 / √(1 + x) for x in \[0, 1\], off by less than 1e-4 of it: where Newton's method begins. A root and a division would take
 /// several times as long as this and a step of that.
 #[inline(always)]
-pub(super) fn inverse_root(x: f32) -> f32 {
+pub(crate) fn inverse_root(x: f32) -> f32 {
     // The Chebyshev fit of degree 4.
     const COEFFICIENTS: [f32; 5] = [
         0.999_927_04,

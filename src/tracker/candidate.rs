@@ -1,6 +1,6 @@
 //! (B) The affine subspaces of all candidates, in the coordinates of the shared history.
 //!
-//! V = [v, H] (equation 2). With the orthonormal Q of [`products`](super::products), q = Qᵀv, and e the unit vector
+//! V = [v, H] (equation 2). With the orthonormal Q of [`products`](crate::tracker::products), q = Qᵀv, and e the unit vector
 //! of the rest v - Qq, whose length is ρ, V Vᵀ is diag(Λ, 0) + z zᵀ in the basis [Q, e], where z = (q, ρ). So the
 //! left singular vectors of V are [Q, e] times the eigenvectors of a matrix of P + 1 rows. They are as well combinations
 //! of Q and d = v - h, so Uᵀf for any f follows from Qᵀf and dᵀf.
@@ -8,15 +8,15 @@
 //! Dividing by ρ is harmless however small it is: the coordinate of a counting direction along e is ρ times a bounded
 //! number (the z of an eigenvector over its eigenvalue).
 
-use super::Params;
-use super::abreast::{ABREAST, Doubles, Singles};
-use super::dominant;
-use super::products::Products;
-use super::subspace::RANK_TOLERANCE;
+use crate::tracker::params::table::Params;
+use crate::tracker::abreast::{ABREAST, Doubles, Singles};
+use crate::tracker::dominant;
+use crate::tracker::products::Products;
+use crate::tracker::appearance::subspace::RANK_TOLERANCE;
 
 /// The bases of all candidates of a frame.
 #[derive(Debug, Clone, Default)]
-pub(super) struct CandidateBases {
+pub(crate) struct CandidateBases {
     /// n.
     limit: usize,
     /// P + 1.

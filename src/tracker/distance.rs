@@ -5,15 +5,15 @@
 
 use std::f32::consts::PI;
 
-use super::Params;
-use super::abreast::{ABREAST, Doubles, Singles};
-use super::candidate::CandidateBases;
-use super::products::Products;
-use super::singular::{self, Columns};
+use crate::tracker::params::table::Params;
+use crate::tracker::abreast::{ABREAST, Doubles, Singles};
+use crate::tracker::candidate::CandidateBases;
+use crate::tracker::products::Products;
+use crate::tracker::singular::{self, Columns};
 
 /// The distances of all candidates to all entries of the bag.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Distances {
+pub(crate) struct Distances {
     alpha: f64,
     /// γ (equation 5).
     gamma: f64,

@@ -4,7 +4,7 @@
 //! exact, only the rotation a rotation: so the tangent is found in single precision, and Newton's method brings the cosine
 //! that goes with it to double precision. What a rotation leaves is then 1e-7 of what there was in place of 1e-16.
 
-use super::abreast::{ABREAST, Doubles, inverse_root};
+use crate::tracker::abreast::{ABREAST, Doubles, inverse_root};
 
 /// Four sweeps are usual; the bound only guards against a NaN.
 const MAX_SWEEPS: usize = 16;
@@ -23,7 +23,7 @@ const LEAST: f32 = 1e-30;
 /// the upper triangle counts. Their diagonals end as the eigenvalues, in no order, and `vectors` with the eigenvector of
 /// the `j`-th diagonal element in its `j`-th row.
 #[inline(always)]
-pub(super) fn diagonalize(matrix: &mut [Doubles], vectors: &mut [Doubles], dim: usize) {
+pub(crate) fn diagonalize(matrix: &mut [Doubles], vectors: &mut [Doubles], dim: usize) {
     vectors.fill([0.0; ABREAST]);
     for j in 0..dim {
         vectors[j * dim + j] = [1.0; ABREAST];
@@ -108,7 +108,7 @@ fn turn(values: &mut [Doubles], p: usize, q: usize, cosine: &Doubles, sine: &Dou
 
 /// Brings the `count` greatest eigenvalues to the front of the diagonal, the greatest first, and their vectors with them.
 #[inline(always)]
-pub(super) fn sort(matrix: &mut [Doubles], vectors: &mut [Doubles], dim: usize, count: usize) {
+pub(crate) fn sort(matrix: &mut [Doubles], vectors: &mut [Doubles], dim: usize, count: usize) {
     for i in 0..count.min(dim) {
         for j in i + 1..dim {
             let (a, b) = (matrix[i * dim + i], matrix[j * dim + j]);
@@ -132,7 +132,7 @@ pub(super) fn sort(matrix: &mut [Doubles], vectors: &mut [Doubles], dim: usize, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::eigen::Spectrum;
+    use crate::tracker::linalg::jacobi::Spectrum;
 
     /// diag(Λ, 0) + z zᵀ of trace 1, with eigenvalues of very different sizes.
     fn matrix(dim: usize, seed: usize) -> Vec<f64> {

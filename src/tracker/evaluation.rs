@@ -2,13 +2,14 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::candidate::CandidateBases;
-use super::distance::Distances;
-use super::products::Products;
-use super::subspace::{self, AffineSubspace};
-use super::{Params, likelihood};
+use crate::tracker::candidate::CandidateBases;
+use crate::tracker::distance::Distances;
+use crate::tracker::products::Products;
+use crate::tracker::appearance::subspace::{self, AffineSubspace};
+use crate::tracker::params::table::Params;
+use crate::tracker::weights::likelihood;
 
-/// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](super::Tracker::step) does it.
+/// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](crate::tracker::tracker::Tracker::step) does it.
 ///
 /// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
 /// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.
@@ -88,7 +89,7 @@ impl Evaluation {
     }
 
     /// Becomes the evaluation for `params`, in the room that it has. The bag must be set again.
-    pub(super) fn prepare(&mut self, params: &Params) {
+    pub(crate) fn prepare(&mut self, params: &Params) {
         self.sigma = params.sigma;
         self.candidates = params.particles as usize;
         self.entries.clear();
@@ -139,7 +140,7 @@ impl Evaluation {
     }
 
     /// The first half of [`compute`](Self::compute), for the first `count` candidates: the distances alone, which it returns.
-    pub(super) fn compute_distances(&mut self, count: usize, history: &[&[f32]]) -> &[f64] {
+    pub(crate) fn compute_distances(&mut self, count: usize, history: &[&[f32]]) -> &[f64] {
         // Candidates are diagonalised side by side: what another frame left there would change the last bits.
         for index in count..self.candidates {
             self.candidate_mut(index).fill(0.0);

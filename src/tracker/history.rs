@@ -1,12 +1,12 @@
 //! What all candidates of a frame share: the P previous patches H, and an orthonormal basis Q of their span, found from the
 //! small matrix HᵀH.
 
-use super::eigen::Spectrum;
-use super::subspace;
+use crate::tracker::linalg::jacobi::Spectrum;
+use crate::tracker::appearance::subspace;
 
 /// The history of a frame.
 #[derive(Debug, Clone, Default)]
-pub(super) struct SharedHistory {
+pub(crate) struct SharedHistory {
     count: usize,
     spectrum: Spectrum,
     eigenvalues: Vec<f64>,
@@ -91,7 +91,7 @@ impl SharedHistory {
 
 /// The inner product of a vector in double and one in single precision, in eight parts so that the loop vectorises.
 #[inline(always)]
-pub(super) fn dot(a: &[f64], b: &[f32]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f32]) -> f64 {
     let mut parts = [0.0_f64; 8];
     let (a_chunks, a_rest) = a.as_chunks::<8>();
     let (b_chunks, b_rest) = b[..a.len()].as_chunks::<8>();

@@ -40,208 +40,44 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod appearance;
+mod classifier;
+mod confidence;
+mod error;
+mod estimate;
+mod features;
+mod image;
+mod learn;
+mod linalg;
+mod motion;
+mod params;
+mod scale;
+mod snapshot;
+mod state;
+mod step;
+#[expect(clippy::module_inception, reason = "the type that the room is named after")]
+mod tracker;
+mod weights;
+mod workspace;
+
 mod abreast;
-mod angle;
-mod area;
-mod arrival;
-mod background;
-mod bag;
-mod camera;
 mod candidate;
-mod cells;
-mod centering;
-mod coarse;
-mod combination;
-mod comparison;
-mod directions;
-mod discriminant;
 mod distance;
 mod dominant;
-mod downscale;
-mod eigen;
-mod energies;
 mod evaluation;
-mod examples;
-mod exponential;
-mod find;
-mod frame;
-mod gradients;
 mod history;
-mod kernel;
-mod learning;
-mod likelihood;
-mod look;
-mod matrix;
-mod metric;
-mod motion;
-mod pair_sums;
-mod params;
-mod patch;
-#[cfg(target_arch = "x86_64")]
-mod permute;
-mod pictures;
-mod places;
-mod planes;
-mod poses;
-mod posterior;
-mod presets;
 mod products;
-mod pyramid;
-mod ranges;
-mod rect;
-mod rotation;
-mod scale;
-mod scan;
-mod score;
-mod search;
 mod singular;
-mod snapshot;
-mod solitary;
-mod state;
-mod subspace;
-mod sums;
-mod thumbnail;
-mod trust;
-mod turn;
-mod view;
-mod whitening;
-mod windows;
 
+pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
+pub use error::TrackerError;
+pub use estimate::{Estimate, Status};
 pub use evaluation::Evaluation;
-pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE, working_size};
-pub use params::{Features, Params, Search};
-pub use patch::patch;
-pub use presets::Preset;
-pub use ranges::ParamsError;
+pub use features::gray::patch;
+pub use image::frame::{FrameError, GrayFrame, WORKING_SIDE, working_size};
+pub use image::rect::Rect;
+pub use params::presets::Preset;
+pub use params::table::{Features, Params, Search};
+pub use params::validate::ParamsError;
 pub use state::LEAST_BOX_SIDE;
-pub use subspace::{AffineSubspace, RANK_TOLERANCE};
-
-use serde::{Deserialize, Serialize};
-
-use state::State;
-
-/// Whether the tracker believes its own box.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// The box is on the target.
-    Tracking,
-    /// The box may be on the target.
-    Uncertain,
-    /// The target is out of sight; the box is the best guess.
-    Lost,
-}
-
-/// The answer to one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Which frame this answers; the first frame of a session is 0.
-    pub frame: u64,
-    /// Where the target is, in the pixels of the uploaded frame.
-    pub target: Rect,
-    /// The chance, in [0, 1], that the box overlaps the target by half or more.
-    pub score: f32,
-    /// What the score and its history mean.
-    pub status: Status,
-}
-
-/// Why a tracker could not be made, or a frame could not be taken. The state is unchanged.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrackerError {
-    /// A parameter is out of its range.
-    #[error(transparent)]
-    Params(#[from] ParamsError),
-    /// The box is not finite, is too small, or does not touch the frame.
-    #[error("the box {0}")]
-    Target(&'static str),
-    /// The frame's size differs from the size of the session's first frame.
-    #[error("the frame is {got_width} x {got_height}, the session's frames are {width} x {height}")]
-    FrameSize {
-        /// Width of the session's frames, before downscaling.
-        width: u32,
-        /// Height of the session's frames, before downscaling.
-        height: u32,
-        /// Width of the frame that came.
-        got_width: u32,
-        /// Height of the frame that came.
-        got_height: u32,
-    },
-    /// The snapshot is damaged, or of another version.
-    #[error("the snapshot {0}")]
-    Snapshot(&'static str),
-}
-
-/// Follows one object.
-///
-/// An error of any method leaves the tracker as it was.
-#[derive(Debug, Clone)]
-pub struct Tracker {
-    state: State,
-}
-
-impl Tracker {
-    /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
-    ///
-    /// # Errors
-    /// A parameter out of its range; a box that is not finite, has a side below [`LEAST_BOX_SIDE`] pixels (or below
-    /// one pixel of the working image) or above four times the frame's longer side, or lies outside the frame.
-    pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
-        params.validate()?;
-        let source = frame.source_size();
-        state::check_target(source, &target)?;
-        Ok(comparison::with(|room| {
-            let state = State::new(frame, target, params, room);
-            Self { state }
-        }))
-    }
-
-    /// Finds the target in the next frame.
-    ///
-    /// # Errors
-    /// A frame whose uploaded size is not that of the session's first frame.
-    pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
-        state::check_frame(self.state.source, frame)?;
-        Ok(comparison::with(|room| self.state.find(frame, room)))
-    }
-
-    /// The user corrects the box: `frame` counts as the next frame, with the answer given.
-    /// The bag keeps what it knew and gains the new look; history and particles restart at the box.
-    ///
-    /// # Errors
-    /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
-    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
-        state::check_frame(self.state.source, frame)?;
-        state::check_target(self.state.source, &target)?;
-        comparison::with(|room| self.state.retarget(frame, target, room));
-        Ok(self.state.estimate)
-    }
-
-    /// The last answer.
-    pub fn estimate(&self) -> Estimate {
-        self.state.estimate
-    }
-
-    /// The parameters of this tracker.
-    pub fn params(&self) -> &Params {
-        &self.state.params
-    }
-
-    /// Width and height of the session's frames, before downscaling.
-    pub fn source_size(&self) -> (u32, u32) {
-        self.state.source
-    }
-
-    /// The whole state as bytes, versioned.
-    pub fn snapshot(&self) -> Vec<u8> {
-        snapshot::write(&self.state)
-    }
-
-    /// A tracker that goes on from `snapshot`, bit for bit.
-    ///
-    /// # Errors
-    /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
-    pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
-        snapshot::read(snapshot).map(|state| Self { state })
-    }
-}
+pub use tracker::Tracker;

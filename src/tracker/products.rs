@@ -13,10 +13,11 @@
 
 use pulp::Simd;
 
-use super::abreast::{ABREAST, Doubles, Singles};
-use super::history::{self, SharedHistory};
-use super::subspace::{self, AffineSubspace};
-use super::{Params, kernel};
+use crate::tracker::abreast::{ABREAST, Doubles, Singles};
+use crate::tracker::history::{self, SharedHistory};
+use crate::tracker::appearance::subspace::{self, AffineSubspace};
+use crate::tracker::params::table::Params;
+use crate::tracker::linalg::gemm;
 
 /// Between two vectors, in values: rows of 1024 values would all begin at the same place of the first cache.
 const GAP: usize = 16;
@@ -33,7 +34,7 @@ const NO_REST: f64 = 1e-13;
 /// The inner products of what is particular to each candidate with (Q, the sum of V, the bag), and what they are made up
 /// with.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Products {
+pub(crate) struct Products {
     len: usize,
     /// From one vector of `right` to the next.
     stride: usize,
@@ -82,7 +83,7 @@ impl Products {
         self.candidate_vectors
             .resize(self.candidates * self.len, 0.0);
         let tile = MOST_ROWS * self.stride;
-        self.tile_first = kernel::align(&mut self.tile, tile);
+        self.tile_first = gemm::align(&mut self.tile, tile);
         self.tile.resize(self.tile_first + tile, 0.0);
         let room = [0.0; ABREAST];
         self.coordinates.clear();
@@ -115,7 +116,7 @@ impl Products {
         if count != self.entries {
             self.entries = count;
             let values = self.columns() * stride;
-            self.right_first = kernel::align(&mut self.right, values);
+            self.right_first = gemm::align(&mut self.right, values);
             self.right.resize(self.right_first + values, 0.0);
             self.out.clear();
             self.out
@@ -162,7 +163,7 @@ impl Products {
         let directions = &right[..self.slots * self.stride];
         let columns = self.entries * self.basis_dim;
         let out = &mut self.of_directions;
-        kernel::multiply(simd, directions, &right[bases..], self.stride, columns, out);
+        gemm::multiply(simd, directions, &right[bases..], self.stride, columns, out);
     }
 
     #[inline(always)]
@@ -190,7 +191,7 @@ impl Products {
                 for (q, row) in rows_b.iter_mut().enumerate() {
                     *row = &right[(j + q).min(columns - 1) * stride..][..stride];
                 }
-                let products = kernel::tile(simd, rows_a, rows_b);
+                let products = gemm::tile(simd, rows_a, rows_b);
                 for q in 0..B.min(columns - j) {
                     let out = &mut out[(j + q) * lanes + first..][..count];
                     for (out, products) in out.iter_mut().zip(&products) {
@@ -295,7 +296,7 @@ impl Products {
 /// The products of one group of candidates. What is called the rest is d but for what is in the span of Q; the products
 /// of d serve for it together with those of Qᵀd, unless it was found by itself and these are zero.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Group<'a> {
+pub(crate) struct Group<'a> {
     products: &'a Products,
     index: usize,
 }

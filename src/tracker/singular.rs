@@ -6,7 +6,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use super::abreast::{ABREAST, Singles, inverse_root};
+use crate::tracker::abreast::{ABREAST, Singles, inverse_root};
 
 /// Three sweeps are usual; the bound only guards against a NaN.
 const MAX_SWEEPS: usize = 10;
@@ -31,11 +31,11 @@ const ARCSIN_SQUARED: [f32; 9] = [
 ];
 
 /// N columns of N values, of each of [`ABREAST`] matrices.
-pub(super) type Columns<const N: usize> = [[Singles; N]; N];
+pub(crate) type Columns<const N: usize> = [[Singles; N]; N];
 
 /// Σ θ² over the `dims` largest singular values cos θ of each matrix.
 #[inline(always)]
-pub(super) fn squared_angles<const N: usize>(columns: &mut Columns<N>, dims: &Singles) -> Singles {
+pub(crate) fn squared_angles<const N: usize>(columns: &mut Columns<N>, dims: &Singles) -> Singles {
     for _ in 0..MAX_SWEEPS {
         let mut rotated = false;
         for p in 0..N {

@@ -8,11 +8,14 @@
 //! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
 //! postcard's encoding.
 
-use super::bag::Bag;
-use super::frame::working_size;
-use super::motion::Particle;
-use super::state::{self, State};
-use super::{Params, TrackerError, comparison, turn};
+use crate::tracker::appearance::bag::Bag;
+use crate::tracker::image::frame::working_size;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::state::{self, State};
+use crate::tracker::params::table::Params;
+use crate::tracker::error::TrackerError;
+use crate::tracker::workspace;
+use crate::tracker::motion::orientation;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
@@ -27,7 +30,7 @@ const ORTHONORMAL: f64 = 1e-3;
 const FRAMES: u64 = 1 << 53;
 
 /// The snapshot of `state`.
-pub(super) fn write(state: &State) -> Vec<u8> {
+pub(crate) fn write(state: &State) -> Vec<u8> {
     let body = postcard::to_stdvec(state).expect("the state has no type that postcard refuses");
     let mut bytes = Vec::with_capacity(HEADER + body.len());
     bytes.extend_from_slice(MAGIC);
@@ -38,7 +41,7 @@ pub(super) fn write(state: &State) -> Vec<u8> {
 }
 
 /// The state in `bytes`, fully checked.
-pub(super) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
+pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
     let damaged = TrackerError::Snapshot("is damaged");
     let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
         return Err(TrackerError::Snapshot("is too short"));
@@ -67,7 +70,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
 
 /// Makes what a snapshot does not carry.
 fn restore(state: &mut State) {
-    comparison::with(|room| {
+    workspace::with(|room| {
         let learning = &mut room.learning;
         state
             .background
@@ -164,7 +167,7 @@ fn check_mends(state: &State) -> bool {
         && state
             .last_seen
             .is_sound((width, height), params.arrival_weight > 0.0)
-        && turn::is_sound(state.turn, params)
+        && orientation::is_sound(state.turn, params)
         && (0.0..=1e6).contains(&state.trust.usual)
 }
 
@@ -205,7 +208,7 @@ fn are_features(values: &[f32]) -> bool {
 
 fn is_orthonormal(columns: &[&[f32]]) -> bool {
     let count = columns.len();
-    let gram = super::subspace::gram(columns);
+    let gram = crate::tracker::appearance::subspace::gram(columns);
     gram.iter().enumerate().all(|(index, &product)| {
         let expected = if index / count == index % count {
             1.0

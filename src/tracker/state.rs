@@ -4,17 +4,21 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::arrival::{Arrival, LastSeen};
-use super::background::Background;
-use super::bag::Bag;
-use super::camera::Camera;
-use super::discriminant::Discriminant;
-use super::frame::working_size;
-use super::motion::{Particle, Reach};
-use super::scale::ScaleFilter;
-use super::score::{Evidence, Usual};
-use super::trust::{self, Trust};
-use super::{Estimate, GrayFrame, Params, Rect, TrackerError};
+use crate::tracker::motion::change_test::{Arrival, LastSeen};
+use crate::tracker::appearance::background::Background;
+use crate::tracker::appearance::bag::Bag;
+use crate::tracker::motion::global_motion::Camera;
+use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::image::frame::working_size;
+use crate::tracker::motion::particles::{Particle, Reach};
+use crate::tracker::scale::dsst::ScaleFilter;
+use crate::tracker::confidence::score::{Evidence, Usual};
+use crate::tracker::confidence::update_gate::{self, Trust};
+use crate::tracker::estimate::Estimate;
+use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::params::table::Params;
+use crate::tracker::image::rect::Rect;
+use crate::tracker::error::TrackerError;
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
@@ -27,7 +31,7 @@ const FOUND_MARGIN: f64 = 0.2;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct State {
+pub(crate) struct State {
     pub params: Params,
     pub source: (u32, u32),
     pub reach: Reach,
@@ -126,7 +130,7 @@ impl State {
     /// Whether frame `number`, whose answer has `score`, is believed enough to be learned from. Without a discriminant a
     /// score is no chance.
     pub fn believes(&self, score: f32, number: u64) -> bool {
-        !self.discriminant.is_on() || trust::believes(f64::from(score), number, &self.params)
+        !self.discriminant.is_on() || update_gate::believes(f64::from(score), number, &self.params)
     }
 
     /// The target is at the answer in the frame that `arrival` has taken.
@@ -150,7 +154,7 @@ impl State {
 /// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`LEAST_BOX_SIDE`] on each
 /// side and at least one pixel of the working image, at most four times as large as the frame, and on the frame with
 /// at least one pixel of its length and height.
-pub(super) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), TrackerError> {
+pub(crate) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), TrackerError> {
     let values = [target.x, target.y, target.width, target.height];
     if !values.iter().all(|value| value.is_finite()) {
         return Err(TrackerError::Target("is not finite"));
@@ -186,12 +190,12 @@ pub(super) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), Trac
 }
 
 /// The longest side of a box, in pixels of uploaded frames of size `source`: four times the frame's longer side.
-pub(super) fn greatest_box_side(source: (u32, u32)) -> f64 {
+pub(crate) fn greatest_box_side(source: (u32, u32)) -> f64 {
     4.0 * f64::from(source.0.max(source.1)).max(LEAST_BOX_SIDE)
 }
 
 /// Checks that `frame` has the size of the session's frames.
-pub(super) fn check_frame(source: (u32, u32), frame: &GrayFrame) -> Result<(), TrackerError> {
+pub(crate) fn check_frame(source: (u32, u32), frame: &GrayFrame) -> Result<(), TrackerError> {
     let (got_width, got_height) = frame.source_size();
     if (got_width, got_height) == source {
         return Ok(());

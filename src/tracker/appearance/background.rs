@@ -1,0 +1,256 @@
+//! The background: what the surroundings of the target look like, and the metric that they make.
+//!
+//! Compared as they are, two patches are alike where both show any edges at all. So vectors of areas beside the target
+//! (and of areas that miss it by a third) give a mean and a covariance C, and vectors are compared by
+//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean): directions in which the background varies count less, which is the metric of
+//! a linear discriminant analysis. Where candidates stand alone, inner products are enough ([`metric`](crate::tracker::appearance::mahalanobis));
+//! otherwise vectors are whitened ([`whitening`](crate::tracker::appearance::whitening)).
+//!
+//! Without samples the metric is the plain one and the mean is zero.
+
+use std::collections::VecDeque;
+
+use pulp::{Arch, Simd, WithSimd};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::tracker::params::table::Params;
+use crate::tracker::features::quantized::Look;
+use crate::tracker::appearance::mahalanobis::{self, Metric};
+use crate::tracker::motion::particles::{Particle, Reach};
+use crate::tracker::appearance::whitening::Whitening;
+
+/// Areas are off by more than this share of the box along x or y: nearer ones show mostly the target.
+const INNER: f64 = 0.3;
+/// Areas are off by at most this multiple of the box along x and y.
+const OUTER: f64 = 1.5;
+/// The box counts as at least this long on a side, in working pixels, so that areas beside a tiny target differ.
+const LEAST_SIDE: f64 = 16.0;
+/// The share of the samples that a refresh replaces.
+const RENEWED: f64 = 0.2;
+
+/// Vectors of areas beside the target, and what follows from them.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Background {
+    /// Oldest first.
+    samples: VecDeque<Look>,
+    #[serde(skip)]
+    mean: Vec<f32>,
+    /// Where candidates stand alone.
+    #[serde(skip)]
+    metric: Metric,
+    /// Where they do not.
+    #[serde(skip)]
+    whitening: Whitening,
+}
+
+/// Room for learning from samples.
+#[derive(Debug, Default)]
+pub(crate) struct Room {
+    vectors: Vec<f32>,
+    metric: mahalanobis::Room,
+}
+
+/// [`Background::learn`], to be compiled for the instructions that this machine has.
+struct Learn<'a> {
+    background: &'a mut Background,
+    params: &'a Params,
+    room: &'a mut Room,
+}
+
+impl WithSimd for Learn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.background.learn_all(self.params, self.room);
+    }
+}
+
+impl Background {
+    /// How many new samples frame `number` brings: all in the first frame, some in every so many of the others.
+    pub fn wanted(number: u64, params: &Params) -> usize {
+        let all = params.background_samples as usize;
+        if number == 0 {
+            all
+        } else if number.is_multiple_of(u64::from(params.background_every)) {
+            (all as f64 * RENEWED).ceil() as usize
+        } else {
+            0
+        }
+    }
+
+    /// Takes new samples, vectors of length D one after the other; the oldest leave.
+    pub fn renew(&mut self, vectors: &[f32], params: &Params, room: &mut Room) {
+        for vector in vectors.chunks_exact(params.feature_len()) {
+            let full = self.samples.len() >= params.background_samples as usize;
+            let oldest = if full { self.samples.pop_front() } else { None };
+            let mut look = oldest.unwrap_or_default();
+            look.keep(vector);
+            self.samples.push_back(look);
+        }
+        self.learn(params, room);
+    }
+
+    /// Learns what follows from the samples.
+    pub fn learn(&mut self, params: &Params, room: &mut Room) {
+        Arch::new().dispatch(Learn {
+            background: self,
+            params,
+            room,
+        });
+    }
+
+    #[inline(always)]
+    fn learn_all(&mut self, params: &Params, room: &mut Room) {
+        let len = params.feature_len();
+        let count = self.samples.len();
+        self.mean.clear();
+        if count < 2 {
+            return;
+        }
+        self.mean.resize(len, 0.0);
+        for look in &self.samples {
+            look.add_to(&mut self.mean, 1.0 / count as f32);
+        }
+        self.samples_into(&mut room.vectors);
+        let ridge = params.background_ridge;
+        if params.candidate_alone {
+            self.metric
+                .become_of(&room.vectors, len, ridge, &mut room.metric);
+        } else {
+            self.whitening = Whitening::of(&self.mean, &room.vectors, ridge);
+        }
+    }
+
+    /// Makes `out` the samples, with the mean taken off: none where there is no metric.
+    #[inline(always)]
+    pub fn samples_into(&self, out: &mut Vec<f32>) {
+        out.resize(self.samples_len(), 0.0);
+        self.write_samples(out);
+    }
+
+    /// How many values the samples have: none where there is no metric.
+    #[inline(always)]
+    pub fn samples_len(&self) -> usize {
+        if self.mean.is_empty() {
+            0
+        } else {
+            self.samples.len() * self.mean.len()
+        }
+    }
+
+    /// Writes the samples, with the mean taken off, to `out`, which is as long as they are.
+    #[inline(always)]
+    pub fn write_samples(&self, out: &mut [f32]) {
+        if self.mean.is_empty() {
+            return;
+        }
+        let vectors = out.chunks_exact_mut(self.mean.len());
+        for (look, vector) in self.samples.iter().zip(vectors) {
+            look.write_without(&self.mean, vector);
+        }
+    }
+
+    /// The mean of the samples: empty where there is no metric.
+    pub fn mean(&self) -> &[f32] {
+        &self.mean
+    }
+
+    /// The metric, where candidates stand alone.
+    pub fn metric(&self) -> &Metric {
+        &self.metric
+    }
+
+    /// The whitening, where candidates do not stand alone.
+    pub fn whitening(&self) -> &Whitening {
+        &self.whitening
+    }
+
+    /// Whether the samples may be those of a tracker with `params`.
+    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
+        self.samples.len() == params.background_samples as usize
+            && self
+                .samples
+                .iter()
+                .all(|look| look.is_sound(params.feature_len(), greatest))
+    }
+}
+
+/// Draws `count` areas beside the target into `out`, as far as they can be had inside the frame.
+pub(crate) fn areas(
+    target: &Particle,
+    reach: &Reach,
+    count: usize,
+    generator: &mut ChaCha8Rng,
+    out: &mut Vec<Particle>,
+) {
+    let width = (reach.box_width * target.scale).max(LEAST_SIDE);
+    let height = (reach.box_height * target.scale).max(LEAST_SIDE);
+    let draw = |generator: &mut ChaCha8Rng| loop {
+        let across = generator.random_range(-OUTER..OUTER);
+        let down = generator.random_range(-OUTER..OUTER);
+        if across.abs() > INNER || down.abs() > INNER {
+            let (x, y) = (target.x + across * width, target.y + down * height);
+            return Particle { x, y, ..*target };
+        }
+    };
+    let inside = |area: &Particle| {
+        (0.0..=reach.frame_width).contains(&area.x) && (0.0..=reach.frame_height).contains(&area.y)
+    };
+    // A target that fills the frame has nothing beside it that is inside.
+    let tries = 20;
+    let area = |_| {
+        let mut area = draw(generator);
+        for _ in 0..tries {
+            if inside(&area) {
+                break;
+            }
+            area = draw(generator);
+        }
+        area
+    };
+    out.clear();
+    out.extend((0..count).map(area));
+}
+
+/// How far [`areas`] are from the target's centre at most, in working pixels.
+pub(crate) fn furthest(target: &Particle, reach: &Reach) -> f64 {
+    let longer = reach.box_width.max(reach.box_height) * target.scale;
+    OUTER * longer.max(LEAST_SIDE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::params::presets::Preset;
+
+    #[test]
+    fn new_samples_replace_the_oldest_and_the_mean_is_theirs() {
+        let params = Params {
+            patch_width: 4,
+            patch_height: 4,
+            features: crate::tracker::params::table::Features::Gray,
+            background_samples: 3,
+            ..Preset::Robust.params()
+        };
+        let (mut background, mut room) = (Background::default(), Room::default());
+        for (first, last, mean) in [(0, 3, 1.0), (3, 4, 2.0), (4, 6, 4.0)] {
+            let vectors: Vec<f32> = (first..last).flat_map(|i| [i as f32; 16]).collect();
+            background.renew(&vectors, &params, &mut room);
+            assert_eq!(background.samples.len(), 3);
+            assert!(
+                background
+                    .mean()
+                    .iter()
+                    .all(|value| (value - mean).abs() < 1e-5)
+            );
+            let mut samples = Vec::new();
+            background.samples_into(&mut samples);
+            for (sample, off) in samples.chunks(16).zip([-1.0, 0.0, 1.0]) {
+                assert!(sample.iter().all(|value| (value - off).abs() < 1e-5));
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
+
+use pulp::{Arch, Simd, WithSimd};
+use serde::{Deserialize, Serialize};
+
+use crate::tracker::linalg::jacobi::Spectrum;
+
+/// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
+/// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
+pub const RANK_TOLERANCE: f64 = 1e-5;
+
+/// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct AffineSubspace {
+    pub(crate) mean: Vec<f32>,
+    /// The columns of U, one after the other.
+    pub(crate) basis: Vec<f32>,
+}
+
+/// [`AffineSubspace::become_of`], to be compiled for the instructions that this machine has.
+struct BecomeOf<'a> {
+    subspace: &'a mut AffineSubspace,
+    vectors: &'a [&'a [f32]],
+    basis_dim: usize,
+    spectrum: &'a mut Spectrum,
+}
+
+impl WithSimd for BecomeOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.subspace
+            .make_of(self.vectors, self.basis_dim, self.spectrum);
+    }
+}
+
+impl AffineSubspace {
+    /// The subspace of feature vectors: μ their mean, U the (up to) `basis_dim` dominant left singular vectors of
+    /// the matrix V of which they are the columns (equation 2), uncentred. U has fewer columns where V has fewer
+    /// directions with a singular value above [`RANK_TOLERANCE`] of the largest; none for all-zero vectors.
+    ///
+    /// # Panics
+    /// If there are no vectors, or their lengths differ.
+    pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
+        let mut subspace = Self::default();
+        subspace.become_of(vectors, basis_dim, &mut Spectrum::default());
+        subspace
+    }
+
+    /// Becomes [`of`](Self::of) these vectors, in the room that it has.
+    pub(crate) fn become_of(
+        &mut self,
+        vectors: &[&[f32]],
+        basis_dim: usize,
+        spectrum: &mut Spectrum,
+    ) {
+        Arch::new().dispatch(BecomeOf {
+            subspace: self,
+            vectors,
+            basis_dim,
+            spectrum,
+        });
+    }
+
+    #[inline(always)]
+    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
+        let len = vectors[0].len();
+        assert!(
+            vectors.iter().all(|vector| vector.len() == len),
+            "feature vectors of one length"
+        );
+        let share = 1.0 / vectors.len() as f64;
+        self.mean.resize(len, 0.0);
+        combine(vectors, |_| share, &mut self.mean);
+
+        // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
+        spectrum.solve(vectors.len(), |i, j| dot(vectors[i], vectors[j]));
+        self.basis.clear();
+        self.basis.reserve_exact(len * basis_dim);
+        let dim = dominant(spectrum.values(), basis_dim);
+        self.basis.resize(len * dim, 0.0);
+        let columns = self.basis.chunks_exact_mut(len);
+        for ((place, value), column) in spectrum.values().enumerate().zip(columns) {
+            let weight = |index| spectrum.weight(place, index) / value.sqrt();
+            combine(vectors, weight, column);
+        }
+    }
+
+    /// The origin μ, of length D.
+    pub fn mean(&self) -> &[f32] {
+        &self.mean
+    }
+
+    /// The columns of U, each of length D.
+    pub fn basis(&self) -> impl ExactSizeIterator<Item = &[f32]> {
+        self.basis.chunks_exact(self.mean.len().max(1))
+    }
+
+    /// The number of columns of U: n, or fewer.
+    pub fn dim(&self) -> usize {
+        self.basis.len() / self.mean.len().max(1)
+    }
+}
+
+/// How many of the eigenvalues of a Gram matrix, largest first, count as directions: at most `limit`.
+#[inline(always)]
+pub(crate) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> usize {
+    let mut least = 0.0;
+    eigenvalues
+        .take(limit)
+        .enumerate()
+        .take_while(|&(index, value)| {
+            if index == 0 {
+                least = value * RANK_TOLERANCE * RANK_TOLERANCE;
+            }
+            value > 0.0 && value > least
+        })
+        .count()
+}
+
+/// VᵀV of vectors, in double precision and row order.
+#[inline(always)]
+pub(crate) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
+    let count = vectors.len();
+    let mut gram = vec![0.0; count * count];
+    for i in 0..count {
+        for j in i..count {
+            let product = dot(vectors[i].as_ref(), vectors[j].as_ref());
+            gram[i * count + j] = product;
+            gram[j * count + i] = product;
+        }
+    }
+    gram
+}
+
+/// The inner product, summed in double precision in eight parts so that the loop vectorises.
+#[inline(always)]
+pub(crate) fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let mut parts = [0.0_f64; 8];
+    let (a_chunks, a_rest) = a.as_chunks::<8>();
+    let (b_chunks, b_rest) = b.as_chunks::<8>();
+    for (x, y) in a_chunks.iter().zip(b_chunks) {
+        for lane in 0..8 {
+            parts[lane] += f64::from(x[lane]) * f64::from(y[lane]);
+        }
+    }
+    let rest = a_rest.iter().zip(b_rest);
+    parts.iter().sum::<f64>()
+        + rest
+            .map(|(&x, &y)| f64::from(x) * f64::from(y))
+            .sum::<f64>()
+}
+
+/// The sum of vectors, each with its weight, into `out`; summed in double precision.
+#[inline(always)]
+pub(crate) fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
+    const BLOCK: usize = 64;
+    for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+        let mut sums = [0.0; BLOCK];
+        let sums = &mut sums[..out.len()];
+        for (index, vector) in vectors.iter().enumerate() {
+            accumulate(sums, &vector[block * BLOCK..][..out.len()], weight(index));
+        }
+        for (out, &sum) in out.iter_mut().zip(sums.iter()) {
+            *out = sum as f32;
+        }
+    }
+}
+
+/// `sum += weight * vector`.
+#[inline(always)]
+pub(crate) fn accumulate(sum: &mut [f64], vector: &[f32], weight: f64) {
+    for (sum, &value) in sum.iter_mut().zip(vector) {
+        *sum += weight * f64::from(value);
+    }
+}

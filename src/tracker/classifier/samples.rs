@@ -1,0 +1,213 @@
+//! What the discriminant sees of a frame's areas.
+//!
+//! An example is the unit vector u = (x - origin) / ‖x - origin‖ of a feature vector x. It is not written out: with the
+//! inner products of x with the weights and with the origin, its length and its score follow, and sums over examples
+//! are sums over vectors. The vectors may have a mean taken off, if the origin has it taken off as well.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::tracker::workspace;
+use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::vector_ops;
+
+/// What is left of a squared length below this share of it is rounding: the vector is the origin.
+const LEAST_LEFT: f32 = 1e-6;
+/// Vectors of a sum that are worked on together, while they are in the cache.
+const GROUP: usize = 8;
+
+/// The origin, and of each example its scale and its score.
+#[derive(Debug, Default)]
+pub(crate) struct Examples {
+    /// The weights and the origin, as the vectors see them.
+    weights: Vec<f32>,
+    origin: Vec<f32>,
+    /// One over the length of x - origin; 0 where there is none.
+    scales: Vec<f32>,
+    scores: Vec<f32>,
+    room: Vec<f32>,
+}
+
+impl Examples {
+    /// Forgets the last examples and takes `discriminant`, for vectors that have `mean` (or, where that is empty,
+    /// nothing) taken off; with room for `most` examples.
+    pub fn begin(&mut self, discriminant: &Discriminant, mean: &[f32], most: usize) {
+        self.weights.clear();
+        self.weights.extend_from_slice(discriminant.weights());
+        self.origin.clear();
+        self.origin.extend_from_slice(discriminant.origin());
+        vector_ops::add(&mut self.origin, -1.0, mean);
+        workspace::empty(&mut self.scales, most);
+        workspace::empty(&mut self.scores, most);
+    }
+
+    /// The vectors whose products are asked for: the weights and the origin.
+    pub fn asks(&self) -> [&[f32]; 2] {
+        [&self.weights, &self.origin]
+    }
+
+    /// Takes further examples: their products with the weights and with the origin, and the squares of their vectors.
+    pub fn examine(&mut self, [of_weights, of_origin]: [&[f32]; 2], squares: &[f32]) {
+        let origin_score = vector_ops::dot(&self.origin, &self.weights);
+        let origin_square = vector_ops::dot(&self.origin, &self.origin);
+        let products = of_weights.iter().zip(of_origin);
+        for ((of_weights, of_origin), square) in products.zip(squares) {
+            let left = square + origin_square - 2.0 * of_origin;
+            let is_left = left > (square + origin_square) * LEAST_LEFT;
+            let scale = if is_left { 1.0 / left.sqrt() } else { 0.0 };
+            self.scales.push(scale);
+            self.scores.push(scale * (of_weights - origin_score));
+        }
+    }
+
+    /// As [`examine`](Self::examine), with the products made here.
+    pub fn examine_alone(&mut self, vectors: &[f32]) {
+        let len = self.weights.len();
+        let count = vectors.len() / len;
+        let mut room = std::mem::take(&mut self.room);
+        room.clear();
+        room.resize(3 * count, 0.0);
+        let (products, squares) = room.split_at_mut(2 * count);
+        let (of_weights, of_origin) = products.split_at_mut(count);
+        gemm::inner_products(&self.weights, vectors, len, count, of_weights);
+        gemm::inner_products(&self.origin, vectors, len, count, of_origin);
+        for (square, vector) in squares.iter_mut().zip(vectors.chunks_exact(len)) {
+            *square = vector_ops::dot(vector, vector);
+        }
+        self.examine([of_weights, of_origin], squares);
+        self.room = room;
+    }
+
+    /// Forgets all examples but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        self.scales.truncate(count);
+        self.scores.truncate(count);
+    }
+
+    /// The scores: about 1 on the target and 0 beside it, but not bounded.
+    pub fn scores(&self) -> &[f32] {
+        &self.scores
+    }
+
+    /// Adds Σ cᵢ uᵢ to `sum`.
+    pub fn add_sum(&self, vectors: &[f32], coefficients: &[f32], sum: &mut [f32]) {
+        Arch::new().dispatch(Sum {
+            examples: self,
+            vectors,
+            coefficients: Coefficients::Given(coefficients),
+            sum,
+        });
+    }
+
+    /// Σ (uᵢ · d)².
+    pub fn energy(&self, vectors: &[f32], direction: &[f32]) -> f32 {
+        Arch::new().dispatch(Energy {
+            examples: self,
+            vectors,
+            direction,
+        })
+    }
+
+    /// Adds Σ (uᵢ · d) uᵢ to `sum`.
+    pub fn add_products(&self, vectors: &[f32], direction: &[f32], sum: &mut [f32]) {
+        Arch::new().dispatch(Sum {
+            examples: self,
+            vectors,
+            coefficients: Coefficients::ProductsWith(direction),
+            sum,
+        });
+    }
+}
+
+/// [`Examples::energy`], to be compiled for the instructions that this machine has.
+struct Energy<'a> {
+    examples: &'a Examples,
+    vectors: &'a [f32],
+    direction: &'a [f32],
+}
+
+impl WithSimd for Energy<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f32 {
+        let (len, scales) = (self.direction.len(), &self.examples.scales);
+        let of_origin = vector_ops::dot(&self.examples.origin, self.direction);
+        let mut energy = 0.0;
+        for first in (0..scales.len()).step_by(GROUP) {
+            let mut group = [self.vectors; GROUP];
+            for (i, vector) in group.iter_mut().enumerate() {
+                // A group at the end has the last vector more than once, which is not counted.
+                *vector = &self.vectors[(first + i).min(scales.len() - 1) * len..][..len];
+            }
+            let products = gemm::tile(simd, group, [self.direction]);
+            for ([product], scale) in products.iter().zip(&scales[first..]) {
+                let product = scale * (product - of_origin);
+                energy += product * product;
+            }
+        }
+        energy
+    }
+}
+
+enum Coefficients<'a> {
+    Given(&'a [f32]),
+    ProductsWith(&'a [f32]),
+}
+
+/// A sum over all examples, to be compiled for the instructions that this machine has.
+struct Sum<'a> {
+    examples: &'a Examples,
+    vectors: &'a [f32],
+    coefficients: Coefficients<'a>,
+    sum: &'a mut [f32],
+}
+
+impl WithSimd for Sum<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            examples,
+            vectors,
+            coefficients,
+            sum,
+        } = self;
+        let len = sum.len();
+        let of_origin = match coefficients {
+            Coefficients::Given(_) => 0.0,
+            Coefficients::ProductsWith(direction) => vector_ops::dot(&examples.origin, direction),
+        };
+        let count = examples.scales.len();
+        let mut total = 0.0;
+        for first in (0..count).step_by(GROUP) {
+            let mut group = [vectors; GROUP];
+            for (i, vector) in group.iter_mut().enumerate() {
+                // A group at the end has the last vector more than once, with the factor 0.
+                *vector = &vectors[(first + i).min(count - 1) * len..][..len];
+            }
+            let mut factors = [0.0; GROUP];
+            let counted = GROUP.min(count - first);
+            match coefficients {
+                Coefficients::Given(given) => {
+                    factors[..counted].copy_from_slice(&given[first..first + counted]);
+                }
+                Coefficients::ProductsWith(direction) => {
+                    let products = gemm::tile(simd, group, [direction]);
+                    let scales = &examples.scales[first..];
+                    for ((factor, [product]), scale) in factors.iter_mut().zip(products).zip(scales)
+                    {
+                        *factor = scale * (product - of_origin);
+                    }
+                }
+            }
+            for (factor, scale) in factors.iter_mut().zip(&examples.scales[first..]) {
+                *factor *= scale;
+                total += *factor;
+            }
+            vector_ops::add_all(simd, sum, factors, group);
+        }
+        vector_ops::add(sum, -total, &examples.origin);
+    }
+}

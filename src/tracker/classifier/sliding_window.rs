@@ -1,0 +1,330 @@
+//! The discriminant's scores of all windows of a grid of cells.
+//!
+//! A window's directions are as they are on the grid, so their products with the weights are a correlation. Its gray
+//! values have its own mean taken off and are divided by its own deviation; both follow from sums, as does the length
+//! that the discriminant divides by ([`examples`](crate::tracker::classifier::samples)).
+//!
+//! Windows side by side are worked on together, one a lane: so each channel of the grid is brought into a line of its own
+//! first ([`planes`](crate::tracker::classifier::channel_planes)).
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::tracker::features::hog_cells::LEAST_CONTRAST;
+use crate::tracker::features::hog::CHANNELS;
+use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
+use crate::tracker::classifier::channel_planes::{Planes, load};
+use crate::tracker::features::extractor::Grid;
+use crate::tracker::params::table::Params;
+use crate::tracker::linalg::vector_ops;
+
+/// Rows of windows whose sums are in registers at a time.
+const ROWS: usize = 4;
+/// What is left of a squared length below this share of it is rounding, as for examples.
+const LEAST_LEFT: f32 = 1e-6;
+
+/// Room for the scores of a grid.
+#[derive(Debug, Default)]
+pub(crate) struct Windows {
+    planes: Planes,
+}
+
+/// [`Windows::scores`], to be compiled for the instructions that this machine has.
+struct Scores<'a> {
+    windows: &'a mut Windows,
+    grid: &'a Grid,
+    discriminant: &'a Discriminant,
+    params: &'a Params,
+    cell_pixels: f32,
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Scores<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let size = (
+            self.params.patch_width as usize,
+            self.params.patch_height as usize,
+        );
+        let planes = &mut self.windows.planes;
+        planes.take(self.grid, size);
+        let scorer = Scorer::new(self.discriminant, self.params, self.cell_pixels);
+        let columns = self.grid.columns + 1 - size.0;
+        let last = self.out.len() / columns - 1;
+        for (block, rows) in self.out.chunks_mut(ROWS * columns).enumerate() {
+            // A block at the end has the last row more than once.
+            let mut places = [last; ROWS];
+            for (row, place) in places.iter_mut().enumerate() {
+                *place = last.min(block * ROWS + row);
+            }
+            for first in (0..columns).step_by(S::F32_LANES) {
+                let products = correlate(simd, planes, (first, places), size.0, self.discriminant);
+                let rows = rows.chunks_mut(columns).zip(places).zip(products);
+                for ((row, j), products) in rows {
+                    let boxes = planes.boxes(simd, (first, j), size.1);
+                    let mut scores = Lanes::ZERO;
+                    scores.load_mut::<S>()[0] = scorer.score(simd, products, boxes);
+                    for (out, score) in row[first..].iter_mut().zip(&scores.0[..S::F32_LANES]) {
+                        *out = *score;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Windows {
+    /// Writes the score of each window of `grid`, row by row, to `out`; `cell_pixels` is the area of a cell in working
+    /// pixels.
+    pub fn scores(
+        &mut self,
+        grid: &Grid,
+        discriminant: &Discriminant,
+        params: &Params,
+        cell_pixels: f32,
+        out: &mut [f32],
+    ) {
+        Arch::new().dispatch(Scores {
+            windows: self,
+            grid,
+            discriminant,
+            params,
+            cell_pixels,
+            out,
+        });
+    }
+}
+
+/// The products of windows with the weights and with the origin, one window a lane.
+#[derive(Clone, Copy)]
+struct Products<S: Simd> {
+    /// Of the directions.
+    directions: [S::f32s; 2],
+    /// Of the gray values as they are on the grid.
+    grays: [S::f32s; 2],
+}
+
+/// The products of the windows from column `first` on in each of `rows`. Of windows that are not on the grid they mean
+/// nothing.
+#[inline(always)]
+fn correlate<S: Simd>(
+    simd: S,
+    planes: &Planes,
+    (first, rows): (usize, [usize; ROWS]),
+    width: usize,
+    discriminant: &Discriminant,
+) -> [Products<S>; ROWS] {
+    let row_len = width * CHANNELS;
+    let weights = discriminant.weights().chunks_exact(row_len);
+    let origin = discriminant.origin().chunks_exact(row_len);
+    let mut directions = [[simd.splat_f32s(0.0); 2]; ROWS];
+    for (r, of) in weights.clone().zip(origin.clone()).enumerate() {
+        for channel in 0..DIRECTIONS {
+            let mut lines = [&[][..]; ROWS];
+            for (line, row) in lines.iter_mut().zip(rows) {
+                *line = planes.line((first, row + r), channel);
+            }
+            add_products(simd, lines, of, channel, &mut directions);
+        }
+    }
+    let mut grays = [[simd.splat_f32s(0.0); 2]; ROWS];
+    for (r, of) in weights.zip(origin).enumerate() {
+        let mut lines = [&[][..]; ROWS];
+        for (line, row) in lines.iter_mut().zip(rows) {
+            *line = planes.line((first, row + r), GRAY);
+        }
+        add_products(simd, lines, of, GRAY, &mut grays);
+    }
+    let mut products = [Products {
+        directions: directions[0],
+        grays: grays[0],
+    }; ROWS];
+    for (products, (directions, grays)) in products.iter_mut().zip(directions.iter().zip(&grays)) {
+        (products.directions, products.grays) = (*directions, *grays);
+    }
+    products
+}
+
+/// Adds the products of a channel of a row of cells, for windows from the beginning of each of `lines` on.
+#[inline(always)]
+fn add_products<S: Simd>(
+    simd: S,
+    lines: [&[f32]; ROWS],
+    (weights, origin): (&[f32], &[f32]),
+    channel: usize,
+    sums: &mut [[S::f32s; 2]; ROWS],
+) {
+    let weights = weights.as_chunks::<CHANNELS>().0;
+    let origin = origin.as_chunks::<CHANNELS>().0;
+    for (c, (weights, origin)) in weights.iter().zip(origin).enumerate() {
+        let weight = simd.splat_f32s(weights[channel]);
+        let origin = simd.splat_f32s(origin[channel]);
+        for row in 0..ROWS {
+            let values = load::<S>(&lines[row][c..]);
+            sums[row][0] = simd.mul_add_e_f32s(values, weight, sums[row][0]);
+            sums[row][1] = simd.mul_add_e_f32s(values, origin, sums[row][1]);
+        }
+    }
+}
+
+/// What scores are made with, beside the sums over windows.
+struct Scorer {
+    /// The sums of the gray channel of the weights and of the origin.
+    grays: [f32; 2],
+    /// w · origin and ‖origin‖².
+    origin_score: f32,
+    origin_square: f32,
+    /// Cells of a window.
+    count: f32,
+    gray_weight: f32,
+    least_deviation: f32,
+}
+
+impl Scorer {
+    #[inline(always)]
+    fn new(discriminant: &Discriminant, params: &Params, cell_pixels: f32) -> Self {
+        let (weights, origin) = (discriminant.weights(), discriminant.origin());
+        let grays = |vector: &[f32]| -> f32 {
+            let cells = vector.as_chunks::<CHANNELS>().0.iter();
+            cells.map(|cell| cell[GRAY]).sum()
+        };
+        Self {
+            grays: [grays(weights), grays(origin)],
+            origin_score: vector_ops::dot(weights, origin),
+            origin_square: vector_ops::dot(origin, origin),
+            count: (weights.len() / CHANNELS) as f32,
+            gray_weight: params.gray_weight as f32,
+            least_deviation: LEAST_CONTRAST * cell_pixels,
+        }
+    }
+
+    /// The scores of windows, from their products and their sums of energies, gray values and squares of these.
+    #[inline(always)]
+    fn score<S: Simd>(
+        &self,
+        simd: S,
+        products: Products<S>,
+        [energy, gray, square]: [S::f32s; 3],
+    ) -> S::f32s {
+        let zero = simd.splat_f32s(0.0);
+        let (count, share) = (
+            simd.splat_f32s(self.count),
+            simd.splat_f32s(1.0 / self.count),
+        );
+        // The gray values of an area have its own mean and deviation.
+        let mean = simd.mul_f32s(gray, share);
+        let variance = simd.sub_f32s(simd.mul_f32s(square, share), simd.mul_f32s(mean, mean));
+        let variance = simd.max_f32s(variance, zero);
+        let least_deviation = simd.splat_f32s(self.least_deviation);
+        let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
+        let scale = simd.div_f32s(simd.splat_f32s(self.gray_weight), deviation);
+        let mut whole = products.directions;
+        for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
+            let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
+            *whole = simd.mul_add_e_f32s(scale, simd.sub_f32s(grays, shift), *whole);
+        }
+        let [of_weights, of_origin] = whole;
+        let contrast = simd.mul_f32s(simd.mul_f32s(scale, scale), variance);
+        let square = simd.mul_add_e_f32s(contrast, count, energy);
+        let both = simd.add_f32s(square, simd.splat_f32s(self.origin_square));
+        let left = simd.sub_f32s(both, simd.add_f32s(of_origin, of_origin));
+        let is_left = simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(LEAST_LEFT)), left);
+        let above = simd.sub_f32s(of_weights, simd.splat_f32s(self.origin_score));
+        let score = simd.div_f32s(above, simd.sqrt_f32s(left));
+        simd.select_f32s(is_left, score, zero)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tracker::classifier::dense_search;
+    use super::*;
+    use crate::tracker::motion::particles::{Particle, Reach};
+    use crate::tracker::features::extractor::View;
+    use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::params::presets::Preset;
+
+    fn number(i: usize) -> f32 {
+        ((i * i * 37 + i * 7919) % 1000) as f32 / 500.0 - 1.0
+    }
+
+    fn frame() -> GrayFrame {
+        let luma = (0..160 * 120).map(|i| ((i * i / 7 + i / 160 * 13 + i) % 251) as u8);
+        GrayFrame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
+    }
+
+    /// Each score from the vector of its window, written out.
+    #[test]
+    fn scores_are_those_of_the_unit_vectors_of_windows() {
+        for (width, height) in [(8, 8), (5, 7)] {
+            let params = Params {
+                patch_width: width,
+                patch_height: height,
+                ..Preset::Robust.params()
+            };
+            let len = params.feature_len();
+            let reach = Reach {
+                frame_width: 160.0,
+                frame_height: 120.0,
+                box_width: 30.0,
+                box_height: 24.0,
+            };
+            let center = Particle {
+                x: 70.0,
+                y: 55.0,
+                scale: 1.1,
+            };
+            let mut view = View::default();
+            view.open(&frame(), &[center], 60.0, &reach, &params);
+            let origin: Vec<f32> = (0..len).map(|i| number(i) / 20.0).collect();
+            let mut discriminant = Discriminant::new(origin.clone());
+            let weights: Vec<f32> = (0..len).map(|i| number(i + 5000)).collect();
+            discriminant.set_weights(&weights);
+
+            let (across, down) = (5, 3);
+            let mut grid = Grid::default();
+            view.grid(
+                &center,
+                (across, down),
+                dense_search::MOST_AWAY,
+                &reach,
+                &params,
+                &mut grid,
+            );
+            let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
+            let (cell_width, cell_height) = View::cell(&center, &reach, &params);
+            let cell_pixels = (cell_width * cell_height) as f32;
+            Windows::default().scores(&grid, &discriminant, &params, cell_pixels, &mut scores);
+
+            let (width, height) = (width as usize, height as usize);
+            for (index, score) in scores.iter().enumerate() {
+                let (i, j) = (index % (2 * across + 1), index / (2 * across + 1));
+                let cell = |c: usize| (j + c / width) * grid.columns + i + c % width;
+                let grays: Vec<f32> = (0..width * height).map(|c| grid.grays[cell(c)]).collect();
+                let count = grays.len() as f32;
+                let mean = grays.iter().sum::<f32>() / count;
+                let variance = grays.iter().map(|gray| (gray - mean).powi(2)).sum::<f32>() / count;
+                let deviation = variance.sqrt().max(LEAST_CONTRAST * cell_pixels);
+                let mut vector = Vec::new();
+                for (c, gray) in grays.iter().enumerate() {
+                    let values = &grid.values[cell(c) * CHANNELS..][..DIRECTIONS];
+                    vector.extend_from_slice(values);
+                    vector.push((gray - mean) / deviation * params.gray_weight as f32);
+                }
+                let left = vector
+                    .iter()
+                    .zip(&origin)
+                    .map(|(value, origin)| value - origin);
+                let left: Vec<f32> = left.collect();
+                let length = vector_ops::dot(&left, &left).sqrt();
+                let expected = vector_ops::dot(&left, &weights) / length;
+                assert!(
+                    (score - expected).abs() < 1e-3,
+                    "{index}: {score} {expected}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! TODO-doc
+
+pub(crate) mod score;
+pub(crate) mod update_gate;

@@ -1,0 +1,111 @@
+//! Whether a frame may teach the tracker.
+//!
+//! What is learned while something covers the target is the thing that covers it. The look that the user pointed at
+//! does not change, so the distance of the answer to the bag's first subspace tells: it jumps when the target is
+//! covered, and creeps when the target turns. A frame is trusted while that distance is below a multiple of what is
+//! usual. What is usual follows slowly in frames that are not trusted, too, so that a lasting change is accepted in
+//! the end.
+//!
+//! Where such a jump is usual the score tells: a frame is learned from only if its box is rather right than not.
+
+use serde::{Deserialize, Serialize};
+
+use crate::tracker::params::table::Params;
+
+/// A running mean needs some frames before anything can be compared with it; a target that changes fast from the start
+/// would never be learned otherwise.
+const UNTIL_USUAL: u64 = 20;
+/// What counts as usual before anything was seen, and what is always trusted: distances are at most 1, and these are
+/// those of a look that shares about half with the first.
+const FIRST_USUAL: f64 = 0.25;
+const ALWAYS_TRUSTED: f64 = 0.3;
+/// A target that has hardly changed so far may have changed this much when it comes back.
+const LEAST_USUAL: f64 = 0.15;
+/// The share of the newest frame in the running mean, when trusted and when not.
+const RENEWAL: f64 = 0.1;
+const RENEWAL_UNTRUSTED: f64 = 0.02;
+
+/// Whether frame `number`, whose answer overlaps the target by half or more with the chance `score`, may be learned from. A
+/// box that is half off is learned as what the target looks like otherwise, and the next one is further off.
+pub(crate) fn believes(score: f64, number: u64, params: &Params) -> bool {
+    number < UNTIL_USUAL || score >= params.learn_above
+}
+
+/// What distances to the first subspace have been usual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Trust {
+    pub usual: f64,
+}
+
+impl Default for Trust {
+    fn default() -> Self {
+        Self { usual: FIRST_USUAL }
+    }
+}
+
+impl Trust {
+    /// Whether `distance` from the first subspace is not far beyond what is usual.
+    fn accepts(&self, distance: f64, params: &Params) -> bool {
+        let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
+        params.trusted_ratio <= 0.0 || distance < limit
+    }
+
+    /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target. The
+    /// search was `widening` times as wide as usual: one that is hardly wider finds what it lost a frame or two before, and
+    /// that is trusted as ever; a wide one finds the likest of all things, so it must look as much like the first look
+    /// as is usual.
+    pub fn recognizes(&self, distance: f64, widening: f64, params: &Params) -> bool {
+        let limit = self.usual.max(LEAST_USUAL) * (1.0 + (params.trusted_ratio - 1.0) / widening);
+        params.trusted_ratio <= 0.0 || distance < limit
+    }
+
+    /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
+    pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
+        let trusted = number < UNTIL_USUAL || self.accepts(distance, params);
+        let renewal = if trusted { RENEWAL } else { RENEWAL_UNTRUSTED };
+        self.usual += renewal * (distance - self.usual);
+        trusted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::params::presets::Preset;
+
+    #[test]
+    fn a_jump_is_not_trusted_until_it_has_lasted() {
+        let params = Preset::Robust.params();
+        let mut trust = Trust::default();
+        assert!((1..50).all(|number| trust.judge(0.2, number, &params)));
+        let untrusted = (50..500).take_while(|&number| !trust.judge(0.6, number, &params));
+        let untrusted = untrusted.count();
+        assert!((10..100).contains(&untrusted), "{untrusted}");
+    }
+
+    #[test]
+    fn what_is_hardly_believed_is_not_learned_once_there_were_some_frames() {
+        let params = Preset::Robust.params();
+        let learned = |score, number| believes(score, number, &params);
+        assert!(learned(0.1, UNTIL_USUAL - 1) && learned(0.7, 500));
+        assert!(!learned(0.6, UNTIL_USUAL) && !learned(0.1, 500));
+        assert!(believes(0.0, 500, &Preset::Paper.params()));
+    }
+
+    /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
+    #[test]
+    fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
+        let params = Preset::Robust.params();
+        let trust = Trust { usual: 0.57 };
+        assert!(trust.recognizes(0.6, 1.5, &params));
+        assert!(!trust.recognizes(0.6, 11.0, &params));
+        assert!(trust.recognizes(0.55, 11.0, &params));
+    }
+
+    #[test]
+    fn a_creeping_change_is_trusted_all_along() {
+        let params = Preset::Robust.params();
+        let mut trust = Trust::default();
+        assert!((1..200).all(|number| trust.judge(0.2 + number as f64 * 0.003, number, &params)));
+    }
+}

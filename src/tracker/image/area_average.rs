@@ -1,0 +1,237 @@
+//! Exact area averaging, in integers.
+//!
+//! An output pixel of index `o` covers the source interval `[o * S / T, (o + 1) * S / T)` for source size `S` and
+//! target size `T`. Measured in units of `1 / T` of a source pixel every interval has the whole length `S`, and
+//! its shares of source pixels are whole numbers too, so the average is exact up to the final rounding.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// The share of one source index in one or two neighbouring target indices, in units of `1 / target`.
+struct Share {
+    target: usize,
+    first: u32,
+    second: u32,
+}
+
+/// The source indices of one target index: `begin..end` as a whole, the one before and the one after by a share, in units of
+/// `1 / target`.
+struct Cell {
+    begin: usize,
+    end: usize,
+    before: u32,
+    after: u32,
+}
+
+/// Which of `source` indices each of `target` indices covers, `target <= source`.
+fn cells(source: u32, target: u32) -> Vec<Cell> {
+    let (source, target) = (u64::from(source), u64::from(target));
+    (0..target)
+        .map(|index| {
+            let (from, until) = (index * source, (index + 1) * source);
+            let (begin, end) = (from.div_ceil(target), until / target);
+            Cell {
+                begin: begin as usize,
+                end: end as usize,
+                before: (begin * target - from) as u32,
+                after: (until - end * target) as u32,
+            }
+        })
+        .collect()
+}
+
+/// How each of `source` indices is shared among `target` indices, `target <= source`.
+fn shares(source: u32, target: u32) -> Vec<Share> {
+    (0..u64::from(source))
+        .map(|index| {
+            let (source, target) = (u64::from(source), u64::from(target));
+            let begin = index * target;
+            let owner = begin / source;
+            let edge = (owner + 1) * source;
+            let first = target.min(edge - begin);
+            Share {
+                target: owner as usize,
+                first: first as u32,
+                second: (target - first) as u32,
+            }
+        })
+        .collect()
+}
+
+/// The area average of `luma` (`source` = width, height, row order) on a grid of `target` = width, height, where
+/// no target side is above its source side. It is put into `out`, which is empty.
+pub(crate) fn area_average(
+    luma: &[u8],
+    source: (u32, u32),
+    target: (u32, u32),
+    out: Vec<u8>,
+) -> Vec<u8> {
+    Arch::new().dispatch(Average {
+        luma,
+        source,
+        target,
+        out,
+    })
+}
+
+/// One average, to be compiled for the instructions that this machine has.
+struct Average<'a> {
+    luma: &'a [u8],
+    source: (u32, u32),
+    target: (u32, u32),
+    out: Vec<u8>,
+}
+
+impl WithSimd for Average<'_> {
+    type Output = Vec<u8>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<u8> {
+        let Self {
+            luma,
+            source,
+            target,
+            mut out,
+        } = self;
+        let is_whole = source.0.is_multiple_of(target.0);
+        let columns = cells(source.0, target.0);
+        let rows = shares(source.1, target.1);
+        out.reserve_exact(target.0 as usize * target.1 as usize);
+        // Rows first: that loop runs over every source pixel, and this way it is contiguous. 255 times the weights
+        // of a column, which sum to the source height, stays far below 2^32 for any image that fits into memory.
+        let mut sums = vec![0_u32; source.0 as usize];
+        let mut next_sums = vec![0_u32; source.0 as usize];
+        for (index, row) in luma.chunks_exact(source.0 as usize).enumerate() {
+            let share = &rows[index];
+            for (sum, &value) in sums.iter_mut().zip(row) {
+                *sum += u32::from(value) * share.first;
+            }
+            if share.second > 0 {
+                for (sum, &value) in next_sums.iter_mut().zip(row) {
+                    *sum += u32::from(value) * share.second;
+                }
+            }
+            let last_of_cell = rows
+                .get(index + 1)
+                .is_none_or(|next| next.target > share.target);
+            if last_of_cell {
+                match source.0 / target.0 {
+                    2 if is_whole => average_whole::<2>(&sums, source.1, &mut out),
+                    3 if is_whole => average_whole::<3>(&sums, source.1, &mut out),
+                    4 if is_whole => average_whole::<4>(&sums, source.1, &mut out),
+                    6 if is_whole => average_whole::<6>(&sums, source.1, &mut out),
+                    _ => average_row(&sums, &columns, source, target.0, &mut out),
+                }
+                std::mem::swap(&mut sums, &mut next_sums);
+                next_sums.fill(0);
+            }
+        }
+        out
+    }
+}
+
+/// The averages of one row of cells, from the sums of its columns.
+#[inline(always)]
+fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, out: &mut Vec<u8>) {
+    let full = u64::from(source.0) * u64::from(source.1);
+    // Rounded down it is the exact quotient, or one less than it: see `quotient`.
+    let inverse = 1.0 / full as f64;
+    out.extend(cells.iter().map(|cell| {
+        let whole = sums[cell.begin..cell.end].iter();
+        let whole: u64 = whole.map(|&sum| u64::from(sum)).sum();
+        let mut total = whole * u64::from(target);
+        total +=
+            u64::from(sums[cell.begin - usize::from(cell.before > 0)]) * u64::from(cell.before);
+        if cell.after > 0 {
+            total += u64::from(sums[cell.end]) * u64::from(cell.after);
+        }
+        quotient(total + full / 2, full, inverse) as u8
+    }));
+}
+
+/// The same where a cell is `WIDTH` whole columns, as it is for the usual sizes of video: no loop within a cell.
+#[inline(always)]
+fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
+    let full = WIDTH as u32 * height;
+    let inverse = 1.0 / f64::from(full);
+    let cells = sums.as_chunks::<WIDTH>().0;
+    out.extend(cells.iter().map(|cell| {
+        let value = cell.iter().sum::<u32>() + full / 2;
+        let near = (f64::from(value) * inverse) as i32 as u32;
+        let near = near - u32::from(near * full > value);
+        (near + u32::from((near + 1) * full <= value)) as u8
+    }));
+}
+
+/// `value / divisor` where `inverse` is 1 / `divisor` and the quotient is small: a division by a variable takes longer
+/// than all else that is done for a cell.
+#[inline(always)]
+fn quotient(value: u64, divisor: u64, inverse: f64) -> u32 {
+    let near = (value as f64 * inverse) as u32;
+    // The product is off by far less than one, so the quotient is this or a neighbour.
+    let near = near - u32::from(u64::from(near) * divisor > value);
+    near + u32::from((u64::from(near) + 1) * divisor <= value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same by the definition: overlaps of intervals, in floating point.
+    fn by_definition(luma: &[u8], source: (u32, u32), target: (u32, u32)) -> Vec<f64> {
+        let overlap = |o: u32, s: u32, source: u32, target: u32| {
+            let ratio = f64::from(source) / f64::from(target);
+            let (begin, end) = (f64::from(o) * ratio, f64::from(o + 1) * ratio);
+            ((f64::from(s) + 1.0).min(end) - f64::from(s).max(begin)).max(0.0) / ratio
+        };
+        let mut out = Vec::new();
+        for row in 0..target.1 {
+            for column in 0..target.0 {
+                let mut sum = 0.0;
+                for y in 0..source.1 {
+                    let vertical = overlap(row, y, source.1, target.1);
+                    for x in 0..source.0 {
+                        let share = vertical * overlap(column, x, source.0, target.0);
+                        sum += share * f64::from(luma[(y * source.0 + x) as usize]);
+                    }
+                }
+                out.push(sum);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn averages_are_exact_up_to_rounding() {
+        for (source, target) in [
+            ((7, 5), (3, 2)),
+            ((8, 6), (4, 3)),
+            ((9, 4), (9, 1)),
+            ((13, 11), (12, 11)),
+            ((5, 1), (2, 1)),
+            ((1, 9), (1, 4)),
+            ((6, 6), (6, 6)),
+        ] {
+            let luma: Vec<u8> = (0..source.0 * source.1)
+                .map(|i| (i * 89 % 256) as u8)
+                .collect();
+            let averages = area_average(&luma, source, target, Vec::new());
+            let expected = by_definition(&luma, source, target);
+            assert_eq!(averages.len(), expected.len());
+            for (&average, &expected) in averages.iter().zip(&expected) {
+                let difference = (f64::from(average) - expected).abs();
+                assert!(difference <= 0.5 + 1e-9, "{source:?} to {target:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn white_stays_white_at_any_size() {
+        for source in [(1921, 1079), (321, 1), (1, 5000), (640, 480)] {
+            let luma = vec![255; source.0 as usize * source.1 as usize];
+            let target = crate::tracker::image::frame::working_size(source.0, source.1);
+            let averages = area_average(&luma, source, target, Vec::new());
+            assert_eq!(averages.len(), target.0 as usize * target.1 as usize);
+            assert!(averages.iter().all(|&value| value == 255));
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! TODO-doc
+
+pub(crate) mod presets;
+pub(crate) mod table;
+pub(crate) mod validate;

@@ -1,0 +1,4 @@
+//! TODO-doc
+
+pub(crate) mod dsst;
+pub(crate) mod pyramid;

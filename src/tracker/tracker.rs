@@ -1,0 +1,84 @@
+//! The tracker of one session, as the rest of the program sees it.
+
+use crate::tracker::error::TrackerError;
+use crate::tracker::estimate::Estimate;
+use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
+use crate::tracker::snapshot;
+use crate::tracker::state::{self, State};
+use crate::tracker::workspace;
+
+/// Follows one object.
+///
+/// An error of any method leaves the tracker as it was.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    pub(crate) state: State,
+}
+
+impl Tracker {
+    /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
+    ///
+    /// # Errors
+    /// A parameter out of its range; a box that is not finite, has a side below [`LEAST_BOX_SIDE`] pixels (or below
+    /// one pixel of the working image) or above four times the frame's longer side, or lies outside the frame.
+    pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
+        params.validate()?;
+        let source = frame.source_size();
+        state::check_target(source, &target)?;
+        Ok(workspace::with(|room| {
+            let state = State::new(frame, target, params, room);
+            Self { state }
+        }))
+    }
+
+    /// Finds the target in the next frame.
+    ///
+    /// # Errors
+    /// A frame whose uploaded size is not that of the session's first frame.
+    pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
+        state::check_frame(self.state.source, frame)?;
+        Ok(workspace::with(|room| self.state.find(frame, room)))
+    }
+
+    /// The user corrects the box: `frame` counts as the next frame, with the answer given.
+    /// The bag keeps what it knew and gains the new look; history and particles restart at the box.
+    ///
+    /// # Errors
+    /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
+    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
+        state::check_frame(self.state.source, frame)?;
+        state::check_target(self.state.source, &target)?;
+        workspace::with(|room| self.state.retarget(frame, target, room));
+        Ok(self.state.estimate)
+    }
+
+    /// The last answer.
+    pub fn estimate(&self) -> Estimate {
+        self.state.estimate
+    }
+
+    /// The parameters of this tracker.
+    pub fn params(&self) -> &Params {
+        &self.state.params
+    }
+
+    /// Width and height of the session's frames, before downscaling.
+    pub fn source_size(&self) -> (u32, u32) {
+        self.state.source
+    }
+
+    /// The whole state as bytes, versioned.
+    pub fn snapshot(&self) -> Vec<u8> {
+        snapshot::write(&self.state)
+    }
+
+    /// A tracker that goes on from `snapshot`, bit for bit.
+    ///
+    /// # Errors
+    /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
+    pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
+        snapshot::read(snapshot).map(|state| Self { state })
+    }
+}

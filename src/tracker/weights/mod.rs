@@ -1,0 +1,4 @@
+//! TODO-doc
+
+pub(crate) mod likelihood;
+pub(crate) mod posterior;
