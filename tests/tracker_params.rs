@@ -62,17 +62,17 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         refined_std_scale: share(),
         displacement_std: 1000.0 * share(),
         scale_change_std: 10.0 * share(),
-        scale_rate: if on(3) { share() } else { 0.0 },
-        scan_peaks: seed as u32 % 17,
-        scan_reach: 4.0 * share(),
-        arrival_weight: if on(5) { 100.0 * share() } else { 0.0 },
+        scale_learning_rate: if on(3) { share() } else { 0.0 },
+        dense_maxima: seed as u32 % 17,
+        dense_radius: 4.0 * share(),
+        static_penalty: if on(5) { 100.0 * share() } else { 0.0 },
         averaging_radius: 100.0 * share(),
-        scan_margin: if on(3) { 0.0 } else { 1000.0 * share().powi(3) },
-        turn_step: if on(5) { 30.0 * share() } else { 0.0 },
-        pose_angle: if on(4) { 90.0 * share() } else { 0.0 },
+        prune_margin: if on(3) { 0.0 } else { 1000.0 * share().powi(3) },
+        rotation_step: if on(5) { 30.0 * share() } else { 0.0 },
+        augmentation_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: 100.0 * share(),
-        learn_above: share(),
-        trusted_ratio: 100.0 * (seed % 3) as f64 / 2.0,
+        update_min_score: share(),
+        update_distance_ratio: 100.0 * (seed % 3) as f64 / 2.0,
         discriminant_weight: 100.0 * (seed % 5) as f64 / 4.0,
         features: if on(0) {
             Features::Gray
@@ -80,13 +80,13 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
             Features::Gradients
         },
         unit_length: on(1),
-        candidate_alone: on(2),
+        single_vector_candidate: on(2),
         search: if on(3) {
             Search::Resampled
         } else {
             Search::Answer
         },
-        camera_shift: on(4),
+        global_motion: on(4),
         ..magnitudes
     }
 }

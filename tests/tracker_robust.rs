@@ -73,7 +73,7 @@ fn a_target_that_leaps_by_its_own_length_is_held() {
 fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     // So that the scene above tests what it says.
     let params = Params {
-        scan_peaks: 0,
+        dense_maxima: 0,
         ..robust(0)
     };
     let (first, given) = leaping(0);
@@ -104,7 +104,7 @@ fn a_head_that_tilts_stays_in_the_middle_of_its_box() {
     for (seed, zoom) in [(0, 1), (1, 1), (2, 1), (0, 3), (1, 3), (2, 3)] {
         let off = off_when_tilted(robust(seed), zoom);
         let always_upright = Params {
-            turn_step: 0.0,
+            rotation_step: 0.0,
             ..robust(seed)
         };
         let upright = off_when_tilted(always_upright, zoom);
@@ -134,7 +134,7 @@ fn a_target_is_held_through_swings_of_the_camera() {
 fn without_its_camera_the_swings_lose_the_target() {
     // So that the scene above tests what it says.
     let params = Params {
-        camera_shift: false,
+        global_motion: false,
         ..robust(0)
     };
     let (first, given) = panned(0, (0, 0));

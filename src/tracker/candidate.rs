@@ -8,11 +8,11 @@
 //! Dividing by ρ is harmless however small it is: the coordinate of a counting direction along e is ρ times a bounded
 //! number (the z of an eigenvector over its eigenvalue).
 
-use crate::tracker::params::table::Params;
 use crate::tracker::abreast::{ABREAST, Doubles, Singles};
-use crate::tracker::dominant;
-use crate::tracker::products::Products;
 use crate::tracker::appearance::subspace::RANK_TOLERANCE;
+use crate::tracker::dominant;
+use crate::tracker::params::table::Params;
+use crate::tracker::products::Products;
 
 /// The bases of all candidates of a frame.
 #[derive(Debug, Clone, Default)]

@@ -5,9 +5,9 @@
 
 use std::f32::consts::PI;
 
-use crate::tracker::params::table::Params;
 use crate::tracker::abreast::{ABREAST, Doubles, Singles};
 use crate::tracker::candidate::CandidateBases;
+use crate::tracker::params::table::Params;
 use crate::tracker::products::Products;
 use crate::tracker::singular::{self, Columns};
 

@@ -2,11 +2,11 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::candidate::CandidateBases;
 use crate::tracker::distance::Distances;
-use crate::tracker::products::Products;
-use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::params::table::Params;
+use crate::tracker::products::Products;
 use crate::tracker::weights::likelihood;
 
 /// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](crate::tracker::tracker::Tracker::step) does it.

@@ -1,8 +1,8 @@
 //! What all candidates of a frame share: the P previous patches H, and an orthonormal basis Q of their span, found from the
 //! small matrix HᵀH.
 
-use crate::tracker::linalg::jacobi::Spectrum;
 use crate::tracker::appearance::subspace;
+use crate::tracker::linalg::jacobi::Spectrum;
 
 /// The history of a frame.
 #[derive(Debug, Clone, Default)]

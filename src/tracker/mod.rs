@@ -55,7 +55,10 @@ mod scale;
 mod snapshot;
 mod state;
 mod step;
-#[expect(clippy::module_inception, reason = "the type that the room is named after")]
+#[expect(
+    clippy::module_inception,
+    reason = "the type that the scratch is named after"
+)]
 mod tracker;
 mod weights;
 mod workspace;

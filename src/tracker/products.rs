@@ -14,16 +14,16 @@
 use pulp::Simd;
 
 use crate::tracker::abreast::{ABREAST, Doubles, Singles};
-use crate::tracker::history::{self, SharedHistory};
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
-use crate::tracker::params::table::Params;
+use crate::tracker::history::{self, SharedHistory};
 use crate::tracker::linalg::gemm;
+use crate::tracker::params::table::Params;
 
 /// Between two vectors, in values: rows of 1024 values would all begin at the same place of the first cache.
 const GAP: usize = 16;
 
 /// Most candidates in a tile of the product.
-const MOST_ROWS: usize = 6;
+const MAX_ROWS: usize = 6;
 
 /// A rest shorter than this share of d (both squared) has lost digits that count.
 const SMALL_REST: f64 = 0.001;
@@ -82,16 +82,16 @@ impl Products {
         self.entries = 0;
         self.candidate_vectors
             .resize(self.candidates * self.len, 0.0);
-        let tile = MOST_ROWS * self.stride;
+        let tile = MAX_ROWS * self.stride;
         self.tile_first = gemm::align(&mut self.tile, tile);
         self.tile.resize(self.tile_first + tile, 0.0);
-        let room = [0.0; ABREAST];
+        let scratch = [0.0; ABREAST];
         self.coordinates.clear();
-        self.coordinates.resize(self.groups * self.slots, room);
+        self.coordinates.resize(self.groups * self.slots, scratch);
         self.rests.clear();
-        self.rests.resize(self.groups, room);
+        self.rests.resize(self.groups, scratch);
         self.squares.clear();
-        self.squares.resize(self.groups, room);
+        self.squares.resize(self.groups, scratch);
         self.history.prepare(self.slots, self.len);
         self.rest.resize(self.len, 0.0);
     }
@@ -149,7 +149,7 @@ impl Products {
         }
         self.multiply_directions(simd);
         if S::REGISTER_COUNT >= 32 {
-            self.multiply::<S, MOST_ROWS, 4>(simd, history[0]);
+            self.multiply::<S, MAX_ROWS, 4>(simd, history[0]);
         } else {
             self.multiply::<S, 4, 3>(simd, history[0]);
         }

@@ -9,13 +9,13 @@
 //! postcard's encoding.
 
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::image::frame::working_size;
-use crate::tracker::motion::particles::Particle;
-use crate::tracker::state::{self, State};
-use crate::tracker::params::table::Params;
 use crate::tracker::error::TrackerError;
-use crate::tracker::workspace;
+use crate::tracker::image::frame::working_size;
 use crate::tracker::motion::orientation;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::params::table::Params;
+use crate::tracker::state::{self, State};
+use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
@@ -23,7 +23,7 @@ const VERSION: u32 = 8;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
-const GREATEST_FEATURE: f32 = 1e3;
+const MAX_FEATURE: f32 = 1e3;
 /// How far single precision may leave UᵀU from the identity.
 const ORTHONORMAL: f64 = 1e-3;
 /// Frame numbers are below: 2^53 can also be said exactly in JSON.
@@ -70,8 +70,8 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
 
 /// Makes what a snapshot does not carry.
 fn restore(state: &mut State) {
-    workspace::with(|room| {
-        let learning = &mut room.learning;
+    workspace::with(|workspace| {
+        let learning = &mut workspace.learning;
         state
             .background
             .learn(&state.params, &mut learning.background);
@@ -87,7 +87,7 @@ fn check(state: &State) -> Result<(), TrackerError> {
         && check_particles(state)
         && check_history(state)
         && check_bag(&state.bag, &state.params)
-        && check_mends(state);
+        && check_extensions(state);
     if sound {
         Ok(())
     } else {
@@ -102,17 +102,20 @@ fn check_numbers(state: &State) -> bool {
         return false;
     }
     let (working_width, working_height) = working_size(width, height);
-    let reach = &state.reach;
+    let bounds = &state.bounds;
     let (horizontal, vertical) = State::to_working(state.source);
-    let box_sides = [(reach.box_width, horizontal), (reach.box_height, vertical)];
+    let box_sides = [
+        (bounds.box_width, horizontal),
+        (bounds.box_height, vertical),
+    ];
     // Scaling back and forth may have rounded.
     let could_be_given = |&(side, scale): &(f64, f64)| {
         side >= 0.99 && side / scale <= 1.01 * state::greatest_box_side(state.source)
     };
     let target = &state.estimate.target;
     let far = 1e2 * f64::from(width.max(height)) + 1e3;
-    reach.frame_width == f64::from(working_width)
-        && reach.frame_height == f64::from(working_height)
+    bounds.frame_width == f64::from(working_width)
+        && bounds.frame_height == f64::from(working_height)
         && box_sides.iter().all(could_be_given)
         && target.is_valid()
         && [target.x, target.y, target.width, target.height]
@@ -131,7 +134,7 @@ fn check_particles(state: &State) -> bool {
     let total: f64 = state.weights.iter().sum();
     state.particles.len() == count
         && state.weights.len() == count
-        && is_held(&state.answer, state)
+        && is_clamped(&state.answer, state)
         && state
             .weights
             .iter()
@@ -140,35 +143,35 @@ fn check_particles(state: &State) -> bool {
         && state
             .particles
             .iter()
-            .all(|particle| is_held(particle, state))
+            .all(|particle| is_clamped(particle, state))
 }
 
 /// Whether a particle is where it may be. Those of a new box may be where a moved one may not: by a pixel. The mean of
 /// scales at a limit may be rounded beyond it.
-fn is_held(particle: &Particle, state: &State) -> bool {
-    let held = state.reach.hold(*particle);
+fn is_clamped(particle: &Particle, state: &State) -> bool {
+    let held = state.bounds.clamp(*particle);
     (held.x - particle.x).abs() <= 2.0
         && (held.y - particle.y).abs() <= 2.0
         && (held.scale - particle.scale).abs() <= 1e-9
 }
 
 /// What only some parameters need: there when they ask for it, and not otherwise.
-fn check_mends(state: &State) -> bool {
+fn check_extensions(state: &State) -> bool {
     let params = &state.params;
     let (width, height) = working_size(state.source.0, state.source.1);
-    state.background.is_sound(params, GREATEST_FEATURE)
-        && state.discriminant.is_sound(params, GREATEST_FEATURE)
-        && state.scale_filter.is_sound(params, GREATEST_FEATURE)
-        && state.camera.is_some() == params.camera_shift
+    state.background.is_valid_for(params, MAX_FEATURE)
+        && state.discriminant.is_valid_for(params, MAX_FEATURE)
+        && state.scale_filter.is_valid_for(params, MAX_FEATURE)
+        && state.global_motion.is_some() == params.global_motion
         && state
-            .camera
+            .global_motion
             .as_ref()
-            .is_none_or(|camera| camera.is_sound(width as usize, height as usize))
+            .is_none_or(|global_motion| global_motion.is_valid_for(width as usize, height as usize))
         && state
             .last_seen
-            .is_sound((width, height), params.arrival_weight > 0.0)
-        && orientation::is_sound(state.turn, params)
-        && (0.0..=1e6).contains(&state.trust.usual)
+            .is_valid_for((width, height), params.static_penalty > 0.0)
+        && orientation::is_valid_for(state.orientation, params)
+        && (0.0..=1e6).contains(&state.update_gate.usual)
 }
 
 fn check_history(state: &State) -> bool {
@@ -186,10 +189,14 @@ fn check_bag(bag: &Bag, params: &Params) -> bool {
         && bag
             .entries()
             .iter()
-            .all(|entry| entry.is_sound(params, GREATEST_FEATURE))
+            .all(|entry| entry.is_valid_for(params, MAX_FEATURE))
         && bag.subspaces().all(|entry| {
             // Where candidates stand alone a subspace is what follows from its looks.
-            let len = if params.candidate_alone { 0 } else { len };
+            let len = if params.single_vector_candidate {
+                0
+            } else {
+                len
+            };
             if len == 0 {
                 return entry.mean.is_empty() && entry.basis.is_empty();
             }
@@ -203,7 +210,7 @@ fn check_bag(bag: &Bag, params: &Params) -> bool {
 }
 
 fn are_features(values: &[f32]) -> bool {
-    values.iter().all(|value| value.abs() <= GREATEST_FEATURE)
+    values.iter().all(|value| value.abs() <= MAX_FEATURE)
 }
 
 fn is_orthonormal(columns: &[&[f32]]) -> bool {

@@ -4,21 +4,21 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::motion::change_test::{Arrival, LastSeen};
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::motion::global_motion::Camera;
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::image::frame::working_size;
-use crate::tracker::motion::particles::{Particle, Reach};
-use crate::tracker::scale::dsst::ScaleFilter;
-use crate::tracker::confidence::score::{Evidence, Usual};
-use crate::tracker::confidence::update_gate::{self, Trust};
+use crate::tracker::confidence::score::{DistanceBaseline, Evidence};
+use crate::tracker::confidence::update_gate::{self, UpdateGate};
+use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
+use crate::tracker::image::frame::working_size;
 use crate::tracker::image::rect::Rect;
-use crate::tracker::error::TrackerError;
+use crate::tracker::motion::change_test::{ChangeTest, LastSeen};
+use crate::tracker::motion::global_motion::GlobalMotion;
+use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::params::table::Params;
+use crate::tracker::scale::dsst::ScaleFilter;
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
@@ -34,7 +34,7 @@ const FOUND_MARGIN: f64 = 0.2;
 pub(crate) struct State {
     pub params: Params,
     pub source: (u32, u32),
-    pub reach: Reach,
+    pub bounds: StateBounds,
     pub estimate: Estimate,
     /// Where the target was found last.
     pub answer: Particle,
@@ -48,13 +48,13 @@ pub(crate) struct State {
     pub background: Background,
     pub discriminant: Discriminant,
     /// Where a shift of the picture is looked for.
-    pub camera: Option<Camera>,
+    pub global_motion: Option<GlobalMotion>,
     pub scale_filter: ScaleFilter,
     pub last_seen: LastSeen,
-    pub trust: Trust,
-    pub usual: Usual,
+    pub update_gate: UpdateGate,
+    pub usual: DistanceBaseline,
     /// By how much the target is turned in the picture against the first look, in radians.
-    pub turn: f64,
+    pub orientation: f64,
     /// For how many frames the target has been out of sight.
     pub frames_lost: u32,
 }
@@ -70,30 +70,30 @@ impl State {
     }
 
     /// The reach of particles around `target`, and the particle that is `target` itself.
-    pub fn aim(source: (u32, u32), target: &Rect) -> (Reach, Particle) {
+    pub fn place(source: (u32, u32), target: &Rect) -> (StateBounds, Particle) {
         let (horizontal, vertical) = Self::to_working(source);
         let (width, height) = working_size(source.0, source.1);
         let area = target.scaled(horizontal, vertical);
-        let reach = Reach {
+        let bounds = StateBounds {
             frame_width: f64::from(width),
             frame_height: f64::from(height),
             box_width: area.width,
             box_height: area.height,
         };
         let (x, y) = area.center();
-        (reach, Particle { x, y, scale: 1.0 })
+        (bounds, Particle { x, y, scale: 1.0 })
     }
 
     /// The box of `particle`, in pixels of the uploaded frame.
     pub fn target_of(&self, particle: &Particle) -> Rect {
         let (horizontal, vertical) = Self::to_working(self.source);
-        self.reach
+        self.bounds
             .area(particle)
             .scaled(1.0 / horizontal, 1.0 / vertical)
     }
 
     /// All particles at `particle`, with equal weights.
-    pub fn gather(&mut self, particle: Particle) {
+    pub fn reset_particles(&mut self, particle: Particle) {
         let count = self.params.stored_particles();
         self.answer = particle;
         self.particles = vec![particle; count];
@@ -102,46 +102,47 @@ impl State {
 
     /// How many times as wide as usual the next search is. The longer a target is out of sight, the further it may have
     /// come, until the search covers the frame.
-    pub fn widening(&self) -> f64 {
+    pub fn search_scale(&self) -> f64 {
         let std = self
             .params
             .motion_std_x
             .max(self.params.motion_std_y)
             .max(1.0);
-        let most = self.reach.frame_width.max(self.reach.frame_height) / 3.0 / std;
+        let most = self.bounds.frame_width.max(self.bounds.frame_height) / 3.0 / std;
         let widened = 1.0 + WIDENING * f64::from(self.frames_lost);
         widened.min(most.max(1.0))
     }
 
     /// Whether the best particle is not the target. Once the target is out of sight the search covers much more, and
     /// finds more that looks a little like it: so to be found again takes a better score, and a look that is recognised.
-    pub fn is_out_of_sight(&self, evidence: &Evidence) -> bool {
+    pub fn is_lost(&self, evidence: &Evidence) -> bool {
         let Some(score) = evidence.discriminant else {
             return false;
         };
-        let (score, below) = (f64::from(score), self.params.lost_below);
+        let (score, below) = (f64::from(score), self.params.lost_threshold);
         if self.frames_lost == 0 {
             return score < below;
         }
-        let (trust, params) = (&self.trust, &self.params);
-        score < below + FOUND_MARGIN || !trust.recognizes(evidence.first, self.widening(), params)
+        let (update_gate, params) = (&self.update_gate, &self.params);
+        score < below + FOUND_MARGIN
+            || !update_gate.recognizes(evidence.first, self.search_scale(), params)
     }
 
     /// Whether frame `number`, whose answer has `score`, is believed enough to be learned from. Without a discriminant a
     /// score is no chance.
-    pub fn believes(&self, score: f32, number: u64) -> bool {
-        !self.discriminant.is_on() || update_gate::believes(f64::from(score), number, &self.params)
+    pub fn passes(&self, score: f32, number: u64) -> bool {
+        !self.discriminant.is_on() || update_gate::passes(f64::from(score), number, &self.params)
     }
 
     /// The target is at the answer in the frame that `arrival` has taken.
-    pub fn see(&mut self, arrival: &Arrival) {
-        if self.params.arrival_weight > 0.0 {
-            self.last_seen.see(self.answer, arrival);
+    pub fn record_seen(&mut self, arrival: &ChangeTest) {
+        if self.params.static_penalty > 0.0 {
+            self.last_seen.record_seen(self.answer, arrival);
         }
     }
 
     /// Makes the first vector of `features` the newest of the history.
-    pub fn remember(&mut self, features: &[f32]) {
+    pub fn push_history(&mut self, features: &[f32]) {
         let full = self.history.len() >= self.params.history as usize;
         let oldest = if full { self.history.pop_back() } else { None };
         let mut newest = oldest.unwrap_or_default();

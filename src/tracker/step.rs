@@ -5,93 +5,99 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::tracker::workspace::Comparison;
-use crate::tracker::motion::particles::{self, Draws, Particle};
-use crate::tracker::image::frame_views::Pictures;
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::motion::proposal::{self, Sought};
-use crate::tracker::state::State;
-use crate::tracker::features::extractor::View;
 use crate::tracker::estimate::Estimate;
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame_views::FrameViews;
+use crate::tracker::motion::particles::{self, Draws, Particle};
+use crate::tracker::motion::proposal::{self, SearchContext};
 use crate::tracker::params::table::Search;
+use crate::tracker::state::State;
+use crate::tracker::workspace::Workspace;
 
 impl State {
     /// Finds the target in `frame`, the next one, and learns from it.
-    pub fn find(&mut self, frame: &GrayFrame, room: &mut Comparison) -> Estimate {
+    pub fn find(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> Estimate {
         let number = self.estimate.frame + 1;
-        let camera = self.camera.as_mut();
-        let shift = camera.map_or((0.0, 0.0), |camera| camera.shift(frame, &mut room.camera));
+        let global_motion = self.global_motion.as_mut();
+        let shift = global_motion.map_or((0.0, 0.0), |global_motion| {
+            global_motion.shift(frame, &mut workspace.global_motion)
+        });
         let rotation = self.rotation();
-        let in_picture =
-            |place: Particle| rotation.map_or(place, |rotation| rotation.in_picture(&place));
-        let sought = Sought {
+        let to_original =
+            |place: Particle| rotation.map_or(place, |rotation| rotation.to_original(&place));
+        let search = SearchContext {
             last: self.answer,
-            shift: rotation.map_or(shift, |rotation| rotation.turned_shift(shift)),
-            widening: self.widening(),
+            shift: rotation.map_or(shift, |rotation| rotation.rotated_displacement(shift)),
+            search_scale: self.search_scale(),
             params: &self.params,
-            reach: &self.reach,
+            bounds: &self.bounds,
         };
-        let carried = sought.carried();
-        room.begin(self, sought.most());
-        room.rotation = rotation;
-        let furthest = sought.furthest() + self.learning_radius(number);
-        let furthest = furthest.max(sought.scanned());
-        let mut pictures = Pictures::of(frame, self, &mut room.pictures);
+        let displaced = search.displaced();
+        workspace.begin(self, search.most());
+        workspace.rotation = rotation;
+        let radius = search.radius() + self.sampling_radius(number);
+        let radius = radius.max(search.scanned());
+        let mut views = FrameViews::of(frame, self, &mut workspace.views);
         if let Some(rotation) = &rotation {
-            let window = View::window(&[self.answer], furthest, &self.reach, &self.params);
-            pictures.turn(rotation, &window, &mut room.pictures);
+            let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
+            views.orientation(rotation, &window, &mut workspace.views);
         }
 
         // (A) Where it may be.
         let mut draws = particles::generator(self.params.seed, number, Draws::Particles);
-        self.propose(pictures.upright(), &sought, furthest, &mut draws, room);
-        if self.params.arrival_weight > 0.0 {
-            room.arrival.take(frame);
-            room.arrival
-                .compare(&self.last_seen, &in_picture(carried), furthest, &self.reach);
+        self.propose(views.rectified(), &search, radius, &mut draws, workspace);
+        if self.params.static_penalty > 0.0 {
+            workspace.arrival.take(frame);
+            workspace.arrival.compare(
+                &self.last_seen,
+                &to_original(displaced),
+                radius,
+                &self.bounds,
+            );
         }
 
         // (B) What is seen there, and (D) how that compares with what is known.
-        let best = self.weigh(pictures.upright(), &sought, &mut draws, room);
-        let evidence = room.evidence(best, &self.trust);
-        let lost = self.is_out_of_sight(&evidence);
+        let best = self.weigh(views.rectified(), &search, &mut draws, workspace);
+        let evidence = workspace.evidence(best, &self.update_gate);
+        let lost = self.is_lost(&evidence);
         let found = if lost {
-            carried
+            displaced
         } else {
             let radius = self.params.averaging_radius;
-            let found = proposal::average(&room.particles, &room.weights, best, radius);
-            self.measure_scale(pictures.upright(), found, room)
+            let found = proposal::average(&workspace.particles, &workspace.weights, best, radius);
+            self.measure_scale(views.rectified(), found, workspace)
         };
         self.frames_lost = if lost {
             self.frames_lost.saturating_add(1)
         } else {
             0
         };
-        let answer = self.reach.hold(in_picture(found));
+        let answer = self.bounds.clamp(to_original(found));
         let evidence = Evidence {
             scale: answer.scale,
             ..evidence
         };
-        let trusted = !lost && self.trust.judge(evidence.first, number, &self.params);
+        let trusted = !lost && self.update_gate.judge(evidence.first, number, &self.params);
         let (score, status) = self.usual.judge(&evidence, lost, trusted);
 
         // (C) What is to be remembered of it.
         self.answer = answer;
-        self.keep_particles(&room.particles, &room.weights);
+        self.keep_particles(&workspace.particles, &workspace.weights);
         if lost {
             // What is found again is looked for as it was first.
-            self.turn = 0.0;
+            self.orientation = 0.0;
         } else {
-            self.see(&room.arrival);
+            self.record_seen(&workspace.arrival);
         }
-        if trusted && self.believes(score, number) {
-            let turn = self.measure_turn(pictures.unturned(), &evidence, room);
+        if trusted && self.passes(score, number) {
+            let orientation = self.measure_orientation(views.original(), &evidence, workspace);
             self.answer = found;
-            self.learn(pictures.upright(), number, room);
-            (self.answer, self.turn) = (answer, turn);
+            self.learn(views.rectified(), number, workspace);
+            (self.answer, self.orientation) = (answer, orientation);
         }
-        pictures.give_back(&mut room.pictures);
+        views.give_back(&mut workspace.views);
         self.estimate = Estimate {
             frame: number,
             target: self.target_of(&answer),
@@ -105,24 +111,30 @@ impl State {
     fn propose(
         &self,
         seen: &GrayFrame,
-        sought: &Sought<'_>,
-        furthest: f64,
+        search: &SearchContext<'_>,
+        radius: f64,
         draws: &mut ChaCha8Rng,
-        room: &mut Comparison,
+        workspace: &mut Workspace,
     ) {
-        let (reach, params) = (&self.reach, &self.params);
+        let (bounds, params) = (&self.bounds, &self.params);
         match params.search {
             Search::Resampled => {
-                particles::propose(self, draws, &mut room.sums, &mut room.particles);
-                let particles = &room.particles;
-                room.view.open(seen, particles, furthest, reach, params);
+                particles::propose(self, draws, &mut workspace.sums, &mut workspace.particles);
+                let particles = &workspace.particles;
+                workspace
+                    .extractor
+                    .compute_channels(seen, particles, radius, bounds, params);
             }
             Search::Answer => {
                 let answer = [self.answer];
-                room.view.open(seen, &answer, furthest, reach, params);
-                room.scan.look(&mut room.view, sought, &self.discriminant);
-                sought.propose(room.scan.peaks(), draws, &mut room.particles);
-                room.scan.sift(sought, &mut room.particles);
+                workspace
+                    .extractor
+                    .compute_channels(seen, &answer, radius, bounds, params);
+                workspace
+                    .scan
+                    .look(&mut workspace.extractor, search, &self.discriminant);
+                search.propose(workspace.scan.maxima(), draws, &mut workspace.particles);
+                workspace.scan.prune(search, &mut workspace.particles);
             }
         }
     }
@@ -131,18 +143,18 @@ impl State {
     fn weigh(
         &self,
         seen: &GrayFrame,
-        sought: &Sought<'_>,
+        search: &SearchContext<'_>,
         draws: &mut ChaCha8Rng,
-        room: &mut Comparison,
+        workspace: &mut Workspace,
     ) -> usize {
-        room.extend(seen, 0, self);
-        let best = room.weigh(sought);
-        if sought.refined() == 0 {
+        workspace.extend(seen, 0, self);
+        let best = workspace.weigh(search);
+        if search.refined() == 0 {
             return best;
         }
-        let first = room.particles.len();
-        sought.refine(&room.weights, draws, &mut room.particles);
-        room.extend(seen, first, self);
-        room.weigh(sought)
+        let first = workspace.particles.len();
+        search.refine(&workspace.weights, draws, &mut workspace.particles);
+        workspace.extend(seen, first, self);
+        workspace.weigh(search)
     }
 }

@@ -27,8 +27,8 @@ impl Tracker {
         params.validate()?;
         let source = frame.source_size();
         state::check_target(source, &target)?;
-        Ok(workspace::with(|room| {
-            let state = State::new(frame, target, params, room);
+        Ok(workspace::with(|workspace| {
+            let state = State::new(frame, target, params, workspace);
             Self { state }
         }))
     }
@@ -39,7 +39,9 @@ impl Tracker {
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
         state::check_frame(self.state.source, frame)?;
-        Ok(workspace::with(|room| self.state.find(frame, room)))
+        Ok(workspace::with(|workspace| {
+            self.state.find(frame, workspace)
+        }))
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
@@ -50,7 +52,7 @@ impl Tracker {
     pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
         state::check_frame(self.state.source, frame)?;
         state::check_target(self.state.source, &target)?;
-        workspace::with(|room| self.state.retarget(frame, target, room));
+        workspace::with(|workspace| self.state.retarget(frame, target, workspace));
         Ok(self.state.estimate)
     }
 

@@ -6,36 +6,36 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use crate::tracker::motion::change_test::Arrival;
-use crate::tracker::motion::global_motion::Camera;
-use crate::tracker::features::centering::Centering;
-use crate::tracker::classifier::samples::Examples;
-use crate::tracker::motion::particles::Particle;
-use crate::tracker::weights::posterior::Posterior;
-use crate::tracker::image::warp::Rotation;
-use crate::tracker::classifier::dense_search::Scan;
+use crate::tracker::appearance::point_distance::PointDistance;
+use crate::tracker::classifier::dense_search::DenseSearch;
+use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::motion::proposal::Sought;
-use crate::tracker::appearance::point_distance::Solitary;
-use crate::tracker::state::State;
-use crate::tracker::confidence::update_gate::Trust;
-use crate::tracker::features::extractor::View;
+use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::evaluation::Evaluation;
-use crate::tracker::params::table::Features;
+use crate::tracker::features::centering::Centering;
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
-use crate::tracker::linalg::gemm;
-use crate::tracker::learn;
-use crate::tracker::weights::likelihood;
 use crate::tracker::image::frame_views;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::learn;
+use crate::tracker::linalg::gemm;
+use crate::tracker::motion::change_test::ChangeTest;
+use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::orientation;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::motion::proposal::SearchContext;
+use crate::tracker::params::table::Features;
+use crate::tracker::params::table::Params;
+use crate::tracker::state::State;
+use crate::tracker::weights::likelihood;
+use crate::tracker::weights::posterior::Posterior;
 
 /// P at most.
-const GREATEST_HISTORY: usize = 10;
+const MAX_HISTORY: usize = 10;
 
 /// What is taken off all vectors: where candidates stand alone, the mean of the background.
 fn offset(state: &State) -> &[f32] {
-    if state.params.candidate_alone {
+    if state.params.single_vector_candidate {
         state.background.mean()
     } else {
         &[]
@@ -45,7 +45,7 @@ fn offset(state: &State) -> &[f32] {
 /// Whether candidates go into the printed evaluation as they are cut: no other vector is made of them.
 fn is_printed(params: &Params) -> bool {
     params.features == Features::Gray
-        && !params.candidate_alone
+        && !params.single_vector_candidate
         && !params.unit_length
         && params.background_samples == 0
         && params.discriminant_weight <= 0.0
@@ -53,12 +53,12 @@ fn is_printed(params: &Params) -> bool {
 
 /// The particles of a frame, and all that is computed of them.
 #[derive(Debug, Default)]
-pub(crate) struct Comparison {
-    pub view: View,
+pub(crate) struct Workspace {
+    pub extractor: Extractor,
     /// For pictures that are turned.
-    turned_view: View,
+    rotated_view: Extractor,
     /// For the pictures in which the target is looked for, and the pixels of those that are turned further.
-    pub pictures: frame_views::Room,
+    pub views: frame_views::Scratch,
     tried_pixels: Vec<u8>,
     pub particles: Vec<Particle>,
     /// For sums of weights.
@@ -71,8 +71,8 @@ pub(crate) struct Comparison {
     /// Their squared lengths.
     squares: Vec<f32>,
     /// What the discriminant sees of them.
-    pub examples: Examples,
-    solitary: Solitary,
+    pub examples: TrainingSamples,
+    point_distance: PointDistance,
     whitened: Vec<f32>,
     products: Vec<f32>,
     evaluation: Option<(Params, Evaluation)>,
@@ -80,61 +80,62 @@ pub(crate) struct Comparison {
     distances: Vec<f64>,
     /// How the picture is turned that the particles are in, if it is, and where they are in the picture itself.
     pub rotation: Option<Rotation>,
-    in_picture: Vec<Particle>,
+    to_original: Vec<Particle>,
     /// The exponent of each particle that its place alone says.
     places: Vec<f64>,
     posterior: Posterior,
     /// The weights of all particles; they sum to 1.
     pub weights: Vec<f64>,
     /// For what is learned from a frame.
-    pub learning: learn::Room,
+    pub learning: learn::Scratch,
     /// For the profiles of a frame.
-    pub camera: Camera,
+    pub global_motion: GlobalMotion,
     /// For what has come to the places of particles.
-    pub arrival: Arrival,
+    pub arrival: ChangeTest,
     /// For the places that are looked at before particles are drawn.
-    pub scan: Scan,
+    pub scan: DenseSearch,
 }
 
 thread_local! {
-    static COMPARISON: RefCell<Comparison> = RefCell::default();
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
 }
 
 /// Runs `work` with this thread's comparison.
-pub(crate) fn with<T>(work: impl FnOnce(&mut Comparison) -> T) -> T {
-    COMPARISON.with_borrow_mut(work)
+pub(crate) fn with<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
+    WORKSPACE.with_borrow_mut(work)
 }
 
-/// Empties `room` and makes it large enough for `most`.
-pub(crate) fn empty<T>(room: &mut Vec<T>, most: usize) {
-    room.clear();
-    room.reserve(most);
+/// Empties `workspace` and makes it large enough for `most`.
+pub(crate) fn clear_and_reserve<T>(workspace: &mut Vec<T>, most: usize) {
+    workspace.clear();
+    workspace.reserve(most);
 }
 
-impl Comparison {
+impl Workspace {
     /// Forgets the last frame, takes the bag of `state`, and makes room for `most` particles, so that the first search for
     /// a lost target finds it too.
     pub fn begin(&mut self, state: &State, most: usize) {
         let params = &state.params;
         let most = most + orientation::tried(params);
         self.len = params.feature_len();
-        self.first = gemm::hold_aligned(&mut self.vectors, most * self.len);
+        self.first = gemm::reserve_aligned(&mut self.vectors, most * self.len);
         let entries = params.bag_size as usize;
-        empty(&mut self.particles, most);
-        empty(&mut self.squares, most);
-        empty(&mut self.distances, most * entries);
-        empty(&mut self.places, most);
-        empty(&mut self.in_picture, most);
+        clear_and_reserve(&mut self.particles, most);
+        clear_and_reserve(&mut self.squares, most);
+        clear_and_reserve(&mut self.distances, most * entries);
+        clear_and_reserve(&mut self.places, most);
+        clear_and_reserve(&mut self.to_original, most);
         if orientation::is_on(params) {
-            self.pictures.begin(&state.reach);
+            self.views.begin(&state.bounds);
         }
         self.posterior.begin(most, entries);
-        empty(&mut self.weights, most);
+        clear_and_reserve(&mut self.weights, most);
         let mean = offset(state);
         self.examples.begin(&state.discriminant, mean, most);
         self.learning.begin(most);
-        if state.params.candidate_alone {
-            self.solitary.set_state(state, self.examples.asks());
+        if state.params.single_vector_candidate {
+            self.point_distance
+                .set_state(state, self.examples.query_vectors());
             return;
         }
         let seed = state.params.seed;
@@ -192,8 +193,8 @@ impl Comparison {
             mean: offset(state),
             squares: &mut self.squares,
         });
-        self.view
-            .describe(frame, particles, &state.reach, params, vectors, centering);
+        self.extractor
+            .describe(frame, particles, &state.bounds, params, vectors, centering);
     }
 
     /// The distances and scores of a batch.
@@ -202,17 +203,17 @@ impl Comparison {
         let (first, range) = (batch.start, self.places(&batch));
         let vectors = &self.vectors[range.clone()];
         let squares = &self.squares[first..];
-        if params.candidate_alone {
-            self.solitary
+        if params.single_vector_candidate {
+            self.point_distance
                 .distances(vectors, squares, params, &mut self.distances);
             if state.discriminant.is_on() {
-                let asked = self.solitary.asked(squares.len());
-                self.examples.examine(asked, squares);
+                let query_products = self.point_distance.query_products(squares.len());
+                self.examples.push_scores(query_products, squares);
             }
             return;
         }
         if state.discriminant.is_on() {
-            self.examples.examine_alone(vectors);
+            self.examples.score_vectors(vectors);
         }
         self.extend_whitened(range, state);
     }
@@ -225,9 +226,9 @@ impl Comparison {
         let count = self.particles.len() - first;
         let candidates = &mut evaluation.candidates_mut()[..count * params.feature_len()];
         let particles = &self.particles[first..];
-        self.view
-            .cut(frame, particles, &state.reach, params, candidates);
-        let mut history = [&[][..]; GREATEST_HISTORY];
+        self.extractor
+            .cut(frame, particles, &state.bounds, params, candidates);
+        let mut history = [&[][..]; MAX_HISTORY];
         for (slice, vector) in history.iter_mut().zip(&state.history) {
             *slice = vector;
         }
@@ -258,7 +259,7 @@ impl Comparison {
         self.whitened.clear();
         self.whitened.extend(state.history.iter().flatten());
         whitening.apply(&mut self.whitened, len, unit_length, &mut self.products);
-        let mut history = [&[][..]; GREATEST_HISTORY];
+        let mut history = [&[][..]; MAX_HISTORY];
         for (slice, vector) in history.iter_mut().zip(self.whitened.chunks_exact(len)) {
             *slice = vector;
         }
@@ -267,33 +268,33 @@ impl Comparison {
     }
 
     /// What the places say of the particles that were not looked at before: their priors, and what has come there.
-    fn look_at_places(&mut self, sought: &Sought<'_>) {
+    fn look_at_places(&mut self, search: &SearchContext<'_>) {
         let known = self.places.len();
         let particles = &self.particles[known..];
-        self.places.extend(sought.priors(particles));
-        let weight = sought.params.arrival_weight;
+        self.places.extend(search.priors(particles));
+        let weight = search.params.static_penalty;
         if weight > 0.0 {
             let places = &mut self.places[known..];
             let mut particles = particles;
             if let Some(rotation) = &self.rotation {
-                self.in_picture.clear();
-                let moved = particles.iter().map(|place| rotation.in_picture(place));
-                self.in_picture.extend(moved);
-                particles = &self.in_picture;
+                self.to_original.clear();
+                let moved = particles.iter().map(|place| rotation.to_original(place));
+                self.to_original.extend(moved);
+                particles = &self.to_original;
             }
             self.arrival
-                .discount(particles, sought.reach, weight, places);
+                .discount(particles, search.bounds, weight, places);
         }
     }
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11), the prior of the place, the
     /// discriminant's score. Returns the most likely one (equation 12).
-    pub fn weigh(&mut self, sought: &Sought<'_>) -> usize {
-        self.look_at_places(sought);
+    pub fn weigh(&mut self, search: &SearchContext<'_>) -> usize {
+        self.look_at_places(search);
         let mut weights = std::mem::take(&mut self.weights);
         weights.clear();
         weights.extend_from_slice(&self.places);
-        self.weigh_from(0, sought.params, sought.params.sigma, &mut weights);
+        self.weigh_from(0, search.params, search.params.sigma, &mut weights);
         self.weights = weights;
         likelihood::arg_max(&self.weights)
     }
@@ -324,7 +325,7 @@ impl Comparison {
 
     /// Weighs what is at `place` in `frame` turned by each of `angles`, in radians: `weights` begin as the logarithms of their
     /// priors. The particles of the frame stay.
-    pub fn weigh_turned(
+    pub fn weigh_rotated(
         &mut self,
         frame: &GrayFrame,
         place: &Particle,
@@ -334,19 +335,20 @@ impl Comparison {
     ) {
         let first = self.particles.len();
         let entries = self.distances.len() / first;
-        let (reach, params) = (&state.reach, &state.params);
-        std::mem::swap(&mut self.view, &mut self.turned_view);
-        let window = View::window(&[*place], 0.0, reach, params);
+        let (bounds, params) = (&state.bounds, &state.params);
+        std::mem::swap(&mut self.extractor, &mut self.rotated_view);
+        let window = Extractor::window(&[*place], 0.0, bounds, params);
         for &angle in angles {
             let pixels = std::mem::take(&mut self.tried_pixels);
-            let turned = Rotation::about(place, angle).apply(frame, &window, pixels);
-            self.view.open(&turned, &[*place], 0.0, reach, params);
+            let rotated = Rotation::about(place, angle).apply(frame, &window, pixels);
+            self.extractor
+                .compute_channels(&rotated, &[*place], 0.0, bounds, params);
             let next = self.particles.len();
             self.particles.push(*place);
-            self.describe(&turned, next..next + 1, state);
-            self.tried_pixels = turned.into_pixels();
+            self.describe(&rotated, next..next + 1, state);
+            self.tried_pixels = rotated.into_pixels();
         }
-        std::mem::swap(&mut self.view, &mut self.turned_view);
+        std::mem::swap(&mut self.extractor, &mut self.rotated_view);
         self.compare(first..self.particles.len(), state);
         self.weigh_from(first, params, orientation::SOFTER * params.sigma, weights);
         self.particles.truncate(first);
@@ -356,12 +358,12 @@ impl Comparison {
     }
 
     /// What particle `index` says about itself.
-    pub fn evidence(&self, index: usize, trust: &Trust) -> Evidence {
+    pub fn evidence(&self, index: usize, update_gate: &UpdateGate) -> Evidence {
         let entries = self.distances.len() / self.particles.len();
         let distances = &self.distances[index * entries..][..entries];
         Evidence {
             first: distances[0],
-            lately: trust.usual,
+            lately: update_gate.usual,
             nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.examples.scores().get(index).copied(),
             scale: self.particles[index].scale,

@@ -4,28 +4,28 @@
 //! subspace one of three vectors: what a target does by tilting its head is in it from the first frame on, and is
 //! farther from no other look. The whole frame is turned, so the rim shows what would be there.
 
-use crate::tracker::motion::particles::Particle;
-use crate::tracker::image::warp::Rotation;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::params::table::Params;
 
 /// Most poses beside the look as it is.
 pub(crate) const MOST: usize = 2;
 
 /// By which angles, in radians, the look is turned; none where that is off.
 pub(crate) fn angles(params: &Params) -> impl Iterator<Item = f64> + use<> {
-    let angle = params.pose_angle.to_radians();
+    let angle = params.augmentation_angle.to_radians();
     [angle, -angle].into_iter().filter(|angle| *angle != 0.0)
 }
 
 /// `frame` turned by `angle` around the centre of `target`.
-pub(crate) fn turned(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFrame {
+pub(crate) fn rotated(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFrame {
     let everywhere = Rect::new(
         0.0,
         0.0,
-        frame.grain() * f64::from(frame.width()),
-        frame.grain() * f64::from(frame.height()),
+        frame.downsample() * f64::from(frame.width()),
+        frame.downsample() * f64::from(frame.height()),
     );
     Rotation::about(target, angle).apply(frame, &everywhere, Vec::new())
 }
@@ -49,13 +49,13 @@ mod tests {
     #[test]
     fn a_quarter_turn_takes_rows_to_columns_and_none_leaves_all() {
         let original = frame(|x, y| ((x * 7 + y * y * 3) % 251) as u8);
-        assert_eq!(turned(&original, &TARGET, 0.0), original);
-        let turn = turned(&original, &TARGET, std::f64::consts::FRAC_PI_2);
+        assert_eq!(rotated(&original, &TARGET, 0.0), original);
+        let orientation = rotated(&original, &TARGET, std::f64::consts::FRAC_PI_2);
         for (x, y) in [(40, 30), (20, 10), (59, 49), (39, 29)] {
             // About the point between the pixels 39 and 40 and the rows 29 and 30.
             let (from_x, from_y) = (69 - y, x - 10);
             let expected = original.pixels()[from_y * 80 + from_x];
-            assert_eq!(turn.pixels()[y * 80 + x], expected, "{x} {y}");
+            assert_eq!(orientation.pixels()[y * 80 + x], expected, "{x} {y}");
         }
     }
 
@@ -63,13 +63,13 @@ mod tests {
     fn a_turned_slope_is_the_slope_along_the_turned_axis() {
         let original = frame(|x, y| (x + 2 * y) as u8);
         let angle = 10_f64.to_radians();
-        let turn = turned(&original, &TARGET, angle);
+        let orientation = rotated(&original, &TARGET, angle);
         for (x, y) in [(30, 20), (40, 30), (50, 35)] {
             let (across, down) = (x as f64 + 0.5 - 40.0, y as f64 + 0.5 - 30.0);
             let from_x = 40.0 + angle.cos() * across - angle.sin() * down - 0.5;
             let from_y = 30.0 + angle.sin() * across + angle.cos() * down - 0.5;
             let expected = from_x + 2.0 * from_y;
-            let found = f64::from(turn.pixels()[y * 80 + x]);
+            let found = f64::from(orientation.pixels()[y * 80 + x]);
             assert!((found - expected).abs() <= 0.51, "{found} {expected}");
         }
     }

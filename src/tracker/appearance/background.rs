@@ -15,18 +15,18 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::params::table::Params;
-use crate::tracker::features::quantized::Look;
 use crate::tracker::appearance::mahalanobis::{self, Metric};
-use crate::tracker::motion::particles::{Particle, Reach};
 use crate::tracker::appearance::whitening::Whitening;
+use crate::tracker::features::quantized::QuantizedVector;
+use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::params::table::Params;
 
 /// Areas are off by more than this share of the box along x or y: nearer ones show mostly the target.
 const INNER: f64 = 0.3;
 /// Areas are off by at most this multiple of the box along x and y.
 const OUTER: f64 = 1.5;
 /// The box counts as at least this long on a side, in working pixels, so that areas beside a tiny target differ.
-const LEAST_SIDE: f64 = 16.0;
+const MIN_SIDE: f64 = 16.0;
 /// The share of the samples that a refresh replaces.
 const RENEWED: f64 = 0.2;
 
@@ -34,7 +34,7 @@ const RENEWED: f64 = 0.2;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Background {
     /// Oldest first.
-    samples: VecDeque<Look>,
+    samples: VecDeque<QuantizedVector>,
     #[serde(skip)]
     mean: Vec<f32>,
     /// Where candidates stand alone.
@@ -47,16 +47,16 @@ pub(crate) struct Background {
 
 /// Room for learning from samples.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
+pub(crate) struct Scratch {
     vectors: Vec<f32>,
-    metric: mahalanobis::Room,
+    metric: mahalanobis::Scratch,
 }
 
 /// [`Background::learn`], to be compiled for the instructions that this machine has.
 struct Learn<'a> {
     background: &'a mut Background,
     params: &'a Params,
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 impl WithSimd for Learn<'_> {
@@ -64,7 +64,7 @@ impl WithSimd for Learn<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.background.learn_all(self.params, self.room);
+        self.background.learn_all(self.params, self.scratch);
     }
 }
 
@@ -82,7 +82,7 @@ impl Background {
     }
 
     /// Takes new samples, vectors of length D one after the other; the oldest leave.
-    pub fn renew(&mut self, vectors: &[f32], params: &Params, room: &mut Room) {
+    pub fn rebuild(&mut self, vectors: &[f32], params: &Params, scratch: &mut Scratch) {
         for vector in vectors.chunks_exact(params.feature_len()) {
             let full = self.samples.len() >= params.background_samples as usize;
             let oldest = if full { self.samples.pop_front() } else { None };
@@ -90,20 +90,20 @@ impl Background {
             look.keep(vector);
             self.samples.push_back(look);
         }
-        self.learn(params, room);
+        self.learn(params, scratch);
     }
 
     /// Learns what follows from the samples.
-    pub fn learn(&mut self, params: &Params, room: &mut Room) {
+    pub fn learn(&mut self, params: &Params, scratch: &mut Scratch) {
         Arch::new().dispatch(Learn {
             background: self,
             params,
-            room,
+            scratch,
         });
     }
 
     #[inline(always)]
-    fn learn_all(&mut self, params: &Params, room: &mut Room) {
+    fn learn_all(&mut self, params: &Params, scratch: &mut Scratch) {
         let len = params.feature_len();
         let count = self.samples.len();
         self.mean.clear();
@@ -114,13 +114,13 @@ impl Background {
         for look in &self.samples {
             look.add_to(&mut self.mean, 1.0 / count as f32);
         }
-        self.samples_into(&mut room.vectors);
+        self.samples_into(&mut scratch.vectors);
         let ridge = params.background_ridge;
-        if params.candidate_alone {
+        if params.single_vector_candidate {
             self.metric
-                .become_of(&room.vectors, len, ridge, &mut room.metric);
+                .fit(&scratch.vectors, len, ridge, &mut scratch.metric);
         } else {
-            self.whitening = Whitening::of(&self.mean, &room.vectors, ridge);
+            self.whitening = Whitening::of(&self.mean, &scratch.vectors, ridge);
         }
     }
 
@@ -169,25 +169,25 @@ impl Background {
     }
 
     /// Whether the samples may be those of a tracker with `params`.
-    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
+    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
         self.samples.len() == params.background_samples as usize
             && self
                 .samples
                 .iter()
-                .all(|look| look.is_sound(params.feature_len(), greatest))
+                .all(|look| look.is_valid_for(params.feature_len(), greatest))
     }
 }
 
 /// Draws `count` areas beside the target into `out`, as far as they can be had inside the frame.
 pub(crate) fn areas(
     target: &Particle,
-    reach: &Reach,
+    bounds: &StateBounds,
     count: usize,
     generator: &mut ChaCha8Rng,
     out: &mut Vec<Particle>,
 ) {
-    let width = (reach.box_width * target.scale).max(LEAST_SIDE);
-    let height = (reach.box_height * target.scale).max(LEAST_SIDE);
+    let width = (bounds.box_width * target.scale).max(MIN_SIDE);
+    let height = (bounds.box_height * target.scale).max(MIN_SIDE);
     let draw = |generator: &mut ChaCha8Rng| loop {
         let across = generator.random_range(-OUTER..OUTER);
         let down = generator.random_range(-OUTER..OUTER);
@@ -197,7 +197,8 @@ pub(crate) fn areas(
         }
     };
     let inside = |area: &Particle| {
-        (0.0..=reach.frame_width).contains(&area.x) && (0.0..=reach.frame_height).contains(&area.y)
+        (0.0..=bounds.frame_width).contains(&area.x)
+            && (0.0..=bounds.frame_height).contains(&area.y)
     };
     // A target that fills the frame has nothing beside it that is inside.
     let tries = 20;
@@ -216,9 +217,9 @@ pub(crate) fn areas(
 }
 
 /// How far [`areas`] are from the target's centre at most, in working pixels.
-pub(crate) fn furthest(target: &Particle, reach: &Reach) -> f64 {
-    let longer = reach.box_width.max(reach.box_height) * target.scale;
-    OUTER * longer.max(LEAST_SIDE)
+pub(crate) fn radius(target: &Particle, bounds: &StateBounds) -> f64 {
+    let longer = bounds.box_width.max(bounds.box_height) * target.scale;
+    OUTER * longer.max(MIN_SIDE)
 }
 
 #[cfg(test)]
@@ -235,10 +236,10 @@ mod tests {
             background_samples: 3,
             ..Preset::Robust.params()
         };
-        let (mut background, mut room) = (Background::default(), Room::default());
+        let (mut background, mut scratch) = (Background::default(), Scratch::default());
         for (first, last, mean) in [(0, 3, 1.0), (3, 4, 2.0), (4, 6, 4.0)] {
             let vectors: Vec<f32> = (first..last).flat_map(|i| [i as f32; 16]).collect();
-            background.renew(&vectors, &params, &mut room);
+            background.rebuild(&vectors, &params, &mut scratch);
             assert_eq!(background.samples.len(), 3);
             assert!(
                 background

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::appearance::background::Background;
-use crate::tracker::appearance::span::{self, Combination};
-use crate::tracker::linalg::jacobi::Spectrum;
-use crate::tracker::features::quantized::Look;
 use crate::tracker::appearance::augmentation;
+use crate::tracker::appearance::background::Background;
+use crate::tracker::appearance::span::{self, Span};
 use crate::tracker::appearance::subspace::AffineSubspace;
+use crate::tracker::features::quantized::QuantizedVector;
+use crate::tracker::linalg::jacobi::Spectrum;
 use crate::tracker::params::table::Params;
 
 /// One affine subspace of the bag.
@@ -19,10 +19,10 @@ pub(crate) struct Entry {
     pub subspace: AffineSubspace,
     /// What it was made of: kept where candidates stand alone, and while there is a background, with whose every change
     /// it is made anew.
-    looks: Vec<Look>,
+    templates: Vec<QuantizedVector>,
     /// The subspace as combinations of the looks, where candidates stand alone.
     #[serde(skip)]
-    combination: Combination,
+    combination: Span,
 }
 
 /// Up to K affine subspaces, oldest first.
@@ -33,65 +33,65 @@ pub(crate) struct Bag {
 
 /// Room for making entries.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
-    combination: span::Room,
+pub(crate) struct Scratch {
+    combination: span::Scratch,
     vectors: Vec<f32>,
     products: Vec<f32>,
     spectrum: Spectrum,
 }
 
 impl Entry {
-    /// Becomes the subspace of feature vectors, of length D one after the other. `room` has taken the background.
-    fn become_of(
+    /// Becomes the subspace of feature vectors, of length D one after the other. `scratch` has taken the background.
+    fn fit(
         &mut self,
         features: &[f32],
         background: &Background,
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
         let vectors = features.chunks_exact(params.feature_len());
-        let count = if params.keeps_looks() {
+        let count = if params.keeps_templates() {
             vectors.len()
         } else {
             0
         };
-        self.looks.resize_with(count, Look::default);
-        for (look, vector) in self.looks.iter_mut().zip(vectors) {
+        self.templates.resize_with(count, QuantizedVector::default);
+        for (look, vector) in self.templates.iter_mut().zip(vectors) {
             look.keep(vector);
         }
-        if params.candidate_alone {
-            self.renew(background, params, room);
+        if params.single_vector_candidate {
+            self.rebuild(background, params, scratch);
         } else {
-            room.vectors.clear();
-            room.vectors.extend_from_slice(features);
-            self.whiten(background, params, room);
+            scratch.vectors.clear();
+            scratch.vectors.extend_from_slice(features);
+            self.whiten(background, params, scratch);
         }
     }
 
     /// Makes the subspace of the looks.
-    fn renew(&mut self, background: &Background, params: &Params, room: &mut Room) {
-        if params.candidate_alone {
-            let room = &mut room.combination;
+    fn rebuild(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
+        if params.single_vector_candidate {
+            let scratch = &mut scratch.combination;
             self.combination
-                .become_of(&self.looks, background, params, room);
+                .fit(&self.templates, background, params, scratch);
             return;
         }
         let len = params.feature_len();
-        room.vectors.clear();
-        room.vectors.resize(self.looks.len() * len, 0.0);
-        let vectors = room.vectors.chunks_exact_mut(len);
-        for (look, vector) in self.looks.iter().zip(vectors) {
+        scratch.vectors.clear();
+        scratch.vectors.resize(self.templates.len() * len, 0.0);
+        let vectors = scratch.vectors.chunks_exact_mut(len);
+        for (look, vector) in self.templates.iter().zip(vectors) {
             look.add_to(vector, 1.0);
         }
-        self.whiten(background, params, room);
+        self.whiten(background, params, scratch);
     }
 
-    /// Makes the subspace of the vectors in `room`.
-    fn whiten(&mut self, background: &Background, params: &Params, room: &mut Room) {
+    /// Makes the subspace of the vectors in `scratch`.
+    fn whiten(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
         let len = params.feature_len();
-        let Room {
+        let Scratch {
             vectors, products, ..
-        } = room;
+        } = scratch;
         background
             .whitening()
             .apply(vectors, len, params.unit_length, products);
@@ -103,25 +103,28 @@ impl Entry {
         }
         let basis_dim = params.basis_dim as usize;
         self.subspace
-            .become_of(&slices[..count], basis_dim, &mut room.spectrum);
+            .fit(&slices[..count], basis_dim, &mut scratch.spectrum);
     }
 
     /// Whether this may be an entry of a tracker with `params`, but for its subspace.
-    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
-        let counts = if params.keeps_looks() {
+    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
+        let counts = if params.keeps_templates() {
             1..=(params.history as usize).max(augmentation::MOST) + 1
         } else {
             0..=0
         };
         let len = params.feature_len();
-        counts.contains(&self.looks.len())
-            && self.looks.iter().all(|look| look.is_sound(len, greatest))
+        counts.contains(&self.templates.len())
+            && self
+                .templates
+                .iter()
+                .all(|look| look.is_valid_for(len, greatest))
     }
 
     /// The subspace as combinations, and of what: where candidates stand alone.
     #[inline(always)]
-    pub fn combination(&self) -> (&Combination, &[Look]) {
-        (&self.combination, &self.looks)
+    pub fn combination(&self) -> (&Span, &[QuantizedVector]) {
+        (&self.combination, &self.templates)
     }
 }
 
@@ -138,7 +141,7 @@ impl Bag {
         features: &[f32],
         background: &Background,
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
         // The one that leaves has the room that the latest needs.
         let mut latest = Entry::default();
@@ -146,44 +149,44 @@ impl Bag {
             let leaves = self.entries.remove(params.pinned as usize);
             latest = leaves.expect("fewer entries are pinned than the bag has");
         }
-        room.combination.take(background);
-        latest.become_of(features, background, params, room);
+        scratch.combination.take(background);
+        latest.fit(features, background, params, scratch);
         self.entries.push_back(latest);
     }
 
     /// Takes the subspace of a look that the user pointed at, as [`admit`](Self::admit) does. Where such looks are pinned
     /// it is the first of them from now on; the oldest of those is an ordinary one then.
-    pub fn point(
+    pub fn admit_pinned(
         &mut self,
         features: &[f32],
         background: &Background,
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
-        self.admit(features, background, params, room);
+        self.admit(features, background, params, scratch);
         if params.pinned > 0 {
             self.entries.rotate_right(1);
         }
     }
 
     /// Makes all subspaces anew where there is a background: the metric has changed.
-    pub fn renew(&mut self, background: &Background, params: &Params, room: &mut Room) {
+    pub fn rebuild(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
         if params.background_samples > 0 {
-            self.renew_all(background, params, room);
+            self.rebuild_all(background, params, scratch);
         }
     }
 
     /// Makes what a snapshot does not carry: combinations, which are those that the session had.
-    pub fn restore(&mut self, background: &Background, params: &Params, room: &mut Room) {
-        if params.candidate_alone {
-            self.renew_all(background, params, room);
+    pub fn restore(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
+        if params.single_vector_candidate {
+            self.rebuild_all(background, params, scratch);
         }
     }
 
-    fn renew_all(&mut self, background: &Background, params: &Params, room: &mut Room) {
-        room.combination.take(background);
+    fn rebuild_all(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
+        scratch.combination.take(background);
         for entry in &mut self.entries {
-            entry.renew(background, params, room);
+            entry.rebuild(background, params, scratch);
         }
     }
 

@@ -23,7 +23,7 @@ pub(crate) struct Metric {
 
 /// Room for making a metric.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
+pub(crate) struct Scratch {
     products: Vec<f32>,
     /// Lᵀ, upper triangular, row by row.
     factor: Vec<f64>,
@@ -34,12 +34,12 @@ impl Metric {
     /// Becomes the metric of centred `samples` of length `len`; `ridge` is a multiple of the covariance's mean
     /// eigenvalue.
     #[inline(always)]
-    pub fn become_of(&mut self, samples: &[f32], len: usize, ridge: f64, room: &mut Room) {
+    pub fn fit(&mut self, samples: &[f32], len: usize, ridge: f64, scratch: &mut Scratch) {
         let count = samples.len() / len;
         self.count = count;
-        room.products.resize(count * count, 0.0);
-        gemm::inner_products(samples, samples, len, count, &mut room.products);
-        let trace = (0..count).map(|i| f64::from(room.products[i * count + i]));
+        scratch.products.resize(count * count, 0.0);
+        gemm::inner_products(samples, samples, len, count, &mut scratch.products);
+        let trace = (0..count).map(|i| f64::from(scratch.products[i * count + i]));
         let ridge = ridge * trace.sum::<f64>() / len as f64;
         self.inverse.clear();
         self.inverse.resize(count * count, 0.0);
@@ -47,17 +47,18 @@ impl Metric {
         if ridge.is_nan() || ridge <= 1e-20 {
             return;
         }
-        room.factor.clear();
-        room.factor
-            .extend(room.products.iter().map(|&product| f64::from(product)));
+        scratch.factor.clear();
+        scratch
+            .factor
+            .extend(scratch.products.iter().map(|&product| f64::from(product)));
         for i in 0..count {
-            room.factor[i * count + i] += ridge;
+            scratch.factor[i * count + i] += ridge;
         }
-        factorize(&mut room.factor, count, ridge);
-        room.inverse.clear();
-        room.inverse.resize(count * count, 0.0);
-        invert(&room.factor, count, &mut room.inverse);
-        for (value, exact) in self.inverse.iter_mut().zip(&room.inverse) {
+        factorize(&mut scratch.factor, count, ridge);
+        scratch.inverse.clear();
+        scratch.inverse.resize(count * count, 0.0);
+        invert(&scratch.factor, count, &mut scratch.inverse);
+        for (value, exact) in self.inverse.iter_mut().zip(&scratch.inverse) {
             *value = *exact as f32;
         }
     }
@@ -74,7 +75,7 @@ impl Metric {
 
     /// The shadow of a vector, of length n, from its inner products with the samples.
     #[inline(always)]
-    pub fn shadow(&self, products: &[f32], out: &mut [f32]) {
+    pub fn background_coordinates_of(&self, products: &[f32], out: &mut [f32]) {
         let rows = self.inverse.chunks_exact(self.count.max(1));
         for (value, row) in out.iter_mut().zip(rows) {
             *value = vector_ops::dot(row, products);
@@ -148,7 +149,7 @@ mod tests {
                 }
             }
             let mut metric = Metric::default();
-            metric.become_of(&samples, len, ridge, &mut Room::default());
+            metric.fit(&samples, len, ridge, &mut Scratch::default());
 
             let centered = DMatrix::from_fn(len, count, |i, j| columns[(i, j)] - mean[i]);
             let covariance = &centered * centered.transpose() / count as f64;
@@ -160,16 +161,17 @@ mod tests {
                 * eigen.eigenvectors.transpose();
 
             let given = vectors(2, len, 2);
-            let shadow = |vector: &[f32]| {
+            let background_coordinates_of = |vector: &[f32]| {
                 let mut products = vec![0.0; count];
                 gemm::inner_products(vector, &samples, len, count, &mut products);
-                let mut shadow = vec![0.0; count];
-                metric.shadow(&products, &mut shadow);
-                shadow
+                let mut background_coordinates_of = vec![0.0; count];
+                metric.background_coordinates_of(&products, &mut background_coordinates_of);
+                background_coordinates_of
             };
             for (x, y) in [(0, 1), (0, 0), (1, 1)] {
                 let (x, y) = (&given[x * len..][..len], &given[y * len..][..len]);
-                let found = vector_ops::dot(x, y) - vector_ops::dot(&shadow(x), &shadow(y));
+                let found = vector_ops::dot(x, y)
+                    - vector_ops::dot(&background_coordinates_of(x), &background_coordinates_of(y));
                 let whitened = |x: &[f32]| &whitening * DVector::from_column_slice(x).cast::<f64>();
                 let expected = whitened(x).dot(&whitened(y));
                 assert!(
@@ -185,12 +187,17 @@ mod tests {
         for value in [0.0, 1e-30, 1e-12, 1e-6] {
             let samples: Vec<f32> = vectors(9, 16, 3).iter().map(|v| v * value).collect();
             let mut metric = Metric::default();
-            metric.become_of(&samples, 16, 1.0, &mut Room::default());
+            metric.fit(&samples, 16, 1.0, &mut Scratch::default());
             let mut products = vec![0.0; 9];
             gemm::inner_products(&vectors(1, 16, 4), &samples, 16, 9, &mut products);
-            let mut shadow = vec![0.0; 9];
-            metric.shadow(&products, &mut shadow);
-            assert!(shadow.iter().all(|value| value.is_finite()), "{value}");
+            let mut background_coordinates_of = vec![0.0; 9];
+            metric.background_coordinates_of(&products, &mut background_coordinates_of);
+            assert!(
+                background_coordinates_of
+                    .iter()
+                    .all(|value| value.is_finite()),
+                "{value}"
+            );
         }
     }
 }

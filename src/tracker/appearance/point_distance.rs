@@ -10,47 +10,47 @@ use std::f64::consts::PI;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::tracker::appearance::span::MIN_REMAINDER;
 use crate::tracker::linalg::acos::{LANES, squared_angles};
-use crate::tracker::appearance::span::LEAST_LEFT;
-use crate::tracker::state::State;
-use crate::tracker::params::table::Params;
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::vector_ops;
+use crate::tracker::params::table::Params;
+use crate::tracker::state::State;
 
 /// Candidates are worked on in groups of this many.
 const GROUP: usize = 32;
 
 /// What candidates are multiplied with, and the products.
 #[derive(Debug, Default)]
-pub(crate) struct Solitary {
+pub(crate) struct PointDistance {
     /// The samples; for each entry of the bag its mean, then its basis vectors; what the discriminant asks for.
     vectors: Vec<f32>,
     /// Where the first of them begins, and how many values they have.
     first: usize,
     len: usize,
     /// The looks of an entry.
-    looks: Vec<f32>,
+    templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
     samples: usize,
     inverse: Vec<f32>,
     /// ‖μₖ‖² and the number of basis vectors of each entry.
     entries: Vec<(f64, usize)>,
     /// For each mean and basis vector its shadow.
-    shadows: Vec<f32>,
+    background_coordinates: Vec<f32>,
     /// For each of `vectors` its products with all candidates; then, for the entries, under the metric.
     products: Vec<f32>,
     /// For each sample a component of all candidates' shadows.
-    candidate_shadows: Vec<f32>,
+    candidate_coordinates: Vec<f32>,
     /// Of each candidate the factor that brings it to its length, and the squared length it has then.
     scales: Vec<f32>,
     norms: Vec<f32>,
 }
 
-/// [`Solitary::set_state`], to be compiled for the instructions that this machine has.
+/// [`PointDistance::set_state`], to be compiled for the instructions that this machine has.
 struct SetState<'a> {
-    solitary: &'a mut Solitary,
+    point_distance: &'a mut PointDistance,
     state: &'a State,
-    asked: [&'a [f32]; 2],
+    query_products: [&'a [f32]; 2],
 }
 
 impl WithSimd for SetState<'_> {
@@ -58,13 +58,14 @@ impl WithSimd for SetState<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        self.solitary.set_all(simd, self.state, self.asked);
+        self.point_distance
+            .set_all(simd, self.state, self.query_products);
     }
 }
 
-/// [`Solitary::distances`], to be compiled for the instructions that this machine has.
+/// [`PointDistance::distances`], to be compiled for the instructions that this machine has.
 struct Distances<'a> {
-    solitary: &'a mut Solitary,
+    point_distance: &'a mut PointDistance,
     candidates: &'a [f32],
     squares: &'a [f32],
     params: &'a Params,
@@ -78,25 +79,27 @@ impl WithSimd for Distances<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let stride = self.squares.len().next_multiple_of(GROUP);
         let len = self.params.feature_len();
-        self.solitary.multiply(simd, self.candidates, len, stride);
-        self.solitary.measure(self.squares, stride, self.params);
-        self.solitary
+        self.point_distance
+            .multiply(simd, self.candidates, len, stride);
+        self.point_distance
+            .measure(self.squares, stride, self.params);
+        self.point_distance
             .compare(self.squares.len(), stride, self.params, self.out);
     }
 }
 
-impl Solitary {
+impl PointDistance {
     /// Takes the bag and the metric of `state`, and two vectors whose products are asked for as well.
-    pub fn set_state(&mut self, state: &State, asked: [&[f32]; 2]) {
+    pub fn set_state(&mut self, state: &State, query_products: [&[f32]; 2]) {
         Arch::new().dispatch(SetState {
-            solitary: self,
+            point_distance: self,
             state,
-            asked,
+            query_products,
         });
     }
 
     #[inline(always)]
-    fn set_all<S: Simd>(&mut self, simd: S, state: &State, asked: [&[f32]; 2]) {
+    fn set_all<S: Simd>(&mut self, simd: S, state: &State, query_products: [&[f32]; 2]) {
         let background = &state.background;
         let len = state.params.feature_len();
         self.samples = background.metric().count();
@@ -107,21 +110,22 @@ impl Solitary {
         let entries = state.bag.entries();
         self.entries
             .extend(entries.iter().map(|entry| entry.combination().0.size()));
-        self.len = (self.samples + self.templates() + asked.len()) * len;
-        self.first = gemm::hold_aligned(&mut self.vectors, self.len);
+        self.len = (self.samples + self.templates() + query_products.len()) * len;
+        self.first = gemm::reserve_aligned(&mut self.vectors, self.len);
         let vectors = &mut self.vectors[self.first..][..self.len];
         let (samples, mut rest) = vectors.split_at_mut(self.samples * len);
         background.write_samples(samples);
-        self.shadows.clear();
+        self.background_coordinates.clear();
         for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
-            let (combination, looks) = entry.combination();
+            let (combination, templates) = entry.combination();
             let (vectors, others) = rest.split_at_mut((1 + dim) * len);
-            combination.write_to(simd, looks, background, &mut self.looks, vectors);
-            self.shadows.extend_from_slice(combination.shadows());
+            combination.write_to(simd, templates, background, &mut self.templates, vectors);
+            self.background_coordinates
+                .extend_from_slice(combination.background_coordinates());
             rest = others;
         }
-        for (vector, asked) in rest.chunks_exact_mut(len).zip(asked) {
-            vector[..asked.len()].copy_from_slice(asked);
+        for (vector, query_products) in rest.chunks_exact_mut(len).zip(query_products) {
+            vector[..query_products.len()].copy_from_slice(query_products);
         }
     }
 
@@ -135,7 +139,7 @@ impl Solitary {
         out: &mut Vec<f64>,
     ) {
         Arch::new().dispatch(Distances {
-            solitary: self,
+            point_distance: self,
             candidates,
             squares,
             params,
@@ -144,7 +148,7 @@ impl Solitary {
     }
 
     /// The products of the last candidates with the vectors that were asked for.
-    pub fn asked(&self, count: usize) -> [&[f32]; 2] {
+    pub fn query_products(&self, count: usize) -> [&[f32]; 2] {
         let stride = count.next_multiple_of(GROUP);
         let rows = self.products.len() / stride;
         [rows - 2, rows - 1].map(|row| &self.products[row * stride..][..count])
@@ -166,11 +170,24 @@ impl Solitary {
         products.resize(self.len / len * stride, 0.0);
         gemm::multiply(simd, vectors, candidates, len, stride, products);
         let (of_samples, rest) = products.split_at_mut(samples * stride);
-        let shadows = &mut self.candidate_shadows;
-        shadows.resize(samples * stride, 0.0);
-        vector_ops::become_triangular(simd, shadows, &self.inverse, of_samples, stride);
+        let background_coordinates = &mut self.candidate_coordinates;
+        background_coordinates.resize(samples * stride, 0.0);
+        vector_ops::become_triangular(
+            simd,
+            background_coordinates,
+            &self.inverse,
+            of_samples,
+            stride,
+        );
         let of_templates = &mut rest[..templates * stride];
-        vector_ops::combine(simd, of_templates, -1.0, &self.shadows, shadows, stride);
+        vector_ops::combine(
+            simd,
+            of_templates,
+            -1.0,
+            &self.background_coordinates,
+            background_coordinates,
+            stride,
+        );
     }
 
     /// Lengths under the metric, from those without.
@@ -179,7 +196,7 @@ impl Solitary {
         self.norms.clear();
         self.norms.extend_from_slice(squares);
         self.norms.resize(stride, 0.0);
-        for row in self.candidate_shadows.chunks_exact(stride) {
+        for row in self.candidate_coordinates.chunks_exact(stride) {
             for (norm, component) in self.norms.iter_mut().zip(row) {
                 *norm -= component * component;
             }
@@ -188,7 +205,7 @@ impl Solitary {
         self.scales.resize(stride, 1.0);
         let squares = squares.iter().chain(std::iter::repeat(&0.0));
         for ((norm, scale), square) in self.norms.iter_mut().zip(&mut self.scales).zip(squares) {
-            let is_left = *norm > square * LEAST_LEFT;
+            let is_left = *norm > square * MIN_REMAINDER;
             if !is_left {
                 // Nothing but rounding: as if it were the mean background.
                 (*norm, *scale) = (0.0, 0.0);
@@ -246,13 +263,13 @@ impl Solitary {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::tracker::appearance::background;
     use crate::tracker::appearance::bag;
-    use super::*;
-    use crate::tracker::params::table::Features;
     use crate::tracker::image::frame::GrayFrame;
-    use crate::tracker::params::presets::Preset;
     use crate::tracker::image::rect::Rect;
+    use crate::tracker::params::presets::Preset;
+    use crate::tracker::params::table::Features;
     use crate::tracker::tracker::Tracker;
     use nalgebra::{DMatrix, DVector};
 
@@ -270,7 +287,7 @@ mod tests {
     fn kept(vectors: &[f32]) -> DMatrix<f64> {
         let mut out = vec![0.0; vectors.len()];
         for (vector, out) in vectors.chunks(20).zip(out.chunks_mut(20)) {
-            let mut look = crate::tracker::features::quantized::Look::default();
+            let mut look = crate::tracker::features::quantized::QuantizedVector::default();
             look.keep(vector);
             look.add_to(out, 1.0);
         }
@@ -304,28 +321,33 @@ mod tests {
             state.background = background::Background::default();
             state
                 .background
-                .renew(&samples, &params, &mut background::Room::default());
-            let looks = [vectors(5, 2), vectors(4, 3)];
+                .rebuild(&samples, &params, &mut background::Scratch::default());
+            let templates = [vectors(5, 2), vectors(4, 3)];
             state.bag = bag::Bag::default();
-            let mut room = bag::Room::default();
-            for looks in &looks {
+            let mut scratch = bag::Scratch::default();
+            for templates in &templates {
                 state
                     .bag
-                    .admit(looks, &state.background, &params, &mut room);
+                    .admit(templates, &state.background, &params, &mut scratch);
             }
             let mut candidates = vectors(3, 4);
             let given = columns(&candidates);
             for candidate in candidates.chunks_exact_mut(20) {
                 vector_ops::add(candidate, -1.0, state.background.mean());
             }
-            let squares: Vec<f32> = candidates.chunks(20).map(|c| vector_ops::dot(c, c)).collect();
-            let mut solitary = Solitary::default();
-            let asked = [vectors(1, 5), vectors(1, 6)];
-            solitary.set_state(&state, [&asked[0], &asked[1]]);
+            let squares: Vec<f32> = candidates
+                .chunks(20)
+                .map(|c| vector_ops::dot(c, c))
+                .collect();
+            let mut point_distance = PointDistance::default();
+            let query_products = [vectors(1, 5), vectors(1, 6)];
+            point_distance.set_state(&state, [&query_products[0], &query_products[1]]);
             let mut found = vec![7.0];
-            solitary.distances(&candidates, &squares, &params, &mut found);
-            for (asked, found) in asked.iter().zip(solitary.asked(3)) {
-                let expected = columns(&candidates).transpose() * columns(asked);
+            point_distance.distances(&candidates, &squares, &params, &mut found);
+            for (query_products, found) in
+                query_products.iter().zip(point_distance.query_products(3))
+            {
+                let expected = columns(&candidates).transpose() * columns(query_products);
                 assert!((expected[2] - f64::from(found[2])).abs() < 1e-4);
             }
 
@@ -361,11 +383,15 @@ mod tests {
             };
             let candidates = compared(given);
             for (i, candidate) in candidates.column_iter().enumerate() {
-                for (k, looks) in looks.iter().enumerate() {
-                    let v = compared(kept(looks));
+                for (k, templates) in templates.iter().enumerate() {
+                    let v = compared(kept(templates));
                     let origin = (candidate - &v.column_mean()).norm_squared() * params.gamma();
                     let svd = v.svd(true, false);
-                    let basis = svd.u.expect("asked for").columns(0, 3).into_owned();
+                    let basis = svd
+                        .u
+                        .expect("query_products for")
+                        .columns(0, 3)
+                        .into_owned();
                     let cosine = (basis.transpose() * candidate).norm() / candidate.norm();
                     let geodesic = 4.0 / (PI * PI) * cosine.min(1.0).acos().powi(2);
                     let expected = 0.3 * origin + 0.7 * geodesic;

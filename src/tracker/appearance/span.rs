@@ -8,46 +8,46 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::background::Background;
-use crate::tracker::linalg::jacobi::Spectrum;
-use crate::tracker::features::quantized::Look;
-use crate::tracker::params::table::Params;
-use crate::tracker::linalg::gemm;
-use crate::tracker::linalg::vector_ops;
 use crate::tracker::appearance::subspace;
+use crate::tracker::features::quantized::QuantizedVector;
+use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::jacobi::Spectrum;
+use crate::tracker::linalg::vector_ops;
+use crate::tracker::params::table::Params;
 
 /// What is left of a squared length below this share of it is rounding.
-pub(crate) const LEAST_LEFT: f32 = 1e-6;
+pub(crate) const MIN_REMAINDER: f32 = 1e-6;
 
 /// The mean, then the basis vectors, of an affine subspace.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Combination {
+pub(crate) struct Span {
     /// ‖μ‖².
     norm: f64,
     /// For the mean and for each basis vector, the coefficients of the looks.
     coefficients: Vec<f32>,
     /// For each of them its shadow.
-    shadows: Vec<f32>,
+    background_coordinates: Vec<f32>,
     /// The number of basis vectors.
     dim: usize,
 }
 
 /// Room for making combinations.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
+pub(crate) struct Scratch {
     /// The background's samples, with their mean taken off.
     samples: Vec<f32>,
     /// The looks, with that mean taken off.
     vectors: Vec<f32>,
     products: Vec<f32>,
-    shadows: Vec<f32>,
+    background_coordinates: Vec<f32>,
     gram: Vec<f32>,
     scales: Vec<f32>,
     spectrum: Spectrum,
 }
 
-/// [`Room::take`], to be compiled for the instructions that this machine has.
+/// [`Scratch::take`], to be compiled for the instructions that this machine has.
 struct Take<'a> {
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
     background: &'a Background,
 }
 
@@ -56,131 +56,144 @@ impl WithSimd for Take<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.background.samples_into(&mut self.room.samples);
+        self.background.samples_into(&mut self.scratch.samples);
     }
 }
 
-/// [`Combination::become_of`], to be compiled for the instructions that this machine has.
-struct BecomeOf<'a> {
-    combination: &'a mut Combination,
-    looks: &'a [Look],
+/// [`Span::fit`], to be compiled for the instructions that this machine has.
+struct Fit<'a> {
+    combination: &'a mut Span,
+    templates: &'a [QuantizedVector],
     background: &'a Background,
     params: &'a Params,
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
-impl WithSimd for BecomeOf<'_> {
+impl WithSimd for Fit<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self {
             combination,
-            looks,
+            templates,
             background,
             params,
-            room,
+            scratch,
         } = self;
-        combination.become_all(simd, looks, background, params, room);
+        combination.fit_all(simd, templates, background, params, scratch);
     }
 }
 
-impl Room {
+impl Scratch {
     /// Takes the samples of `background`, which all combinations are made with from here on.
     pub fn take(&mut self, background: &Background) {
         Arch::new().dispatch(Take {
-            room: self,
+            scratch: self,
             background,
         });
     }
 }
 
-impl Combination {
-    /// Becomes the subspace of `looks` as the metric of `background`, the one that `room` has taken, sees them.
-    pub fn become_of(
+impl Span {
+    /// Becomes the subspace of `templates` as the metric of `background`, the one that `scratch` has taken, sees them.
+    pub fn fit(
         &mut self,
-        looks: &[Look],
+        templates: &[QuantizedVector],
         background: &Background,
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
-        Arch::new().dispatch(BecomeOf {
+        Arch::new().dispatch(Fit {
             combination: self,
-            looks,
+            templates,
             background,
             params,
-            room,
+            scratch,
         });
     }
 
     #[inline(always)]
-    fn become_all<S: Simd>(
+    fn fit_all<S: Simd>(
         &mut self,
         simd: S,
-        looks: &[Look],
+        templates: &[QuantizedVector],
         background: &Background,
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
-        let (len, count) = (params.feature_len(), looks.len());
+        let (len, count) = (params.feature_len(), templates.len());
         let metric = background.metric();
         let samples = metric.count();
-        room.vectors.resize(count * len, 0.0);
-        for (look, vector) in looks.iter().zip(room.vectors.chunks_exact_mut(len)) {
+        scratch.vectors.resize(count * len, 0.0);
+        for (look, vector) in templates.iter().zip(scratch.vectors.chunks_exact_mut(len)) {
             look.write(background.mean(), vector);
         }
-        let (vectors, products) = (&room.vectors, &mut room.products);
+        let (vectors, products) = (&scratch.vectors, &mut scratch.products);
         products.resize(count * samples, 0.0);
-        gemm::multiply(simd, vectors, &room.samples, len, samples, products);
-        room.shadows.resize(count * samples, 0.0);
-        room.gram.resize(count * count, 0.0);
-        gemm::multiply(simd, vectors, vectors, len, count, &mut room.gram);
-        let shadow = |i: usize| i * samples..(i + 1) * samples;
+        gemm::multiply(simd, vectors, &scratch.samples, len, samples, products);
+        scratch.background_coordinates.resize(count * samples, 0.0);
+        scratch.gram.resize(count * count, 0.0);
+        gemm::multiply(simd, vectors, vectors, len, count, &mut scratch.gram);
+        let background_coordinates_of = |i: usize| i * samples..(i + 1) * samples;
         for i in 0..count {
-            metric.shadow(&room.products[shadow(i)], &mut room.shadows[shadow(i)]);
+            metric.background_coordinates_of(
+                &scratch.products[background_coordinates_of(i)],
+                &mut scratch.background_coordinates[background_coordinates_of(i)],
+            );
         }
-        room.scales.clear();
+        scratch.scales.clear();
         for i in 0..count {
             for j in 0..count {
-                let of_shadows = vector_ops::dot(&room.shadows[shadow(i)], &room.shadows[shadow(j)]);
-                let plain = room.gram[i * count + j];
+                let of_shadows = vector_ops::dot(
+                    &scratch.background_coordinates[background_coordinates_of(i)],
+                    &scratch.background_coordinates[background_coordinates_of(j)],
+                );
+                let plain = scratch.gram[i * count + j];
                 let product = plain - of_shadows;
-                let is_left = i != j || product > plain * LEAST_LEFT;
-                room.gram[i * count + j] = if is_left { product } else { 0.0 };
+                let is_left = i != j || product > plain * MIN_REMAINDER;
+                scratch.gram[i * count + j] = if is_left { product } else { 0.0 };
             }
-            let square = room.gram[i * count + i];
-            room.scales.push(match (params.unit_length, square > 0.0) {
-                (true, true) => 1.0 / square.sqrt(),
-                (true, false) => 0.0,
-                (false, _) => 1.0,
-            });
+            let square = scratch.gram[i * count + i];
+            scratch
+                .scales
+                .push(match (params.unit_length, square > 0.0) {
+                    (true, true) => 1.0 / square.sqrt(),
+                    (true, false) => 0.0,
+                    (false, _) => 1.0,
+                });
         }
-        self.combine(count, params.basis_dim as usize, room);
-        self.shadows.clear();
+        self.combine(count, params.basis_dim as usize, scratch);
+        self.background_coordinates.clear();
         for row in self.coefficients.chunks_exact(count) {
-            let first = self.shadows.len();
-            self.shadows.resize(first + samples, 0.0);
+            let first = self.background_coordinates.len();
+            self.background_coordinates.resize(first + samples, 0.0);
             for (i, coefficient) in row.iter().enumerate() {
-                let target = &mut self.shadows[first..];
-                vector_ops::add(target, *coefficient, &room.shadows[shadow(i)]);
+                let target = &mut self.background_coordinates[first..];
+                vector_ops::add(
+                    target,
+                    *coefficient,
+                    &scratch.background_coordinates[background_coordinates_of(i)],
+                );
             }
         }
     }
 
     /// The coefficients, from the Gram matrix of `count` looks and the factors that bring them to their length.
-    fn combine(&mut self, count: usize, basis_dim: usize, room: &mut Room) {
-        let scale = |i: usize| f64::from(room.scales[i]);
-        let gram = |i: usize, j: usize| f64::from(room.gram[i * count + j]) * scale(i) * scale(j);
+    fn combine(&mut self, count: usize, basis_dim: usize, scratch: &mut Scratch) {
+        let scale = |i: usize| f64::from(scratch.scales[i]);
+        let gram =
+            |i: usize, j: usize| f64::from(scratch.gram[i * count + j]) * scale(i) * scale(j);
         let share = 1.0 / count as f64;
         let sum = (0..count * count).map(|at| gram(at / count, at % count));
         self.norm = (sum.sum::<f64>() * share * share).max(0.0);
         self.coefficients.clear();
         self.coefficients
             .extend((0..count).map(|i| (share * scale(i)) as f32));
-        room.spectrum.solve(count, gram);
-        self.dim = subspace::dominant(room.spectrum.values(), basis_dim);
-        for (place, value) in room.spectrum.values().take(self.dim).enumerate() {
-            let weight = |i: usize| room.spectrum.weight(place, i) / value.sqrt() * scale(i);
+        scratch.spectrum.solve(count, gram);
+        self.dim = subspace::dominant(scratch.spectrum.values(), basis_dim);
+        for (place, value) in scratch.spectrum.values().take(self.dim).enumerate() {
+            let weight = |i: usize| scratch.spectrum.weight(place, i) / value.sqrt() * scale(i);
             self.coefficients
                 .extend((0..count).map(|i| weight(i) as f32));
         }
@@ -192,26 +205,26 @@ impl Combination {
     }
 
     /// The shadows of the mean and of the basis vectors.
-    pub fn shadows(&self) -> &[f32] {
-        &self.shadows
+    pub fn background_coordinates(&self) -> &[f32] {
+        &self.background_coordinates
     }
 
-    /// Writes the mean and the basis vectors, before the metric, to `out`, which is as long as they are. `looks` are those
-    /// that this was made of; `room` is room for them.
+    /// Writes the mean and the basis vectors, before the metric, to `out`, which is as long as they are. `templates` are those
+    /// that this was made of; `scratch` is room for them.
     #[inline(always)]
     pub fn write_to<S: Simd>(
         &self,
         simd: S,
-        looks: &[Look],
+        templates: &[QuantizedVector],
         background: &Background,
-        room: &mut Vec<f32>,
+        scratch: &mut Vec<f32>,
         out: &mut [f32],
     ) {
         let len = out.len() / (1 + self.dim);
-        room.resize(looks.len() * len, 0.0);
-        for (look, vector) in looks.iter().zip(room.chunks_exact_mut(len)) {
+        scratch.resize(templates.len() * len, 0.0);
+        for (look, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
             look.write(background.mean(), vector);
         }
-        vector_ops::become_combinations(simd, out, &self.coefficients, room, len);
+        vector_ops::become_combinations(simd, out, &self.coefficients, scratch, len);
     }
 }

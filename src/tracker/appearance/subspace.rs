@@ -17,15 +17,15 @@ pub struct AffineSubspace {
     pub(crate) basis: Vec<f32>,
 }
 
-/// [`AffineSubspace::become_of`], to be compiled for the instructions that this machine has.
-struct BecomeOf<'a> {
+/// [`AffineSubspace::fit`], to be compiled for the instructions that this machine has.
+struct Fit<'a> {
     subspace: &'a mut AffineSubspace,
     vectors: &'a [&'a [f32]],
     basis_dim: usize,
     spectrum: &'a mut Spectrum,
 }
 
-impl WithSimd for BecomeOf<'_> {
+impl WithSimd for Fit<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -44,18 +44,13 @@ impl AffineSubspace {
     /// If there are no vectors, or their lengths differ.
     pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
         let mut subspace = Self::default();
-        subspace.become_of(vectors, basis_dim, &mut Spectrum::default());
+        subspace.fit(vectors, basis_dim, &mut Spectrum::default());
         subspace
     }
 
     /// Becomes [`of`](Self::of) these vectors, in the room that it has.
-    pub(crate) fn become_of(
-        &mut self,
-        vectors: &[&[f32]],
-        basis_dim: usize,
-        spectrum: &mut Spectrum,
-    ) {
-        Arch::new().dispatch(BecomeOf {
+    pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
+        Arch::new().dispatch(Fit {
             subspace: self,
             vectors,
             basis_dim,

@@ -56,26 +56,34 @@ impl Whitening {
         whitening
     }
 
-    /// Turns feature vectors, of length `len` one after the other, into what is compared. `room` is for intermediate
+    /// Turns feature vectors, of length `len` one after the other, into what is compared. `scratch` is for intermediate
     /// results.
-    pub fn apply(&self, vectors: &mut [f32], len: usize, unit_length: bool, room: &mut Vec<f32>) {
+    pub fn apply(
+        &self,
+        vectors: &mut [f32],
+        len: usize,
+        unit_length: bool,
+        scratch: &mut Vec<f32>,
+    ) {
         if !self.mean.is_empty() {
             for vector in vectors.chunks_exact_mut(len) {
                 vector_ops::add(vector, -1.0, &self.mean);
             }
             let count = self.gains.len();
-            room.clear();
-            room.resize(vectors.len() / len * count, 0.0);
-            gemm::inner_products(vectors, &self.directions, len, count, room);
-            for row in room.chunks_exact_mut(count.max(1)) {
+            scratch.clear();
+            scratch.resize(vectors.len() / len * count, 0.0);
+            gemm::inner_products(vectors, &self.directions, len, count, scratch);
+            for row in scratch.chunks_exact_mut(count.max(1)) {
                 for (product, gain) in row.iter_mut().zip(&self.gains) {
                     *product *= gain;
                 }
             }
-            vector_ops::add_combinations(vectors, -1.0, room, &self.directions, len);
+            vector_ops::add_combinations(vectors, -1.0, scratch, &self.directions, len);
         }
         if unit_length {
-            vectors.chunks_exact_mut(len).for_each(vector_ops::normalize);
+            vectors
+                .chunks_exact_mut(len)
+                .for_each(vector_ops::normalize);
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use pulp::Simd;
 
+use crate::tracker::classifier::dense_search::MAX_AWAY;
+use crate::tracker::features::extractor::Grid;
 use crate::tracker::features::hog::CHANNELS;
 use crate::tracker::features::integral::{DIRECTIONS, GRAY, LANES};
-use crate::tracker::classifier::dense_search::MOST_AWAY;
-use crate::tracker::features::extractor::Grid;
 
 /// After the directions and the gray values: energies of the directions, gray values and their squares, summed over as
 /// many cells to the right as a window is wide.
@@ -15,7 +15,7 @@ const PLANES: usize = WIDE + WIDE_COUNT;
 
 /// The lines of a grid, those of a row of cells one after the other.
 #[derive(Debug, Default)]
-pub(crate) struct Planes {
+pub(crate) struct ChannelPlanes {
     /// From one line to the next: a register may begin at any cell. What is beyond the cells is of no account.
     stride: usize,
     lines: Vec<f32>,
@@ -24,15 +24,15 @@ pub(crate) struct Planes {
     squares: Vec<f32>,
 }
 
-impl Planes {
+impl ChannelPlanes {
     /// Takes the cells of `grid`, for windows of so many columns and rows; with room for the most that a scan looks at.
     #[inline(always)]
     pub fn take(&mut self, grid: &Grid, (width, height): (usize, usize)) {
-        let most_columns = width + 2 * MOST_AWAY + LANES;
-        let most = most_columns * (height + 2 * MOST_AWAY) * PLANES;
-        hold(&mut self.lines, most);
-        hold(&mut self.energies, most_columns);
-        hold(&mut self.squares, most_columns);
+        let most_columns = width + 2 * MAX_AWAY + LANES;
+        let most = most_columns * (height + 2 * MAX_AWAY) * PLANES;
+        clamp(&mut self.lines, most);
+        clamp(&mut self.energies, most_columns);
+        clamp(&mut self.squares, most_columns);
         self.stride = grid.columns + LANES;
         let cells = grid.values.chunks_exact(grid.columns * CHANNELS);
         let rows = cells.zip(grid.grays.chunks_exact(grid.columns));
@@ -94,7 +94,7 @@ impl Planes {
 }
 
 /// Makes `values` hold at least `count` of them, whatever they are.
-fn hold(values: &mut Vec<f32>, count: usize) {
+fn clamp(values: &mut Vec<f32>, count: usize) {
     if values.len() < count {
         values.resize(count, 0.0);
     }
@@ -119,7 +119,7 @@ mod tests {
             values: (0..columns * rows * CHANNELS).map(number).collect(),
             grays: (0..columns * rows).map(number).collect(),
         };
-        let mut planes = Planes::default();
+        let mut planes = ChannelPlanes::default();
         planes.take(&grid, (width, height));
         let cell = |i: usize, j: usize| &grid.values[(j * columns + i) * CHANNELS..][..DIRECTIONS];
         let gray = |i: usize, j: usize| grid.grays[j * columns + i];

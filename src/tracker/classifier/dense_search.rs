@@ -11,43 +11,43 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::classifier::sliding_window::SlidingWindow;
+use crate::tracker::features::extractor::{Extractor, Grid};
 use crate::tracker::motion::particles::Particle;
-use crate::tracker::motion::proposal::Sought;
-use crate::tracker::features::extractor::{Grid, View};
-use crate::tracker::classifier::sliding_window::Windows;
+use crate::tracker::motion::proposal::SearchContext;
 use crate::tracker::params::table::Features;
 use crate::tracker::params::table::Params;
 use crate::tracker::workspace;
 
 /// Places in each direction at most: a look further than that costs more than the rest of a step.
-pub(crate) const MOST_AWAY: usize = 24;
-/// Values that are multiplied at most: as many as [`MOST_AWAY`] takes with 8 x 8 cells. More cells, fewer places.
-const MOST_PRODUCTS: usize = 1_600_000;
+pub(crate) const MAX_AWAY: usize = 24;
+/// Values that are multiplied at most: as many as [`MAX_AWAY`] takes with 8 x 8 cells. More cells, fewer places.
+const MAX_PRODUCTS: usize = 1_600_000;
 
 /// The scores of a frame, and room for them.
 #[derive(Debug, Default)]
-pub(crate) struct Scan {
+pub(crate) struct DenseSearch {
     grid: Grid,
-    windows: Windows,
+    sliding_window: SlidingWindow,
     /// How likely each place is, row by row: the logarithm of what its particle's weight is multiplied with.
     values: Vec<f32>,
     /// The same without the peaks that were taken, and those.
     left: Vec<f32>,
-    peaks: Vec<Particle>,
+    maxima: Vec<Particle>,
     /// Where the places are; none where nothing was looked at.
-    places: Option<Places>,
+    places: Option<SampleCoords>,
 }
 
 /// Places in a row and above each other, around a center.
 #[derive(Debug, Clone, Copy)]
-struct Places {
+struct SampleCoords {
     center: Particle,
     /// How far to the left of the center, and above it, the first of them is.
     away: (usize, usize),
     cell: (f64, f64),
 }
 
-impl Places {
+impl SampleCoords {
     #[inline(always)]
     fn at(&self, column: usize, row: usize) -> Particle {
         let ((across, down), (width, height)) = (self.away, self.cell);
@@ -80,8 +80,8 @@ impl Places {
 
 /// What scores of places become together with the prior, to be compiled for the instructions that this machine has.
 struct Weigh<'a> {
-    places: Places,
-    sought: &'a Sought<'a>,
+    places: SampleCoords,
+    search: &'a SearchContext<'a>,
     values: &'a mut [f32],
 }
 
@@ -90,78 +90,85 @@ impl WithSimd for Weigh<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let factor = self.sought.params.discriminant_weight;
+        let factor = self.search.params.discriminant_weight;
         let columns = 2 * self.places.away.0 + 1;
         for (row, values) in self.values.chunks_exact_mut(columns).enumerate() {
             for (column, value) in values.iter_mut().enumerate() {
                 let likely = factor * f64::from(*value);
                 let place = self.places.at(column, row);
-                *value = (likely + self.sought.log_displacement(&place)) as f32;
+                *value = (likely + self.search.log_displacement(&place)) as f32;
             }
         }
     }
 }
 
-impl Scan {
+impl DenseSearch {
     /// The best places, best first.
-    pub fn peaks(&self) -> &[Particle] {
-        &self.peaks
+    pub fn maxima(&self) -> &[Particle] {
+        &self.maxima
     }
 
-    /// Looks at all places around the one that is sought, in what `view` is open on.
-    pub fn look(&mut self, view: &mut View, sought: &Sought<'_>, discriminant: &Discriminant) {
-        let params = sought.params;
-        self.peaks.clear();
+    /// Looks at all places around the one that is sought, in what `extractor` is open on.
+    pub fn look(
+        &mut self,
+        extractor: &mut Extractor,
+        search: &SearchContext<'_>,
+        discriminant: &Discriminant,
+    ) {
+        let params = search.params;
+        self.maxima.clear();
         self.places = None;
-        if params.scan_peaks == 0 || !discriminant.is_on() || params.features != Features::Gradients
+        if params.dense_maxima == 0
+            || !discriminant.is_on()
+            || params.features != Features::Gradients
         {
             return;
         }
-        let center = sought.carried();
-        let (cell_width, cell_height) = View::cell(&center, sought.reach, params);
-        let (across, down) = places(sought.scanned(), (cell_width, cell_height), params);
-        view.grid(
+        let center = search.displaced();
+        let (cell_width, cell_height) = Extractor::cell(&center, search.bounds, params);
+        let (across, down) = places(search.scanned(), (cell_width, cell_height), params);
+        extractor.grid(
             &center,
             (across, down),
-            MOST_AWAY,
-            sought.reach,
+            MAX_AWAY,
+            search.bounds,
             params,
             &mut self.grid,
         );
         let (columns, rows) = (2 * across + 1, 2 * down + 1);
-        workspace::empty(&mut self.values, (2 * MOST_AWAY + 1).pow(2));
-        workspace::empty(&mut self.left, (2 * MOST_AWAY + 1).pow(2));
+        workspace::clear_and_reserve(&mut self.values, (2 * MAX_AWAY + 1).pow(2));
+        workspace::clear_and_reserve(&mut self.left, (2 * MAX_AWAY + 1).pow(2));
         self.values.resize(columns * rows, 0.0);
         let cell_pixels = (cell_width * cell_height) as f32;
         let values = &mut self.values;
-        self.windows
+        self.sliding_window
             .scores(&self.grid, discriminant, params, cell_pixels, values);
-        let places = Places {
+        let places = SampleCoords {
             center,
             away: (across, down),
             cell: (cell_width, cell_height),
         };
         Arch::new().dispatch(Weigh {
             places,
-            sought,
+            search,
             values: &mut self.values,
         });
         self.places = Some(places);
         self.left.clone_from(&self.values);
-        for _ in 0..params.scan_peaks {
-            let Some(best) = take_peak(&mut self.left, columns) else {
+        for _ in 0..params.dense_maxima {
+            let Some(best) = take_maximum(&mut self.left, columns) else {
                 break;
             };
-            self.peaks.push(places.at(best % columns, best / columns));
+            self.maxima.push(places.at(best % columns, best / columns));
         }
     }
 
     /// Leaves out those of the first `particles` that are hopeless: at places less likely than the best one by more than is
     /// asked for. What was last seen, there or carried along, stays, and what is out of sight may be anywhere.
-    pub fn sift(&self, sought: &Sought<'_>, particles: &mut Vec<Particle>) {
-        let margin = sought.params.scan_margin;
+    pub fn prune(&self, search: &SearchContext<'_>, particles: &mut Vec<Particle>) {
+        let margin = search.params.prune_margin;
         let Some(places) = self.places else { return };
-        if margin <= 0.0 || sought.widening > 1.0 {
+        if margin <= 0.0 || search.search_scale > 1.0 {
             return;
         }
         let most = self
@@ -182,16 +189,16 @@ impl Scan {
 /// How many places to look at to each side, and up and down, to get `away` working pixels far.
 fn places(away: f64, (cell_width, cell_height): (f64, f64), params: &Params) -> (usize, usize) {
     let [mut across, mut down] =
-        [cell_width, cell_height].map(|cell| ((away / cell).ceil() as usize).min(MOST_AWAY));
+        [cell_width, cell_height].map(|cell| ((away / cell).ceil() as usize).min(MAX_AWAY));
     let len = params.feature_len();
-    while (2 * across + 1) * (2 * down + 1) * len > MOST_PRODUCTS && across.max(down) > 0 {
+    while (2 * across + 1) * (2 * down + 1) * len > MAX_PRODUCTS && across.max(down) > 0 {
         (across, down) = (across.saturating_sub(1), down.saturating_sub(1));
     }
     (across, down)
 }
 
 /// The index of the greatest value; it and those beside it count no more.
-fn take_peak(values: &mut [f32], columns: usize) -> Option<usize> {
+fn take_maximum(values: &mut [f32], columns: usize) -> Option<usize> {
     // In parts so that the loop vectorises.
     let mut parts = [f32::NEG_INFINITY; 16];
     for chunk in values.chunks(parts.len()) {
@@ -216,8 +223,8 @@ fn take_peak(values: &mut [f32], columns: usize) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::motion::particles::Reach;
     use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::motion::particles::StateBounds;
     use crate::tracker::params::presets::Preset;
 
     fn frame() -> GrayFrame {
@@ -229,7 +236,7 @@ mod tests {
     #[test]
     fn a_grid_has_the_gray_values_of_its_areas() {
         let params = Preset::Robust.params();
-        let reach = Reach {
+        let bounds = StateBounds {
             frame_width: 160.0,
             frame_height: 120.0,
             box_width: 32.0,
@@ -240,14 +247,14 @@ mod tests {
             y: 60.0,
             scale: 1.0,
         };
-        let mut view = View::default();
-        view.open(&frame(), &[center], 40.0, &reach, &params);
+        let mut extractor = Extractor::default();
+        extractor.compute_channels(&frame(), &[center], 40.0, &bounds, &params);
         let mut grid = Grid::default();
-        view.grid(&center, (2, 1), MOST_AWAY, &reach, &params, &mut grid);
+        extractor.grid(&center, (2, 1), MAX_AWAY, &bounds, &params, &mut grid);
         assert_eq!(grid.columns, 12);
         assert_eq!(grid.grays.len(), 120);
         let mut alone = Grid::default();
-        view.grid(&center, (0, 0), MOST_AWAY, &reach, &params, &mut alone);
+        extractor.grid(&center, (0, 0), MAX_AWAY, &bounds, &params, &mut alone);
         for (index, gray) in alone.grays.iter().enumerate() {
             let on_grid = grid.grays[(1 + index / 8) * 12 + 2 + index % 8];
             assert!(
@@ -264,7 +271,7 @@ mod tests {
             y: 40.0,
             scale: 1.0,
         };
-        let places = Places {
+        let places = SampleCoords {
             center,
             away: (3, 2),
             cell: (4.0, 5.0),
@@ -291,9 +298,9 @@ mod tests {
         for (index, value) in [(8, 5.0), (9, 4.0), (1, 4.5), (20, 3.0), (34, 2.0)] {
             values[index] = value;
         }
-        let peaks: Vec<_> = (0..3).map(|_| take_peak(&mut values, 7)).collect();
-        assert_eq!(peaks, [Some(8), Some(20), Some(34)]);
+        let maxima: Vec<_> = (0..3).map(|_| take_maximum(&mut values, 7)).collect();
+        assert_eq!(maxima, [Some(8), Some(20), Some(34)]);
         values.fill(f32::NEG_INFINITY);
-        assert_eq!(take_peak(&mut values, 7), None);
+        assert_eq!(take_maximum(&mut values, 7), None);
     }
 }

@@ -13,10 +13,10 @@
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::params::table::Params;
-use crate::tracker::classifier::samples::Examples;
+use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::linalg::vector_ops;
-use crate::tracker::motion::particles::{Particle, Reach};
+use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::params::table::Params;
 
 /// Standard deviation of the labels' bell, as a share of the box along x and y, and of the logarithm of the scale.
 const LABEL_WIDTH: f64 = 0.15;
@@ -39,7 +39,7 @@ pub(crate) struct Discriminant {
 
 /// Room for a fit.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
+pub(crate) struct Scratch {
     /// What the labels are, and then how far the scores are from them.
     pub labels: Vec<f32>,
     gradient: Vec<f32>,
@@ -50,11 +50,11 @@ pub(crate) struct Room {
 /// [`Discriminant::fit`], to be compiled for the instructions that this machine has.
 struct Fit<'a> {
     discriminant: &'a mut Discriminant,
-    examples: &'a Examples,
+    examples: &'a TrainingSamples,
     vectors: &'a [f32],
     damping: f64,
     steps: usize,
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 impl WithSimd for Fit<'_> {
@@ -64,7 +64,7 @@ impl WithSimd for Fit<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let (damping, steps) = (self.damping, self.steps);
         self.discriminant
-            .fit_all(self.examples, self.vectors, damping, steps, self.room);
+            .fit_all(self.examples, self.vectors, damping, steps, self.scratch);
     }
 }
 
@@ -101,33 +101,39 @@ impl Discriminant {
     /// Learns from the first frame.
     pub fn begin(
         &mut self,
-        examples: &Examples,
+        examples: &TrainingSamples,
         vectors: &[f32],
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
         let damping = params.discriminant_damping * FIRST_DAMPING;
-        self.fit(examples, vectors, damping, FIRST_STEPS, room);
+        self.fit(examples, vectors, damping, FIRST_STEPS, scratch);
     }
 
-    /// Learns from a further frame: the examples that its particles are, their vectors, and the labels in `room`.
+    /// Learns from a further frame: the examples that its particles are, their vectors, and the labels in `scratch`.
     pub fn learn(
         &mut self,
-        examples: &Examples,
+        examples: &TrainingSamples,
         vectors: &[f32],
         params: &Params,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
-        self.fit(examples, vectors, params.discriminant_damping, STEPS, room);
+        self.fit(
+            examples,
+            vectors,
+            params.discriminant_damping,
+            STEPS,
+            scratch,
+        );
     }
 
     fn fit(
         &mut self,
-        examples: &Examples,
+        examples: &TrainingSamples,
         vectors: &[f32],
         damping: f64,
         steps: usize,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
         Arch::new().dispatch(Fit {
             discriminant: self,
@@ -135,25 +141,25 @@ impl Discriminant {
             vectors,
             damping,
             steps,
-            room,
+            scratch,
         });
     }
 
     #[inline(always)]
     fn fit_all(
         &mut self,
-        examples: &Examples,
+        examples: &TrainingSamples,
         vectors: &[f32],
         damping: f64,
         steps: usize,
-        room: &mut Room,
+        scratch: &mut Scratch,
     ) {
-        let Room {
+        let Scratch {
             labels: residuals,
             gradient,
             direction,
             product,
-        } = room;
+        } = scratch;
         let damping = damping as f32 * residuals.len() as f32;
         for (residual, score) in residuals.iter_mut().zip(examples.scores()) {
             *residual -= score;
@@ -192,7 +198,7 @@ impl Discriminant {
     }
 
     /// Whether this may be the discriminant of a tracker with `params`.
-    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
+    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
         let len = if params.discriminant_weight > 0.0 {
             params.feature_len()
         } else {
@@ -208,9 +214,9 @@ impl Discriminant {
 
 /// How much of the target an area shows, as the discriminant is taught: 1 at `target`, falling as a bell with the
 /// distance and the ratio of scales.
-pub(crate) fn label(area: &Particle, target: &Particle, reach: &Reach) -> f32 {
-    let across = (area.x - target.x) / (reach.box_width * target.scale);
-    let down = (area.y - target.y) / (reach.box_height * target.scale);
+pub(crate) fn label(area: &Particle, target: &Particle, bounds: &StateBounds) -> f32 {
+    let across = (area.x - target.x) / (bounds.box_width * target.scale);
+    let down = (area.y - target.y) / (bounds.box_height * target.scale);
     let larger = (area.scale / target.scale).ln();
     let squared = across * across + down * down + larger * larger;
     (-0.5 * squared / (LABEL_WIDTH * LABEL_WIDTH)).exp() as f32
@@ -234,14 +240,14 @@ mod tests {
         for mean in [0.0, 0.3] {
             discriminant.weights.clone_from(&before);
             let shifted: Vec<f32> = vectors.iter().map(|value| value - mean).collect();
-            let mut examples = Examples::default();
+            let mut examples = TrainingSamples::default();
             examples.begin(&discriminant, &vec![mean; len], 0);
-            examples.examine_alone(&shifted);
-            let mut room = Room {
+            examples.score_vectors(&shifted);
+            let mut scratch = Scratch {
                 labels: labels.clone(),
-                ..Room::default()
+                ..Scratch::default()
             };
-            discriminant.fit(&examples, &shifted, 0.2, 60, &mut room);
+            discriminant.fit(&examples, &shifted, 0.2, 60, &mut scratch);
 
             let mut u = DMatrix::from_row_slice(count, len, &vectors).cast::<f64>();
             for mut row in u.row_iter_mut() {
@@ -269,14 +275,14 @@ mod tests {
         for tiny in [1e-18_f32, 1e-20, 1e-21, 1e-22, 1e-25, 1e-38, 1e-44] {
             let mut discriminant = Discriminant::new(vec![0.0; 4]);
             let vectors = [tiny, 0.0, 0.0, 0.0, 0.0, tiny, 0.0, 0.0];
-            let mut examples = Examples::default();
+            let mut examples = TrainingSamples::default();
             examples.begin(&discriminant, &[], 0);
-            examples.examine_alone(&vectors);
-            let mut room = Room {
+            examples.score_vectors(&vectors);
+            let mut scratch = Scratch {
                 labels: vec![1.0, 0.5],
-                ..Room::default()
+                ..Scratch::default()
             };
-            discriminant.fit(&examples, &vectors, 1e-4, 25, &mut room);
+            discriminant.fit(&examples, &vectors, 1e-4, 25, &mut scratch);
             let finite = discriminant.weights.iter().all(|weight| weight.is_finite());
             assert!(finite, "{tiny}: {:?}", discriminant.weights);
         }

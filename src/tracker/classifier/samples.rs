@@ -6,29 +6,29 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::workspace;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::vector_ops;
+use crate::tracker::workspace;
 
 /// What is left of a squared length below this share of it is rounding: the vector is the origin.
-const LEAST_LEFT: f32 = 1e-6;
+const MIN_REMAINDER: f32 = 1e-6;
 /// Vectors of a sum that are worked on together, while they are in the cache.
 const GROUP: usize = 8;
 
 /// The origin, and of each example its scale and its score.
 #[derive(Debug, Default)]
-pub(crate) struct Examples {
+pub(crate) struct TrainingSamples {
     /// The weights and the origin, as the vectors see them.
     weights: Vec<f32>,
     origin: Vec<f32>,
     /// One over the length of x - origin; 0 where there is none.
     scales: Vec<f32>,
     scores: Vec<f32>,
-    room: Vec<f32>,
+    scratch: Vec<f32>,
 }
 
-impl Examples {
+impl TrainingSamples {
     /// Forgets the last examples and takes `discriminant`, for vectors that have `mean` (or, where that is empty,
     /// nothing) taken off; with room for `most` examples.
     pub fn begin(&mut self, discriminant: &Discriminant, mean: &[f32], most: usize) {
@@ -37,45 +37,45 @@ impl Examples {
         self.origin.clear();
         self.origin.extend_from_slice(discriminant.origin());
         vector_ops::add(&mut self.origin, -1.0, mean);
-        workspace::empty(&mut self.scales, most);
-        workspace::empty(&mut self.scores, most);
+        workspace::clear_and_reserve(&mut self.scales, most);
+        workspace::clear_and_reserve(&mut self.scores, most);
     }
 
     /// The vectors whose products are asked for: the weights and the origin.
-    pub fn asks(&self) -> [&[f32]; 2] {
+    pub fn query_vectors(&self) -> [&[f32]; 2] {
         [&self.weights, &self.origin]
     }
 
     /// Takes further examples: their products with the weights and with the origin, and the squares of their vectors.
-    pub fn examine(&mut self, [of_weights, of_origin]: [&[f32]; 2], squares: &[f32]) {
+    pub fn push_scores(&mut self, [of_weights, of_origin]: [&[f32]; 2], squares: &[f32]) {
         let origin_score = vector_ops::dot(&self.origin, &self.weights);
         let origin_square = vector_ops::dot(&self.origin, &self.origin);
         let products = of_weights.iter().zip(of_origin);
         for ((of_weights, of_origin), square) in products.zip(squares) {
             let left = square + origin_square - 2.0 * of_origin;
-            let is_left = left > (square + origin_square) * LEAST_LEFT;
+            let is_left = left > (square + origin_square) * MIN_REMAINDER;
             let scale = if is_left { 1.0 / left.sqrt() } else { 0.0 };
             self.scales.push(scale);
             self.scores.push(scale * (of_weights - origin_score));
         }
     }
 
-    /// As [`examine`](Self::examine), with the products made here.
-    pub fn examine_alone(&mut self, vectors: &[f32]) {
+    /// As [`push_scores`](Self::push_scores), with the products made here.
+    pub fn score_vectors(&mut self, vectors: &[f32]) {
         let len = self.weights.len();
         let count = vectors.len() / len;
-        let mut room = std::mem::take(&mut self.room);
-        room.clear();
-        room.resize(3 * count, 0.0);
-        let (products, squares) = room.split_at_mut(2 * count);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.clear();
+        scratch.resize(3 * count, 0.0);
+        let (products, squares) = scratch.split_at_mut(2 * count);
         let (of_weights, of_origin) = products.split_at_mut(count);
         gemm::inner_products(&self.weights, vectors, len, count, of_weights);
         gemm::inner_products(&self.origin, vectors, len, count, of_origin);
         for (square, vector) in squares.iter_mut().zip(vectors.chunks_exact(len)) {
             *square = vector_ops::dot(vector, vector);
         }
-        self.examine([of_weights, of_origin], squares);
-        self.room = room;
+        self.push_scores([of_weights, of_origin], squares);
+        self.scratch = scratch;
     }
 
     /// Forgets all examples but the first `count`.
@@ -119,9 +119,9 @@ impl Examples {
     }
 }
 
-/// [`Examples::energy`], to be compiled for the instructions that this machine has.
+/// [`TrainingSamples::energy`], to be compiled for the instructions that this machine has.
 struct Energy<'a> {
-    examples: &'a Examples,
+    examples: &'a TrainingSamples,
     vectors: &'a [f32],
     direction: &'a [f32],
 }
@@ -157,7 +157,7 @@ enum Coefficients<'a> {
 
 /// A sum over all examples, to be compiled for the instructions that this machine has.
 struct Sum<'a> {
-    examples: &'a Examples,
+    examples: &'a TrainingSamples,
     vectors: &'a [f32],
     coefficients: Coefficients<'a>,
     sum: &'a mut [f32],

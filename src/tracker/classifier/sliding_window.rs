@@ -9,29 +9,29 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::features::hog_cells::LEAST_CONTRAST;
-use crate::tracker::features::hog::CHANNELS;
+use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
-use crate::tracker::classifier::channel_planes::{Planes, load};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::params::table::Params;
+use crate::tracker::features::hog::CHANNELS;
+use crate::tracker::features::hog_cells::MIN_CONTRAST;
+use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
 use crate::tracker::linalg::vector_ops;
+use crate::tracker::params::table::Params;
 
 /// Rows of windows whose sums are in registers at a time.
 const ROWS: usize = 4;
 /// What is left of a squared length below this share of it is rounding, as for examples.
-const LEAST_LEFT: f32 = 1e-6;
+const MIN_REMAINDER: f32 = 1e-6;
 
 /// Room for the scores of a grid.
 #[derive(Debug, Default)]
-pub(crate) struct Windows {
-    planes: Planes,
+pub(crate) struct SlidingWindow {
+    planes: ChannelPlanes,
 }
 
-/// [`Windows::scores`], to be compiled for the instructions that this machine has.
+/// [`SlidingWindow::scores`], to be compiled for the instructions that this machine has.
 struct Scores<'a> {
-    windows: &'a mut Windows,
+    sliding_window: &'a mut SlidingWindow,
     grid: &'a Grid,
     discriminant: &'a Discriminant,
     params: &'a Params,
@@ -48,7 +48,7 @@ impl WithSimd for Scores<'_> {
             self.params.patch_width as usize,
             self.params.patch_height as usize,
         );
-        let planes = &mut self.windows.planes;
+        let planes = &mut self.sliding_window.planes;
         planes.take(self.grid, size);
         let scorer = Scorer::new(self.discriminant, self.params, self.cell_pixels);
         let columns = self.grid.columns + 1 - size.0;
@@ -75,7 +75,7 @@ impl WithSimd for Scores<'_> {
     }
 }
 
-impl Windows {
+impl SlidingWindow {
     /// Writes the score of each window of `grid`, row by row, to `out`; `cell_pixels` is the area of a cell in working
     /// pixels.
     pub fn scores(
@@ -87,7 +87,7 @@ impl Windows {
         out: &mut [f32],
     ) {
         Arch::new().dispatch(Scores {
-            windows: self,
+            sliding_window: self,
             grid,
             discriminant,
             params,
@@ -111,7 +111,7 @@ struct Products<S: Simd> {
 #[inline(always)]
 fn correlate<S: Simd>(
     simd: S,
-    planes: &Planes,
+    planes: &ChannelPlanes,
     (first, rows): (usize, [usize; ROWS]),
     width: usize,
     discriminant: &Discriminant,
@@ -196,7 +196,7 @@ impl Scorer {
             origin_square: vector_ops::dot(origin, origin),
             count: (weights.len() / CHANNELS) as f32,
             gray_weight: params.gray_weight as f32,
-            least_deviation: LEAST_CONTRAST * cell_pixels,
+            least_deviation: MIN_CONTRAST * cell_pixels,
         }
     }
 
@@ -230,7 +230,8 @@ impl Scorer {
         let square = simd.mul_add_e_f32s(contrast, count, energy);
         let both = simd.add_f32s(square, simd.splat_f32s(self.origin_square));
         let left = simd.sub_f32s(both, simd.add_f32s(of_origin, of_origin));
-        let is_left = simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(LEAST_LEFT)), left);
+        let is_left =
+            simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(MIN_REMAINDER)), left);
         let above = simd.sub_f32s(of_weights, simd.splat_f32s(self.origin_score));
         let score = simd.div_f32s(above, simd.sqrt_f32s(left));
         simd.select_f32s(is_left, score, zero)
@@ -239,11 +240,11 @@ impl Scorer {
 
 #[cfg(test)]
 mod tests {
-    use crate::tracker::classifier::dense_search;
     use super::*;
-    use crate::tracker::motion::particles::{Particle, Reach};
-    use crate::tracker::features::extractor::View;
+    use crate::tracker::classifier::dense_search;
+    use crate::tracker::features::extractor::Extractor;
     use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::motion::particles::{Particle, StateBounds};
     use crate::tracker::params::presets::Preset;
 
     fn number(i: usize) -> f32 {
@@ -265,7 +266,7 @@ mod tests {
                 ..Preset::Robust.params()
             };
             let len = params.feature_len();
-            let reach = Reach {
+            let bounds = StateBounds {
                 frame_width: 160.0,
                 frame_height: 120.0,
                 box_width: 30.0,
@@ -276,8 +277,8 @@ mod tests {
                 y: 55.0,
                 scale: 1.1,
             };
-            let mut view = View::default();
-            view.open(&frame(), &[center], 60.0, &reach, &params);
+            let mut extractor = Extractor::default();
+            extractor.compute_channels(&frame(), &[center], 60.0, &bounds, &params);
             let origin: Vec<f32> = (0..len).map(|i| number(i) / 20.0).collect();
             let mut discriminant = Discriminant::new(origin.clone());
             let weights: Vec<f32> = (0..len).map(|i| number(i + 5000)).collect();
@@ -285,18 +286,24 @@ mod tests {
 
             let (across, down) = (5, 3);
             let mut grid = Grid::default();
-            view.grid(
+            extractor.grid(
                 &center,
                 (across, down),
-                dense_search::MOST_AWAY,
-                &reach,
+                dense_search::MAX_AWAY,
+                &bounds,
                 &params,
                 &mut grid,
             );
             let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
-            let (cell_width, cell_height) = View::cell(&center, &reach, &params);
+            let (cell_width, cell_height) = Extractor::cell(&center, &bounds, &params);
             let cell_pixels = (cell_width * cell_height) as f32;
-            Windows::default().scores(&grid, &discriminant, &params, cell_pixels, &mut scores);
+            SlidingWindow::default().scores(
+                &grid,
+                &discriminant,
+                &params,
+                cell_pixels,
+                &mut scores,
+            );
 
             let (width, height) = (width as usize, height as usize);
             for (index, score) in scores.iter().enumerate() {
@@ -306,7 +313,7 @@ mod tests {
                 let count = grays.len() as f32;
                 let mean = grays.iter().sum::<f32>() / count;
                 let variance = grays.iter().map(|gray| (gray - mean).powi(2)).sum::<f32>() / count;
-                let deviation = variance.sqrt().max(LEAST_CONTRAST * cell_pixels);
+                let deviation = variance.sqrt().max(MIN_CONTRAST * cell_pixels);
                 let mut vector = Vec::new();
                 for (c, gray) in grays.iter().enumerate() {
                     let values = &grid.values[cell(c) * CHANNELS..][..DIRECTIONS];

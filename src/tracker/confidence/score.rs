@@ -27,7 +27,7 @@ const OF_FIRST: f64 = -6.4;
 const OF_LATELY: f64 = -6.4;
 const OF_SCALE: f64 = -2.1;
 /// The greatest score of a target that is out of sight: nothing of it is in the box.
-const GREATEST_LOST: f64 = 0.1;
+const MAX_LOST: f64 = 0.1;
 
 /// A ratio at which the score is a half.
 const HALF_RATIO: f64 = 3.0;
@@ -40,7 +40,7 @@ const LOST_BELOW: f64 = 0.2;
 const RENEWAL: f64 = 0.05;
 
 /// The least usual distance: a still picture must not make the first flicker a loss.
-const LEAST_USUAL: f64 = 1e-3;
+const MIN_USUAL: f64 = 1e-3;
 
 /// What the chosen candidate says about itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,12 +59,12 @@ pub(crate) struct Evidence {
 
 /// What distances have been usual while tracking.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Usual {
+pub(crate) struct DistanceBaseline {
     /// The running mean; none before the first frame that was tracked.
     pub distance: Option<f64>,
 }
 
-impl Usual {
+impl DistanceBaseline {
     /// The score in [0, 1] and the status of an answer; `lost` when the target is out of sight, `trusted` when the
     /// frame may be learned from. The frame counts for those to come if it was tracked.
     pub fn judge(&mut self, evidence: &Evidence, lost: bool, trusted: bool) -> (f32, Status) {
@@ -78,7 +78,7 @@ impl Usual {
             + OF_SCALE * evidence.scale.ln().abs();
         let score = 1.0 / (1.0 + (-exponent).exp());
         if lost {
-            (score.min(GREATEST_LOST) as f32, Status::Lost)
+            (score.min(MAX_LOST) as f32, Status::Lost)
         } else if score < UNCERTAIN_BELOW || !trusted {
             (score as f32, Status::Uncertain)
         } else {
@@ -87,7 +87,7 @@ impl Usual {
     }
 
     fn judge_distance(&mut self, distance: f64) -> (f32, Status) {
-        let usual = self.distance.unwrap_or(distance).max(LEAST_USUAL);
+        let usual = self.distance.unwrap_or(distance).max(MIN_USUAL);
         let ratio = distance / usual / HALF_RATIO;
         let score = 1.0 / (1.0 + ratio * ratio);
         let status = if score < LOST_BELOW {
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_score_falls_with_the_distance_and_the_usual_follows_only_tracked_frames() {
-        let mut usual = Usual::default();
+        let mut usual = DistanceBaseline::default();
         assert_eq!(usual.judge_distance(0.02), (0.9, Status::Tracking));
         let mut last = 1.0;
         for step in 0..40 {
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_still_picture_does_not_make_a_flicker_a_loss() {
-        let mut usual = Usual::default();
+        let mut usual = DistanceBaseline::default();
         for _ in 0..100 {
             assert_eq!(usual.judge_distance(0.0).1, Status::Tracking);
         }
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn the_evidence_of_a_discriminant_orders_scores_and_a_loss_is_never_likely() {
-        let mut usual = Usual::default();
+        let mut usual = DistanceBaseline::default();
         let mut judge = |discriminant, first, scale, lost, trusted| {
             let evidence = Evidence {
                 first,

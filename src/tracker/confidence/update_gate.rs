@@ -20,43 +20,44 @@ const UNTIL_USUAL: u64 = 20;
 const FIRST_USUAL: f64 = 0.25;
 const ALWAYS_TRUSTED: f64 = 0.3;
 /// A target that has hardly changed so far may have changed this much when it comes back.
-const LEAST_USUAL: f64 = 0.15;
+const MIN_USUAL: f64 = 0.15;
 /// The share of the newest frame in the running mean, when trusted and when not.
 const RENEWAL: f64 = 0.1;
 const RENEWAL_UNTRUSTED: f64 = 0.02;
 
 /// Whether frame `number`, whose answer overlaps the target by half or more with the chance `score`, may be learned from. A
 /// box that is half off is learned as what the target looks like otherwise, and the next one is further off.
-pub(crate) fn believes(score: f64, number: u64, params: &Params) -> bool {
-    number < UNTIL_USUAL || score >= params.learn_above
+pub(crate) fn passes(score: f64, number: u64, params: &Params) -> bool {
+    number < UNTIL_USUAL || score >= params.update_min_score
 }
 
 /// What distances to the first subspace have been usual.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Trust {
+pub(crate) struct UpdateGate {
     pub usual: f64,
 }
 
-impl Default for Trust {
+impl Default for UpdateGate {
     fn default() -> Self {
         Self { usual: FIRST_USUAL }
     }
 }
 
-impl Trust {
+impl UpdateGate {
     /// Whether `distance` from the first subspace is not far beyond what is usual.
     fn accepts(&self, distance: f64, params: &Params) -> bool {
-        let limit = (params.trusted_ratio * self.usual).max(ALWAYS_TRUSTED);
-        params.trusted_ratio <= 0.0 || distance < limit
+        let limit = (params.update_distance_ratio * self.usual).max(ALWAYS_TRUSTED);
+        params.update_distance_ratio <= 0.0 || distance < limit
     }
 
     /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target. The
-    /// search was `widening` times as wide as usual: one that is hardly wider finds what it lost a frame or two before, and
+    /// search was `search_scale` times as wide as usual: one that is hardly wider finds what it lost a frame or two before, and
     /// that is trusted as ever; a wide one finds the likest of all things, so it must look as much like the first look
     /// as is usual.
-    pub fn recognizes(&self, distance: f64, widening: f64, params: &Params) -> bool {
-        let limit = self.usual.max(LEAST_USUAL) * (1.0 + (params.trusted_ratio - 1.0) / widening);
-        params.trusted_ratio <= 0.0 || distance < limit
+    pub fn recognizes(&self, distance: f64, search_scale: f64, params: &Params) -> bool {
+        let limit =
+            self.usual.max(MIN_USUAL) * (1.0 + (params.update_distance_ratio - 1.0) / search_scale);
+        params.update_distance_ratio <= 0.0 || distance < limit
     }
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
@@ -76,9 +77,9 @@ mod tests {
     #[test]
     fn a_jump_is_not_trusted_until_it_has_lasted() {
         let params = Preset::Robust.params();
-        let mut trust = Trust::default();
-        assert!((1..50).all(|number| trust.judge(0.2, number, &params)));
-        let untrusted = (50..500).take_while(|&number| !trust.judge(0.6, number, &params));
+        let mut update_gate = UpdateGate::default();
+        assert!((1..50).all(|number| update_gate.judge(0.2, number, &params)));
+        let untrusted = (50..500).take_while(|&number| !update_gate.judge(0.6, number, &params));
         let untrusted = untrusted.count();
         assert!((10..100).contains(&untrusted), "{untrusted}");
     }
@@ -86,26 +87,30 @@ mod tests {
     #[test]
     fn what_is_hardly_believed_is_not_learned_once_there_were_some_frames() {
         let params = Preset::Robust.params();
-        let learned = |score, number| believes(score, number, &params);
+        let learned = |score, number| passes(score, number, &params);
         assert!(learned(0.1, UNTIL_USUAL - 1) && learned(0.7, 500));
         assert!(!learned(0.6, UNTIL_USUAL) && !learned(0.1, 500));
-        assert!(believes(0.0, 500, &Preset::Paper.params()));
+        assert!(passes(0.0, 500, &Preset::Paper.params()));
     }
 
     /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
     #[test]
     fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
         let params = Preset::Robust.params();
-        let trust = Trust { usual: 0.57 };
-        assert!(trust.recognizes(0.6, 1.5, &params));
-        assert!(!trust.recognizes(0.6, 11.0, &params));
-        assert!(trust.recognizes(0.55, 11.0, &params));
+        let update_gate = UpdateGate { usual: 0.57 };
+        assert!(update_gate.recognizes(0.6, 1.5, &params));
+        assert!(!update_gate.recognizes(0.6, 11.0, &params));
+        assert!(update_gate.recognizes(0.55, 11.0, &params));
     }
 
     #[test]
     fn a_creeping_change_is_trusted_all_along() {
         let params = Preset::Robust.params();
-        let mut trust = Trust::default();
-        assert!((1..200).all(|number| trust.judge(0.2 + number as f64 * 0.003, number, &params)));
+        let mut update_gate = UpdateGate::default();
+        assert!((1..200).all(|number| update_gate.judge(
+            0.2 + number as f64 * 0.003,
+            number,
+            &params
+        )));
     }
 }

@@ -13,7 +13,7 @@ const GROUP: usize = 8;
 
 /// The energies of the cells of one area.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Energies {
+pub(crate) struct BlockNorm {
     columns: usize,
     /// Row by row.
     values: Vec<f32>,
@@ -27,7 +27,7 @@ pub(crate) struct Energies {
     scales: Vec<f32>,
 }
 
-impl Energies {
+impl BlockNorm {
     /// Makes room for so many columns and rows of cells.
     pub fn prepare(&mut self, columns: usize, rows: usize) {
         self.columns = columns;
@@ -61,8 +61,8 @@ impl Energies {
     ) {
         let out = &mut self.values[row * self.columns + first..][..N];
         if reduce::can_sum::<S, f32>(simd) {
-            let groups = energies.as_chunks::<{ reduce::TOGETHER }>();
-            let out = out.as_chunks_mut::<{ reduce::TOGETHER }>();
+            let groups = energies.as_chunks::<{ reduce::GROUP_SIZE }>();
+            let out = out.as_chunks_mut::<{ reduce::GROUP_SIZE }>();
             for (energies, out) in groups.0.iter().zip(out.0) {
                 *out = f32::sum_each(simd, *energies);
             }
@@ -151,7 +151,7 @@ mod tests {
     fn scales_are_those_of_the_mean_energy_around() {
         for (columns, rows) in [(4, 4), (8, 8), (5, 7), (17, 4)] {
             let energy = |i: usize| (i * 37 % 23) as f32;
-            let mut energies = Energies::default();
+            let mut energies = BlockNorm::default();
             energies.prepare(columns, rows);
             for (i, value) in energies.values[..columns * rows].iter_mut().enumerate() {
                 *value = energy(i);

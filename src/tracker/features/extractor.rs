@@ -2,31 +2,31 @@
 //!
 //! A view is open on one frame, around one place: what lies further off is not there.
 
-use crate::tracker::features::hog::{CHANNELS, Cells};
 use crate::tracker::features::centering::Centering;
-use crate::tracker::features::integral::{DIRECTIONS, GradientSums};
-use crate::tracker::motion::particles::{Particle, Reach};
-use crate::tracker::features::gray::PatchCutter;
-use crate::tracker::params::table::Features;
+use crate::tracker::features::gray::GrayPatches;
+use crate::tracker::features::hog::{CHANNELS, Hog};
+use crate::tracker::features::integral::{DIRECTIONS, IntegralChannels};
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
 use crate::tracker::image::rect::Rect;
-use crate::tracker::workspace;
+use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::params::table::Features;
+use crate::tracker::params::table::Params;
 use crate::tracker::scale::pyramid;
+use crate::tracker::workspace;
 
 /// How much larger than the largest particle the areas of a frame may be: scales change by a few hundredths a frame.
-const LARGER: f64 = 1.08;
+const SCALE_MARGIN: f64 = 1.08;
 
 /// Cuts feature vectors out of one frame.
 #[derive(Debug, Default)]
-pub(crate) struct View {
-    cutter: PatchCutter,
+pub(crate) struct Extractor {
+    cutter: GrayPatches,
     /// Working pixels along a pixel of the frame's.
-    grain: f64,
-    gradients: GradientSums,
-    cells: Cells,
+    downsample: f64,
+    gradients: IntegralChannels,
+    cells: Hog,
     /// Those of a grid.
-    grid_cells: Cells,
+    grid_cells: Hog,
 }
 
 /// The cells of a place and its surroundings, row by row.
@@ -39,10 +39,15 @@ pub(crate) struct Grid {
     pub grays: Vec<f32>,
 }
 
-impl View {
-    /// What is looked at for the areas of `particles`, of which there is one, and for others up to `furthest` working pixels
-    /// from one of these and [`LARGER`] than the largest.
-    pub fn window(particles: &[Particle], furthest: f64, reach: &Reach, params: &Params) -> Rect {
+impl Extractor {
+    /// What is looked at for the areas of `particles`, of which there is one, and for others up to `radius` working pixels
+    /// from one of these and [`SCALE_MARGIN`] than the largest.
+    pub fn window(
+        particles: &[Particle],
+        radius: f64,
+        bounds: &StateBounds,
+        params: &Params,
+    ) -> Rect {
         let mut largest = particles[0];
         let (mut left, mut right) = (largest.x, largest.x);
         let (mut top, mut bottom) = (largest.y, largest.y);
@@ -51,35 +56,35 @@ impl View {
             (top, bottom) = (top.min(particle.y), bottom.max(particle.y));
             largest.scale = largest.scale.max(particle.scale);
         }
-        let area = seen(&largest, reach, params);
+        let area = seen(&largest, bounds, params);
         // A pyramid is of the box alone, without its context.
-        let larger = LARGER.max(pyramid::largest() / params.context);
+        let larger = SCALE_MARGIN.max(pyramid::largest() / params.context);
         let (width, height) = (larger * area.width, larger * area.height);
         Rect::new(
-            left - furthest - width / 2.0,
-            top - furthest - height / 2.0,
-            right - left + 2.0 * furthest + width,
-            bottom - top + 2.0 * furthest + height,
+            left - radius - width / 2.0,
+            top - radius - height / 2.0,
+            right - left + 2.0 * radius + width,
+            bottom - top + 2.0 * radius + height,
         )
     }
 
     /// Gets ready for the areas in the [`window`](Self::window).
-    pub fn open(
+    pub fn compute_channels(
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
-        furthest: f64,
-        reach: &Reach,
+        radius: f64,
+        bounds: &StateBounds,
         params: &Params,
     ) {
-        self.grain = frame.grain();
+        self.downsample = frame.downsample();
         if params.features == Features::Gradients {
-            let window = Self::window(particles, furthest, reach, params);
+            let window = Self::window(particles, radius, bounds, params);
             // One size of cells for all: the first particle is the last answer.
-            let (width, height) = Self::cell(&particles[0], reach, params);
-            let cell = (width / self.grain, height / self.grain);
+            let (width, height) = Self::cell(&particles[0], bounds, params);
+            let cell = (width / self.downsample, height / self.downsample);
             self.gradients
-                .compute(frame, &window.in_pixels_of(self.grain), cell);
+                .compute(frame, &window.in_pixels_of(self.downsample), cell);
         }
     }
 
@@ -88,12 +93,12 @@ impl View {
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
-        reach: &Reach,
+        bounds: &StateBounds,
         params: &Params,
         out: &mut Vec<f32>,
     ) {
         out.resize(particles.len() * params.feature_len(), 0.0);
-        self.describe(frame, particles, reach, params, out, None);
+        self.describe(frame, particles, bounds, params, out, None);
     }
 
     /// Writes the feature vectors, of length D, of `particles` to `out`, which is as long as they are; centered, if that is
@@ -102,23 +107,23 @@ impl View {
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
-        reach: &Reach,
+        bounds: &StateBounds,
         params: &Params,
         out: &mut [f32],
         centering: Option<Centering<'_>>,
     ) {
         match params.features {
             Features::Gray => {
-                self.cut(frame, particles, reach, params, out);
+                self.cut(frame, particles, bounds, params, out);
                 if let Some(centering) = centering {
                     centering.apply_to_all(out, params.feature_len());
                 }
             }
             Features::Gradients => {
-                let grain = self.grain;
+                let downsample = self.downsample;
                 let areas = particles
                     .iter()
-                    .map(|particle| seen(particle, reach, params).in_pixels_of(grain));
+                    .map(|particle| seen(particle, bounds, params).in_pixels_of(downsample));
                 self.cells
                     .describe(&self.gradients, areas, params, out, centering);
             }
@@ -126,8 +131,8 @@ impl View {
     }
 
     /// Width and height of a cell of `particle`, in working pixels.
-    pub fn cell(particle: &Particle, reach: &Reach, params: &Params) -> (f64, f64) {
-        let area = seen(particle, reach, params);
+    pub fn cell(particle: &Particle, bounds: &StateBounds, params: &Params) -> (f64, f64) {
+        let area = seen(particle, bounds, params);
         (
             area.width / f64::from(params.patch_width),
             area.height / f64::from(params.patch_height),
@@ -141,7 +146,7 @@ impl View {
         center: &Particle,
         more: (usize, usize),
         most: usize,
-        reach: &Reach,
+        bounds: &StateBounds,
         params: &Params,
         grid: &mut Grid,
     ) {
@@ -151,12 +156,12 @@ impl View {
         };
         let (columns, rows) = sides(more);
         let (most_columns, most_rows) = sides((most, most));
-        let (x, y) = reach.area(center).center();
-        let (width, height) = Self::cell(center, reach, params);
+        let (x, y) = bounds.area(center).center();
+        let (width, height) = Self::cell(center, bounds, params);
         let area = Rect::centered(x, y, width * f64::from(columns), height * f64::from(rows));
         let most = (most_columns * most_rows) as usize;
-        workspace::empty(&mut grid.values, most * CHANNELS);
-        workspace::empty(&mut grid.grays, most);
+        workspace::clear_and_reserve(&mut grid.values, most * CHANNELS);
+        workspace::clear_and_reserve(&mut grid.grays, most);
         grid.columns = columns as usize;
         grid.values
             .resize((columns * rows) as usize * CHANNELS, 0.0);
@@ -167,7 +172,7 @@ impl View {
         };
         let cells = &mut self.grid_cells;
         cells.reserve(most_columns as usize, most_rows as usize);
-        let areas = std::iter::once(area.in_pixels_of(self.grain));
+        let areas = std::iter::once(area.in_pixels_of(self.downsample));
         cells.describe(&self.gradients, areas, &params, &mut grid.values, None);
         grid.grays.extend(cells.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
@@ -180,20 +185,20 @@ impl View {
         &mut self,
         frame: &GrayFrame,
         particles: &[Particle],
-        reach: &Reach,
+        bounds: &StateBounds,
         params: &Params,
         out: &mut [f32],
     ) {
         let areas = particles
             .iter()
-            .map(|particle| seen(particle, reach, params));
+            .map(|particle| seen(particle, bounds, params));
         self.cutter.cut(frame, areas, params, out);
     }
 }
 
 /// The area that is looked at for a particle: its box and the context around it.
-fn seen(particle: &Particle, reach: &Reach, params: &Params) -> Rect {
-    let area = reach.area(particle);
+fn seen(particle: &Particle, bounds: &StateBounds, params: &Params) -> Rect {
+    let area = bounds.area(particle);
     let (x, y) = area.center();
     Rect::centered(
         x,

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::features::integral::DIRECTIONS;
+use crate::tracker::image::frame::GrayFrame;
 
 /// For each pixel of a row the direction of its gradient, in bins, and its strength.
 #[derive(Debug, Clone, Default)]
@@ -84,8 +84,11 @@ mod tests {
     #[test]
     fn angles_are_those_of_atan2() {
         for step in 0..2000 {
-            let turn = f64::from(step) * std::f64::consts::TAU / 2000.0;
-            let (x, y) = ((turn.cos() * 200.0) as f32, (turn.sin() * 200.0) as f32);
+            let orientation = f64::from(step) * std::f64::consts::TAU / 2000.0;
+            let (x, y) = (
+                (orientation.cos() * 200.0) as f32,
+                (orientation.sin() * 200.0) as f32,
+            );
             let expected = f64::from(y)
                 .atan2(f64::from(x))
                 .rem_euclid(std::f64::consts::PI);

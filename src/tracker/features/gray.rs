@@ -10,14 +10,14 @@ use pulp::{Arch, Simd, WithSimd};
 #[cfg(target_arch = "x86_64")]
 use crate::tracker::features::gray_avx512::PermutedCuts;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
 
 /// How many columns are worked on together.
 const BLOCK: usize = 16;
 
 /// Most rows or columns of cells; whole blocks.
-pub(crate) const MOST_CELLS: usize = 64;
+pub(crate) const MAX_CELLS: usize = 64;
 
 /// More than the quads of a row; a power of two, so that a masked index needs no check.
 const WINDOW: usize = 512;
@@ -28,7 +28,7 @@ const _: () = assert!((crate::tracker::image::frame::WORKING_SIDE as usize) < WI
 /// This took as long as everything else that a step does. So the four pixels between which a cell lies are one 32-bit
 /// word, a *quad*, made once a frame for all areas; a cell is then one load, and the rest is vector instructions.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct PatchCutter {
+pub(crate) struct GrayPatches {
     /// For each pixel of the region row by row: itself, the one right of it, and the two below these, lowest byte first.
     quads: Vec<u32>,
     /// The pixels of the region, where patches are cut by permutations.
@@ -38,8 +38,8 @@ pub(crate) struct PatchCutter {
 
 /// For each cell along one axis, the pixel at or before its centre, and the share of the pixel after that one.
 pub(crate) struct Axis {
-    pub first: [u32; MOST_CELLS],
-    pub share: [f32; MOST_CELLS],
+    pub first: [u32; MAX_CELLS],
+    pub share: [f32; MAX_CELLS],
 }
 
 /// The pixels at or after which cells can lie: from (`left`, `top`), `width` a row, `height` rows.
@@ -59,7 +59,7 @@ struct Cuts<'a, A> {
     out: &'a mut [f32],
 }
 
-impl PatchCutter {
+impl GrayPatches {
     /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each.
     pub fn cut<A: Iterator<Item = Rect> + Clone>(
         &mut self,
@@ -124,7 +124,7 @@ impl<A: Iterator<Item = Rect> + Clone> WithSimd for Cuts<'_, A> {
                 let start = (row - region.top) as usize * region.width;
                 let row = quads[start..]
                     .first_chunk()
-                    .expect("a window of room after the last quad");
+                    .expect("a window of scratch after the last quad");
                 cut_row(row, &at, &across.share, share, target);
             }
         }
@@ -135,8 +135,8 @@ impl<A: Iterator<Item = Rect> + Clone> WithSimd for Cuts<'_, A> {
 #[inline(always)]
 fn cut_row(
     row: &[u32; WINDOW],
-    at: &[u32; MOST_CELLS],
-    shares: &[f32; MOST_CELLS],
+    at: &[u32; MAX_CELLS],
+    shares: &[f32; MAX_CELLS],
     lower: f32,
     target: &mut [f32],
 ) {
@@ -165,8 +165,8 @@ impl Axis {
     #[inline(always)]
     pub fn lay(start: f64, extent: f64, count: u32, pixels: u32) -> Self {
         let mut axis = Self {
-            first: [0; MOST_CELLS],
-            share: [0.0; MOST_CELLS],
+            first: [0; MAX_CELLS],
+            share: [0.0; MAX_CELLS],
         };
         let step = extent / f64::from(count);
         let last = f64::from(pixels - 1);
@@ -238,7 +238,7 @@ impl Region {
 /// The feature vector of `area` of `image`, both in working pixels: D gray values in [0, 1], row by row.
 pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
     let mut values = vec![0.0; params.feature_len()];
-    PatchCutter::default().cut(image, std::iter::once(*area), params, &mut values);
+    GrayPatches::default().cut(image, std::iter::once(*area), params, &mut values);
     values
 }
 
@@ -291,22 +291,22 @@ mod tests {
             };
             for (width, height) in [(320, 240), (40, 30), (240, 320), (1, 30), (40, 1), (1, 1)] {
                 let image = image(width, height);
-                let room = vec![0.5_f32; 7 * params.feature_len()];
+                let scratch = vec![0.5_f32; 7 * params.feature_len()];
                 let areas = areas().into_iter();
-                let mut cutter = PatchCutter::default();
-                let mut fastest = room.clone();
+                let mut cutter = GrayPatches::default();
+                let mut fastest = scratch.clone();
                 cutter.cut(&image, areas.clone(), &params, &mut fastest);
-                let mut widest = room.clone();
+                let mut widest = scratch.clone();
                 let cuts = cutter.cuts(&image, areas.clone(), &params, &mut widest);
                 Arch::new().dispatch(cuts);
                 assert_eq!(fastest, widest, "{columns} x {rows} of {width} x {height}");
-                let mut plain = room.clone();
+                let mut plain = scratch.clone();
                 let cuts = cutter.cuts(&image, areas.clone(), &params, &mut plain);
                 Simd::vectorize(Scalar::new(), cuts);
                 assert_eq!(fastest, plain, "{columns} x {rows} of {width} x {height}");
                 #[cfg(target_arch = "x86_64")]
                 if let Some(simd) = pulp::x86::V3::try_new() {
-                    let mut middle = room;
+                    let mut middle = scratch;
                     Simd::vectorize(simd, cutter.cuts(&image, areas, &params, &mut middle));
                     assert_eq!(fastest, middle, "{columns} x {rows} of {width} x {height}");
                 }

@@ -10,19 +10,20 @@ use std::ops::Range;
 
 use pulp::{NullaryFnOnce, x86::V4};
 
-use crate::tracker::features::gray::{Axis, MOST_CELLS, Region};
+use crate::tracker::features::gray::{Axis, MAX_CELLS, Region};
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::params::table::Params;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
 
 /// Cells that are looked up together.
 const LANES: usize = 16;
 
 /// Pixels among which one permutation looks up.
-const REACH: usize = 2 * LANES;
+const BOUNDS: usize = 2 * LANES;
 
 /// Room after the last pixel: more than the look-ups in the longest row of pixels reach over its end.
-const ROOM: usize = (crate::tracker::image::frame::WORKING_SIDE as usize).next_multiple_of(REACH) + 2 * REACH;
+const ROOM: usize =
+    (crate::tracker::image::frame::WORKING_SIDE as usize).next_multiple_of(BOUNDS) + 2 * BOUNDS;
 
 /// All cuts of a frame.
 pub(crate) struct PermutedCuts<'a, A> {
@@ -43,7 +44,7 @@ struct Block {
     at: [u32; LANES],
     /// The share of the pixel after that one.
     shares: [f32; LANES],
-    /// How many times [`REACH`] pixels they lie among, and whether they lie among the first [`LANES`].
+    /// How many times [`BOUNDS`] pixels they lie among, and whether they lie among the first [`LANES`].
     pieces: usize,
     is_narrow: bool,
 }
@@ -95,9 +96,9 @@ impl<A: Iterator<Item = Rect> + Clone> NullaryFnOnce for PermutedCuts<'_, A> {
 /// The rows of cells of one area.
 struct Rows<'a> {
     /// Where the row of pixels at or before the centres begins.
-    starts: &'a [usize; MOST_CELLS],
+    starts: &'a [usize; MAX_CELLS],
     /// The share of the row after that one.
-    shares: &'a [f32; MOST_CELLS],
+    shares: &'a [f32; MAX_CELLS],
     pixels: &'a [f32],
     width: usize,
 }
@@ -110,13 +111,13 @@ impl Block {
         let last = (cells + LANES).min(columns) - 1;
         let first = across.first[cells];
         // The pixel after the last counts too.
-        let furthest = (across.first[last] - first + 1) as usize;
+        let radius = (across.first[last] - first + 1) as usize;
         let mut block = Self {
             first: (first - left) as usize,
             at: [0; LANES],
             shares: [0.0; LANES],
-            pieces: furthest / REACH + 1,
-            is_narrow: furthest < LANES,
+            pieces: radius / BOUNDS + 1,
+            is_narrow: radius < LANES,
         };
         for lane in 0..LANES {
             block.at[lane] = across.first[cells + lane].wrapping_sub(first);
@@ -204,8 +205,8 @@ impl Pair<'_> {
         let [mut before, mut after] = self.look_up_near(simd, left, right, 0);
         for index in 1..pieces {
             // A permutation looks at the five low bits of a place.
-            let further = self.look_up_near(simd, left, right, index * REACH);
-            let least = x._mm512_set1_epi32((index * REACH) as i32);
+            let further = self.look_up_near(simd, left, right, index * BOUNDS);
+            let least = x._mm512_set1_epi32((index * BOUNDS) as i32);
             let is_further = x._mm512_cmpge_epi32_mask(left, least);
             before = x._mm512_mask_blend_ps(is_further, before, further[0]);
             let is_further = x._mm512_cmpge_epi32_mask(right, least);
@@ -229,7 +230,7 @@ impl Pair<'_> {
 fn load(pixels: &[f32]) -> __m512 {
     let pixels: &[f32; LANES] = pixels
         .first_chunk()
-        .expect("a window of room after the last pixel");
+        .expect("a window of scratch after the last pixel");
     pulp::cast(*pixels)
 }
 

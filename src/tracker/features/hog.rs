@@ -2,28 +2,28 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::features::hog_cells::Area;
 use crate::tracker::features::centering::Centering;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, GradientSums};
-use crate::tracker::params::table::Params;
+use crate::tracker::features::hog_cells::Area;
+use crate::tracker::features::integral::{DIRECTIONS, GRAY, IntegralChannels};
 use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
 
 /// Values of a cell: the directions, then its gray value.
 pub(crate) const CHANNELS: usize = DIRECTIONS + 1;
 
 /// Room for the cells of areas.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Cells {
+pub(crate) struct Hog {
     columns: usize,
     rows: usize,
     /// Of two areas, so that the one is summed up while the other is still divided.
     areas: [Area; 2],
 }
 
-/// [`Cells::describe`], to be compiled for the instructions that this machine has.
+/// [`Hog::describe`], to be compiled for the instructions that this machine has.
 struct Describe<'a, A> {
-    cells: &'a mut Cells,
-    sums: &'a GradientSums,
+    cells: &'a mut Hog,
+    sums: &'a IntegralChannels,
     areas: A,
     gray_weight: f32,
     out: &'a mut [f32],
@@ -80,7 +80,7 @@ fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut 
     }
 }
 
-impl Cells {
+impl Hog {
     /// Writes the feature vectors of `areas` (working pixels, sides above 0, in the window that was summed up) to `out`,
     /// each of length D: cell by cell, row by row, the nine directions and the gray value.
     ///
@@ -89,7 +89,7 @@ impl Cells {
     /// that is asked for.
     pub fn describe(
         &mut self,
-        sums: &GradientSums,
+        sums: &IntegralChannels,
         areas: impl Iterator<Item = Rect>,
         params: &Params,
         out: &mut [f32],
@@ -132,8 +132,8 @@ impl Cells {
 
 #[cfg(test)]
 mod tests {
-    use crate::tracker::features::hog_cells::{FLAT, GREATEST};
     use super::*;
+    use crate::tracker::features::hog_cells::{FLAT, GREATEST};
     use crate::tracker::image::frame::GrayFrame;
     use crate::tracker::params::presets::Preset;
 
@@ -148,9 +148,10 @@ mod tests {
         let pixel = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
         let across = pixel((x + 1).min(width - 1), y) - pixel(x.saturating_sub(1), y);
         let down = pixel(x, (y + 1).min(height - 1)) - pixel(x, y.saturating_sub(1));
-        let turn = down.atan2(across).rem_euclid(std::f64::consts::PI) / std::f64::consts::PI;
+        let orientation =
+            down.atan2(across).rem_euclid(std::f64::consts::PI) / std::f64::consts::PI;
         (
-            (turn * DIRECTIONS as f64).min(8.9999999),
+            (orientation * DIRECTIONS as f64).min(8.9999999),
             across.hypot(down),
         )
     }
@@ -178,7 +179,7 @@ mod tests {
     #[test]
     fn cells_are_sums_over_their_pixels() {
         let frame = frame();
-        let (mut sums, mut cells) = (GradientSums::default(), Cells::default());
+        let (mut sums, mut cells) = (IntegralChannels::default(), Hog::default());
         cells.prepare(4, 4);
         for area in [
             Rect::new(10.0, 8.0, 32.0, 24.0),
@@ -206,11 +207,11 @@ mod tests {
     }
 
     fn features(frame: &GrayFrame, area: Rect, params: &Params) -> Vec<f32> {
-        let mut sums = GradientSums::default();
+        let mut sums = IntegralChannels::default();
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
         sums.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
         let mut out = vec![1.0; params.feature_len()];
-        Cells::default().describe(&sums, std::iter::once(area), params, &mut out, None);
+        Hog::default().describe(&sums, std::iter::once(area), params, &mut out, None);
         out
     }
 

@@ -2,18 +2,20 @@
 
 use pulp::Simd;
 
-use crate::tracker::image::rect::Rect;
+use crate::tracker::features::block_norm::BlockNorm;
 use crate::tracker::features::hog::CHANNELS;
-use crate::tracker::features::block_norm::Energies;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, GradientSums, LANES, Lanes, registers};
-use crate::tracker::features::sample_coords::Places;
+use crate::tracker::features::integral::{
+    DIRECTIONS, GRAY, IntegralChannels, LANES, Lanes, registers,
+};
+use crate::tracker::features::sample_coords::SampleCoords;
+use crate::tracker::image::rect::Rect;
 
 /// The greatest normalised value of a direction, so that one strong edge does not outweigh all else.
 pub(crate) const GREATEST: f32 = 0.4;
 /// Gradients of flat cells are noise: this much, in gray levels a pixel, is added to what they are divided by.
 pub(crate) const FLAT: f32 = 2.0;
 /// The least standard deviation of gray values, in gray levels, that theirs are divided by.
-pub(crate) const LEAST_CONTRAST: f32 = 4.0;
+pub(crate) const MIN_CONTRAST: f32 = 4.0;
 
 /// The share of each channel in a cell's energy.
 const ENERGY_SHARES: Lanes = {
@@ -40,12 +42,12 @@ const STRIP: usize = 8;
 pub(crate) struct Area {
     /// The channels of each cell, row by row.
     pub cells: Vec<Lanes>,
-    energies: Energies,
+    energies: BlockNorm,
     grays: Grays,
     /// The mean number of pixels of a cell.
     pixels: f32,
     /// The corners of the cells among the columns and the rows of the sums.
-    places: [Places; 2],
+    places: [SampleCoords; 2],
 }
 
 /// The sum of the gray values of all cells, and that of their squares.
@@ -66,7 +68,12 @@ impl Area {
 
     /// Takes the places of the cells of `area`, for [`sum_up`](Self::sum_up).
     #[inline(always)]
-    pub fn locate(&mut self, sums: &GradientSums, area: &Rect, (columns, rows): (usize, usize)) {
+    pub fn locate(
+        &mut self,
+        sums: &IntegralChannels,
+        area: &Rect,
+        (columns, rows): (usize, usize),
+    ) {
         let width = (area.width / columns as f64) as f32;
         let height = (area.height / rows as f64) as f32;
         sums.columns((area.x as f32, width), &mut self.places[0]);
@@ -75,7 +82,13 @@ impl Area {
 
     /// Becomes the cells of the area that was located, and their energies.
     #[inline(always)]
-    pub fn sum_up<S: Simd>(&mut self, simd: S, sums: &GradientSums, area: &Rect, columns: usize) {
+    pub fn sum_up<S: Simd>(
+        &mut self,
+        simd: S,
+        sums: &IntegralChannels,
+        area: &Rect,
+        columns: usize,
+    ) {
         let mut grays = [Lanes::ZERO; 2];
         let mut first = 0;
         while first + STRIP <= columns {
@@ -100,7 +113,7 @@ impl Area {
     fn sum_strip<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        sums: &GradientSums,
+        sums: &IntegralChannels,
         (first, columns): (usize, usize),
         total: &mut [Lanes; 2],
     ) {
@@ -170,7 +183,7 @@ impl Area {
         let (count, pixels, grays) = (self.cells.len() as f32, self.pixels, self.grays);
         let mean = grays.sum / count;
         let variance = (grays.squares / count - mean * mean).max(0.0);
-        let gray_scale = gray_weight / variance.sqrt().max(LEAST_CONTRAST * pixels);
+        let gray_scale = gray_weight / variance.sqrt().max(MIN_CONTRAST * pixels);
         let floor = (FLAT * pixels) * (FLAT * pixels);
         // A value is min(cell * factor + offset, limit).
         let (mut gray_factors, mut offsets) = (Lanes::ZERO, Lanes::ZERO);

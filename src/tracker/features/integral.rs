@@ -12,7 +12,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::features::gradient::GradientRow;
-use crate::tracker::features::sample_coords::{Place, Places};
+use crate::tracker::features::sample_coords::{SampleCoord, SampleCoords};
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
 
@@ -99,13 +99,13 @@ const GRAY_SHARES: Lanes = {
 
 /// Running sums of the channels over a window of a frame.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct GradientSums {
+pub(crate) struct IntegralChannels {
     left: usize,
     top: usize,
     right: usize,
     bottom: usize,
     /// Pixels from one corner to the next.
-    grain: usize,
+    downsample: usize,
     columns: usize,
     rows: usize,
     /// `(rows + 1) * (columns + 1)`: the sum over all pixels of the window above and left of a corner. Room beyond.
@@ -113,9 +113,9 @@ pub(crate) struct GradientSums {
     row: GradientRow,
 }
 
-/// [`GradientSums::compute`], to be compiled for the instructions that this machine has.
+/// [`IntegralChannels::compute`], to be compiled for the instructions that this machine has.
 struct Compute<'a> {
-    sums: &'a mut GradientSums,
+    sums: &'a mut IntegralChannels,
     frame: &'a GrayFrame,
 }
 
@@ -128,7 +128,7 @@ impl WithSimd for Compute<'_> {
     }
 }
 
-impl GradientSums {
+impl IntegralChannels {
     /// Sums up the channels over the part of `frame` that `window` (working pixels) touches. Where a cell is at least
     /// [`COARSE`] pixels wide and high, there is a corner at every second pixel only.
     pub fn compute(&mut self, frame: &GrayFrame, window: &Rect, cell: (f64, f64)) {
@@ -136,9 +136,9 @@ impl GradientSums {
         let (top, bottom) = span(window.y, window.height, frame.height() as usize);
         (self.left, self.top) = (left, top);
         (self.right, self.bottom) = (right, bottom);
-        self.grain = if cell.0.min(cell.1) >= COARSE { 2 } else { 1 };
-        self.columns = (right - left).div_ceil(self.grain);
-        self.rows = (bottom - top).div_ceil(self.grain);
+        self.downsample = if cell.0.min(cell.1) >= COARSE { 2 } else { 1 };
+        self.columns = (right - left).div_ceil(self.downsample);
+        self.rows = (bottom - top).div_ceil(self.downsample);
         Arch::new().dispatch(Compute { sums: self, frame });
     }
 
@@ -154,15 +154,15 @@ impl GradientSums {
             let (above, below) = self.sums.split_at_mut((row + 1) * stride);
             let (above, below) = (&above[row * stride..], &mut below[..stride]);
             below[0] = Lanes::ZERO;
-            for step in 0..self.grain {
-                let y = self.top + row * self.grain + step;
+            for step in 0..self.downsample {
+                let y = self.top + row * self.downsample + step;
                 if y >= self.bottom {
                     break;
                 }
                 let gradients = &mut self.row;
                 let pixels = self.left..self.right;
-                gradients.compute(frame, pixels, y, self.columns * self.grain);
-                match (self.grain, step) {
+                gradients.compute(frame, pixels, y, self.columns * self.downsample);
+                match (self.downsample, step) {
                     (1, _) => sum_row::<S, 1, true>(simd, gradients, above, below),
                     (_, 0) => sum_row::<S, 2, true>(simd, gradients, above, below),
                     _ => sum_row::<S, 2, false>(simd, gradients, above, below),
@@ -173,21 +173,21 @@ impl GradientSums {
 
     /// Makes `places` those of evenly spaced `x`, in working pixels, among the columns of corners.
     #[inline(always)]
-    pub fn columns(&self, (x, step): (f32, f32), places: &mut Places) {
-        let share = 1.0 / self.grain as f32;
+    pub fn columns(&self, (x, step): (f32, f32), places: &mut SampleCoords) {
+        let share = 1.0 / self.downsample as f32;
         places.take((x - self.left as f32) * share, step * share, self.columns);
     }
 
     /// Makes `places` those of evenly spaced `y`, in working pixels, among the rows of corners.
     #[inline(always)]
-    pub fn rows(&self, (y, step): (f32, f32), places: &mut Places) {
-        let share = 1.0 / self.grain as f32;
+    pub fn rows(&self, (y, step): (f32, f32), places: &mut SampleCoords) {
+        let share = 1.0 / self.downsample as f32;
         places.take((y - self.top as f32) * share, step * share, self.rows);
     }
 
     /// The sums along a line.
     #[inline(always)]
-    pub fn row(&self, place: Place) -> SumsRow<'_> {
+    pub fn row(&self, place: SampleCoord) -> SumsRow<'_> {
         let stride = self.columns + 1;
         let rows = &self.sums[place.corner * stride..][..2 * stride];
         let (upper, lower) = rows.split_at(stride);
@@ -199,10 +199,10 @@ impl GradientSums {
     }
 }
 
-/// The sums at the corners below a row of pixels, one for every `GRAIN` pixels: those of the row's pixels up to there
+/// The sums at the corners below a row of pixels, one for every `FACTOR` pixels: those of the row's pixels up to there
 /// are added to the sums above (`IS_FIRST`), or to what is below already.
 #[inline(always)]
-fn sum_row<S: Simd, const GRAIN: usize, const IS_FIRST: bool>(
+fn sum_row<S: Simd, const FACTOR: usize, const IS_FIRST: bool>(
     simd: S,
     row: &GradientRow,
     above: &[Lanes],
@@ -214,9 +214,9 @@ fn sum_row<S: Simd, const GRAIN: usize, const IS_FIRST: bool>(
     let gray_shares = gray_shares.load::<S>();
     let zero = simd.splat_f32s(0.0);
     let mut total = [zero; LANES];
-    let (bins, _) = row.bins.as_chunks::<GRAIN>();
-    let (strengths, _) = row.strengths.as_chunks::<GRAIN>();
-    let (grays, _) = row.gray[1..].as_chunks::<GRAIN>();
+    let (bins, _) = row.bins.as_chunks::<FACTOR>();
+    let (strengths, _) = row.strengths.as_chunks::<FACTOR>();
+    let (grays, _) = row.gray[1..].as_chunks::<FACTOR>();
     let pixels = bins.iter().zip(strengths).zip(grays);
     let corners = above[1..].iter().zip(&mut below[1..]);
     for (((bins, strengths), grays), (above, below)) in pixels.zip(corners) {
@@ -224,7 +224,7 @@ fn sum_row<S: Simd, const GRAIN: usize, const IS_FIRST: bool>(
         for register in 0..registers::<S>() {
             // Apart from the sum so far, of which each pixel waits for the last one.
             let mut sum = zero;
-            for i in 0..GRAIN {
+            for i in 0..FACTOR {
                 let bin = simd.splat_f32s(bins[i]);
                 let away = simd.abs_f32s(simd.sub_f32s(bin, centers[register]));
                 let share = simd.mul_add_e_f32s(slopes[register], away, tops[register]);
@@ -254,7 +254,7 @@ pub(crate) struct SumsRow<'a> {
 impl SumsRow<'_> {
     /// The sum at a point of the line, interpolated between the four corners around it.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, column: Place) -> Registers<S> {
+    pub fn at<S: Simd>(&self, simd: S, column: SampleCoord) -> Registers<S> {
         let [upper_left, upper_right] = &self.upper[column.corner..].as_chunks::<2>().0[0];
         let [lower_left, lower_right] = &self.lower[column.corner..].as_chunks::<2>().0[0];
         let (right, down) = (simd.splat_f32s(column.beyond), simd.splat_f32s(self.down));
@@ -294,7 +294,7 @@ mod tests {
     fn sums_are_those_of_the_pixels_above_and_left() {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
         let frame = GrayFrame::from_luma(60, 50, luma.collect()).expect("a frame of this size");
-        let mut sums = GradientSums::default();
+        let mut sums = IntegralChannels::default();
         for (left, top, cell) in [(0, 0, 4.0), (7, 12, 4.0), (0, 0, 9.0), (7, 12, 9.0)] {
             // An odd width and height.
             let window = Rect::new(left as f64, top as f64, 31.0, 25.0);
@@ -319,7 +319,7 @@ mod tests {
                         at.next_multiple_of(2)
                     }
                 };
-                let (mut rows, mut columns) = (Places::default(), Places::default());
+                let (mut rows, mut columns) = (SampleCoords::default(), SampleCoords::default());
                 rows.prepare(1);
                 columns.prepare(1);
                 sums.rows(((top + corner(down)) as f32, 0.0), &mut rows);

@@ -11,15 +11,15 @@ const ROUND: f32 = 12_582_912.0;
 
 /// A feature vector in a byte a value.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Look {
+pub(crate) struct QuantizedVector {
     /// What one step of a value is worth.
     scale: f32,
     values: Vec<i8>,
 }
 
-/// [`Look::keep`], to be compiled for the instructions that this machine has.
+/// [`QuantizedVector::keep`], to be compiled for the instructions that this machine has.
 struct Keep<'a> {
-    look: &'a mut Look,
+    look: &'a mut QuantizedVector,
     features: &'a [f32],
 }
 
@@ -32,7 +32,7 @@ impl WithSimd for Keep<'_> {
     }
 }
 
-impl Look {
+impl QuantizedVector {
     /// Keeps `features` in place of what it kept.
     pub fn keep(&mut self, features: &[f32]) {
         Arch::new().dispatch(Keep {
@@ -96,7 +96,7 @@ impl Look {
     }
 
     /// Whether this may be a feature vector of length `len` with no value over `greatest`.
-    pub fn is_sound(&self, len: usize, greatest: f32) -> bool {
+    pub fn is_valid_for(&self, len: usize, greatest: f32) -> bool {
         self.values.len() == len && (0.0..=greatest / 127.0).contains(&self.scale)
     }
 }
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_look_comes_back_within_half_a_step() {
         let features: Vec<f32> = (0..100).map(|i| (i as f32 * 0.7).sin() * 0.3).collect();
-        let mut look = Look::default();
+        let mut look = QuantizedVector::default();
         look.keep(&features);
         let mut back = vec![0.0; 100];
         look.add_to(&mut back, 1.0);

@@ -4,14 +4,14 @@ use crate::tracker::features::integral::LANES;
 
 /// A coordinate among corners: the corner before it, and how far it is beyond that, 0 to 1.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct SampleCoord {
     pub corner: usize,
     pub beyond: f32,
 }
 
 /// The places of evenly spaced coordinates.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Places {
+pub(crate) struct SampleCoords {
     corners: Vec<u32>,
     beyond: Vec<f32>,
 }
@@ -20,7 +20,7 @@ pub(crate) struct Places {
 const ROUND: f32 = 8_388_608.0;
 const WHOLE: u32 = (1 << 23) - 1;
 
-impl Places {
+impl SampleCoords {
     /// Makes room for `count` places, in whole groups.
     pub fn prepare(&mut self, count: usize) {
         self.corners.resize(count.next_multiple_of(LANES), 0);
@@ -48,8 +48,8 @@ impl Places {
 
     /// The place of coordinate `index`.
     #[inline(always)]
-    pub fn get(&self, index: usize) -> Place {
-        Place {
+    pub fn get(&self, index: usize) -> SampleCoord {
+        SampleCoord {
             corner: self.corners[index] as usize,
             beyond: self.beyond[index],
         }
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn places_are_where_their_coordinates_are() {
-        let mut places = Places::default();
+        let mut places = SampleCoords::default();
         places.prepare(37);
         for (start, step, count) in [
             (0.0, 1.0, 40),

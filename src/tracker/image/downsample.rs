@@ -5,10 +5,10 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::motion::particles::{Particle, Reach};
-use crate::tracker::features::extractor::View;
-use crate::tracker::params::table::Features;
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::params::table::Features;
 use crate::tracker::params::table::Params;
 
 /// Pixels along the shorter side of a cell, at least. With 4 a car's growth in the picture is measured too poorly, and the box does not follow it.
@@ -19,7 +19,7 @@ const SHRUNK: f64 = 4.0;
 const GREATEST: usize = 4;
 
 /// Along how many pixels of the frame one of the picture goes in which `target` is looked at: 1, 2 or 4.
-pub(crate) fn grain(target: &Particle, reach: &Reach, params: &Params) -> usize {
+pub(crate) fn downsample(target: &Particle, bounds: &StateBounds, params: &Params) -> usize {
     if params.features == Features::Gray {
         return 1;
     }
@@ -27,42 +27,42 @@ pub(crate) fn grain(target: &Particle, reach: &Reach, params: &Params) -> usize 
         scale: 1.0,
         ..*target
     };
-    let (width, height) = View::cell(&first, reach, params);
+    let (width, height) = Extractor::cell(&first, bounds, params);
     let shorter = width.min(height);
     // A box may be larger than the frame, which has to have a pixel.
-    let most = reach.frame_width.min(reach.frame_height);
-    let mut grain = 1;
-    while grain < GREATEST {
-        let next = (2 * grain) as f64;
+    let most = bounds.frame_width.min(bounds.frame_height);
+    let mut downsample = 1;
+    while downsample < GREATEST {
+        let next = (2 * downsample) as f64;
         if shorter < FINEST * next || shorter * target.scale < SHRUNK * next || next > most {
             break;
         }
-        grain *= 2;
+        downsample *= 2;
     }
-    grain
+    downsample
 }
 
-/// `frame` in pixels of `grain` = 2 or 4 by as many of its own. `room` is memory, whatever it holds.
-pub(crate) fn picture(frame: &GrayFrame, grain: usize, mut room: Vec<u8>) -> GrayFrame {
+/// `frame` in pixels of `downsample` = 2 or 4 by as many of its own. `scratch` is memory, whatever it holds.
+pub(crate) fn picture(frame: &GrayFrame, downsample: usize, mut scratch: Vec<u8>) -> GrayFrame {
     let (width, height) = (
-        frame.width() as usize / grain,
-        frame.height() as usize / grain,
+        frame.width() as usize / downsample,
+        frame.height() as usize / downsample,
     );
-    room.clear();
-    room.resize(width * height, 0);
+    scratch.clear();
+    scratch.resize(width * height, 0);
     Arch::new().dispatch(Average {
         frame,
-        grain,
+        downsample,
         width,
-        out: &mut room,
+        out: &mut scratch,
     });
-    frame.coarse(grain as u32, (width as u32, height as u32), room)
+    frame.coarse(downsample as u32, (width as u32, height as u32), scratch)
 }
 
 /// The means of [`picture`], to be compiled for the instructions that this machine has.
 struct Average<'a> {
     frame: &'a GrayFrame,
-    grain: usize,
+    downsample: usize,
     width: usize,
     out: &'a mut [u8],
 }
@@ -72,7 +72,7 @@ impl WithSimd for Average<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        if self.grain == 2 {
+        if self.downsample == 2 {
             self.average::<2>();
         } else {
             self.average::<4>();
@@ -82,18 +82,18 @@ impl WithSimd for Average<'_> {
 
 impl Average<'_> {
     #[inline(always)]
-    fn average<const GRAIN: usize>(self) {
+    fn average<const FACTOR: usize>(self) {
         let source_width = self.frame.width() as usize;
-        let rows = self.frame.pixels().chunks_exact(GRAIN * source_width);
+        let rows = self.frame.pixels().chunks_exact(FACTOR * source_width);
         for (out, rows) in self.out.chunks_exact_mut(self.width).zip(rows) {
-            let lines: [&[[u8; GRAIN]]; GRAIN] = std::array::from_fn(|row| {
+            let lines: [&[[u8; FACTOR]]; FACTOR] = std::array::from_fn(|row| {
                 let line = &rows[row * source_width..][..source_width];
-                &line.as_chunks::<GRAIN>().0[..out.len()]
+                &line.as_chunks::<FACTOR>().0[..out.len()]
             });
             for (i, out) in out.iter_mut().enumerate() {
                 let square = lines.iter().flat_map(|line| line[i]);
                 let sum: u16 = square.map(u16::from).sum();
-                let count = (GRAIN * GRAIN) as u16;
+                let count = (FACTOR * FACTOR) as u16;
                 *out = ((sum + count / 2) / count) as u8;
             }
         }
@@ -112,21 +112,24 @@ mod tests {
         let luma = (0..width * height).map(|i| gray(i % width, i / width));
         let frame = GrayFrame::from_luma(width as u32, height as u32, luma.collect());
         let frame = frame.expect("a frame of this size");
-        for grain in [2, 4] {
-            let found = picture(&frame, grain, vec![9; 5]);
-            let (columns, rows) = (width / grain, height / grain);
+        for downsample in [2, 4] {
+            let found = picture(&frame, downsample, vec![9; 5]);
+            let (columns, rows) = (width / downsample, height / downsample);
             assert_eq!(
                 (found.width(), found.height()),
                 (columns as u32, rows as u32)
             );
-            assert_eq!(found.grain(), grain as f64);
+            assert_eq!(found.downsample(), downsample as f64);
             for (at, found) in found.pixels().iter().enumerate() {
                 let (column, row) = (at % columns, at / columns);
-                let square = (0..grain * grain).map(|i| {
-                    let (x, y) = (column * grain + i % grain, row * grain + i / grain);
+                let square = (0..downsample * downsample).map(|i| {
+                    let (x, y) = (
+                        column * downsample + i % downsample,
+                        row * downsample + i / downsample,
+                    );
                     f64::from(gray(x, y))
                 });
-                let mean = square.sum::<f64>() / (grain * grain) as f64;
+                let mean = square.sum::<f64>() / (downsample * downsample) as f64;
                 assert!((f64::from(*found) - mean).abs() <= 0.5, "{found} {mean}");
             }
         }
@@ -137,7 +140,7 @@ mod tests {
         let params = Preset::Robust.params();
         // Boxes with eight cells along 1.2 of their sides.
         let of = |cell: f64, scale: f64| {
-            let reach = Reach {
+            let bounds = StateBounds {
                 frame_width: 320.0,
                 frame_height: 240.0,
                 box_width: cell * 8.0 / 1.2,
@@ -148,7 +151,7 @@ mod tests {
                 y: 120.0,
                 scale,
             };
-            grain(&target, &reach, &params)
+            downsample(&target, &bounds, &params)
         };
         assert_eq!(
             [3.0, 11.9, 12.1, 23.9, 24.1, 50.0].map(|cell| of(cell, 1.0)),
@@ -163,17 +166,17 @@ mod tests {
             y: 1.0,
             scale: 1.0,
         };
-        let thin = Reach {
+        let thin = StateBounds {
             frame_width: 300.0,
             frame_height: 3.0,
             box_width: 300.0,
             box_height: 300.0,
         };
-        assert_eq!(grain(&target, &thin, &params), 2);
+        assert_eq!(downsample(&target, &thin, &params), 2);
         let gray = Params {
             features: Features::Gray,
             ..params
         };
-        assert_eq!(grain(&target, &thin, &gray), 1);
+        assert_eq!(downsample(&target, &thin, &gray), 1);
     }
 }

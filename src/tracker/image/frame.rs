@@ -6,8 +6,6 @@
 
 use crate::tracker::image::area_average;
 
-pub use crate::tracker::image::rect::Rect;
-
 /// Longest side, in pixels, of the working image. The paper's pixel lengths hold at this size.
 pub const WORKING_SIDE: u32 = 320;
 
@@ -36,7 +34,7 @@ pub struct GrayFrame {
     source_width: u32,
     source_height: u32,
     /// Working pixels along a side of a pixel: 1, but where the tracker made it coarser.
-    grain: u32,
+    downsample: u32,
 }
 
 impl GrayFrame {
@@ -58,7 +56,7 @@ impl GrayFrame {
     }
 
     /// The same for a frame of `source` = width, height, of which a decoder gives a reduced picture, with `size` = width,
-    /// height, in `luma`. It may be as small as the working image. `room` is memory for the working image, whatever it holds.
+    /// height, in `luma`. It may be as small as the working image. `scratch` is memory for the working image, whatever it holds.
     ///
     /// # Errors
     /// As [`Self::from_luma`]; also a picture that is smaller than the working image, or larger than the frame.
@@ -66,15 +64,15 @@ impl GrayFrame {
         source: (u32, u32),
         size: (u32, u32),
         luma: &[u8],
-        mut room: Vec<u8>,
+        mut scratch: Vec<u8>,
     ) -> Result<Self, FrameError> {
         let working = checked_working_size(source, size, luma.len())?;
-        room.clear();
+        scratch.clear();
         let pixels = if working == size {
-            room.extend_from_slice(luma);
-            room
+            scratch.extend_from_slice(luma);
+            scratch
         } else {
-            area_average::area_average(luma, size, working, room)
+            area_average::area_average(luma, size, working, scratch)
         };
         Ok(Self::new(source, working, pixels))
     }
@@ -86,7 +84,7 @@ impl GrayFrame {
             pixels,
             source_width: source.0,
             source_height: source.1,
-            grain: 1,
+            downsample: 1,
         }
     }
 
@@ -96,22 +94,22 @@ impl GrayFrame {
         Self { pixels, ..*self }
     }
 
-    /// The same frame in `pixels` that are `grain` times as large, of which there are `size` = columns, rows.
-    pub(crate) fn coarse(&self, grain: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
+    /// The same frame in `pixels` that are `downsample` times as large, of which there are `size` = columns, rows.
+    pub(crate) fn coarse(&self, downsample: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
         debug_assert_eq!(pixels.len(), (size.0 * size.1) as usize);
         let (width, height) = size;
         Self {
             width,
             height,
             pixels,
-            grain,
+            downsample,
             ..*self
         }
     }
 
     /// Working pixels along a side of one of these pixels.
-    pub(crate) fn grain(&self) -> f64 {
-        f64::from(self.grain)
+    pub(crate) fn downsample(&self) -> f64 {
+        f64::from(self.downsample)
     }
 
     /// Width of the working image.

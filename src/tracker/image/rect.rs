@@ -34,13 +34,13 @@ impl Rect {
         Self::new(x - width / 2.0, y - height / 2.0, width, height)
     }
 
-    /// The same box in pixels that are `grain` times as large.
-    pub(crate) fn in_pixels_of(&self, grain: f64) -> Self {
+    /// The same box in pixels that are `downsample` times as large.
+    pub(crate) fn in_pixels_of(&self, downsample: f64) -> Self {
         Self::new(
-            self.x / grain,
-            self.y / grain,
-            self.width / grain,
-            self.height / grain,
+            self.x / downsample,
+            self.y / downsample,
+            self.width / downsample,
+            self.height / downsample,
         )
     }
 

@@ -50,7 +50,7 @@ impl WithSimd for Means<'_> {
 pub(crate) fn shrink(frame: &GrayFrame, out: &mut Vec<u8>) -> usize {
     let width = frame.width() as usize;
     let (columns, rows) = (width / CELL, frame.height() as usize / CELL);
-    workspace::empty(out, columns * rows);
+    workspace::clear_and_reserve(out, columns * rows);
     out.resize(columns * rows, 0);
     if columns > 0 {
         Arch::new().dispatch(Means {

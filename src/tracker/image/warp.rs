@@ -4,15 +4,15 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::motion::particles::Particle;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::motion::particles::Particle;
 
 /// Places between pixels are counted in so many parts, as a power of two, and mixed in [`SHARES`] shares.
 const PARTS: u32 = 16;
 const SHARES: u32 = 256;
 /// Pixels that are mixed at once.
-const TOGETHER: usize = 16;
+const GROUP_SIZE: usize = 16;
 
 /// A turn around a point. The picture that it makes is the *turned* one; a target that has turned by as much in the picture
 /// stands upright there.
@@ -56,7 +56,7 @@ impl Rotation {
     }
 
     /// Where `particle` of the turned picture is in the picture itself.
-    pub fn in_picture(&self, particle: &Particle) -> Particle {
+    pub fn to_original(&self, particle: &Particle) -> Particle {
         let (x, y) = (particle.x - self.x, particle.y - self.y);
         Particle {
             x: self.x + self.cos * x - self.sin * y,
@@ -66,40 +66,40 @@ impl Rotation {
     }
 
     /// What a displacement in the picture is in the turned one.
-    pub fn turned_shift(&self, (x, y): (f64, f64)) -> (f64, f64) {
+    pub fn rotated_displacement(&self, (x, y): (f64, f64)) -> (f64, f64) {
         (self.cos * x + self.sin * y, self.cos * y - self.sin * x)
     }
 
     /// `frame` turned, within `window` (working pixels of the turned picture); outside of it is what was there before. Gray
-    /// values between pixels by bilinear interpolation, beyond the edge what is at the edge. `room` is memory, whatever it
+    /// values between pixels by bilinear interpolation, beyond the edge what is at the edge. `scratch` is memory, whatever it
     /// holds.
-    pub fn apply(&self, frame: &GrayFrame, window: &Rect, mut room: Vec<u8>) -> GrayFrame {
+    pub fn apply(&self, frame: &GrayFrame, window: &Rect, mut scratch: Vec<u8>) -> GrayFrame {
         let (width, height) = (frame.width() as usize, frame.height() as usize);
         let source = frame.pixels();
-        room.clear();
-        room.extend_from_slice(source);
+        scratch.clear();
+        scratch.extend_from_slice(source);
         let span = |from: f64, length: f64, limit: usize| {
             let held = |at: f64| at.clamp(0.0, limit as f64) as usize;
             held(from.floor())..held((from + length).ceil())
         };
-        let window = window.in_pixels_of(frame.grain());
+        let window = window.in_pixels_of(frame.downsample());
         let columns = span(window.x, window.width, width);
         let rows = span(window.y, window.height, height);
         // Of one row or column there is nothing to mix.
         if width > 1 && height > 1 {
             Arch::new().dispatch(Mix {
                 rotation: Self {
-                    x: self.x / frame.grain(),
-                    y: self.y / frame.grain(),
+                    x: self.x / frame.downsample(),
+                    y: self.y / frame.downsample(),
                     ..*self
                 },
                 frame,
                 columns,
                 rows,
-                out: &mut room,
+                out: &mut scratch,
             });
         }
-        frame.with_pixels(room)
+        frame.with_pixels(scratch)
     }
 
     /// Writes the pixels of the turned picture from this `column` and `row` on to `out`.
@@ -123,14 +123,14 @@ impl Rotation {
         let inside = along.inside(across.inside(0..out.len()));
         let (source, width) = (frame.pixels(), frame.width() as usize);
         let mut done = inside.start;
-        if inside.len() >= TOGETHER {
+        if inside.len() >= GROUP_SIZE {
             while done < inside.end {
                 // Some of the last ones twice, where they do not come out even.
-                let first = done.min(inside.end - TOGETHER);
+                let first = done.min(inside.end - GROUP_SIZE);
                 let mixed =
                     mix_several(source, width, &across.several(first), &along.several(first));
-                out[first..][..TOGETHER].copy_from_slice(&mixed);
-                done = first + TOGETHER;
+                out[first..][..GROUP_SIZE].copy_from_slice(&mixed);
+                done = first + GROUP_SIZE;
             }
         }
         for i in (0..inside.start).chain(done..out.len()) {
@@ -150,12 +150,12 @@ impl Rotation {
 fn mix_several(
     source: &[u8],
     width: usize,
-    x: &[i32; TOGETHER],
-    y: &[i32; TOGETHER],
-) -> [u8; TOGETHER] {
-    let uppers: [u32; TOGETHER] =
+    x: &[i32; GROUP_SIZE],
+    y: &[i32; GROUP_SIZE],
+) -> [u8; GROUP_SIZE] {
+    let uppers: [u32; GROUP_SIZE] =
         std::array::from_fn(|i| ((y[i] >> PARTS) * width as i32 + (x[i] >> PARTS)) as u32);
-    let (mut above, mut below) = ([0_u16; TOGETHER], [0_u16; TOGETHER]);
+    let (mut above, mut below) = ([0_u16; GROUP_SIZE], [0_u16; GROUP_SIZE]);
     for ((upper, above), below) in uppers.iter().zip(&mut above).zip(&mut below) {
         let square = &source[*upper as usize..][..width + 2];
         *above = u16::from_le_bytes([square[0], square[1]]);
@@ -194,7 +194,7 @@ impl Line {
     }
 
     #[inline(always)]
-    fn several(&self, first: usize) -> [i32; TOGETHER] {
+    fn several(&self, first: usize) -> [i32; GROUP_SIZE] {
         std::array::from_fn(|i| self.at(first + i))
     }
 
@@ -278,9 +278,9 @@ mod tests {
     fn a_turned_picture_is_that_of_the_textbook() {
         let original = frame(|x, y| ((x * x / 3 + y * 5) % 200) as u8);
         for angle in [0.0_f64, 0.3, -1.2, 3.0] {
-            let turned = Rotation::about(&TARGET, angle);
-            let turned = turned.apply(&original, &everywhere(), vec![9; 7]);
-            for (found, expected) in turned.pixels().iter().zip(textbook(&original, angle)) {
+            let rotated = Rotation::about(&TARGET, angle);
+            let rotated = rotated.apply(&original, &everywhere(), vec![9; 7]);
+            for (found, expected) in rotated.pixels().iter().zip(textbook(&original, angle)) {
                 let off = (f64::from(*found) - expected).abs();
                 // Shares of a 256th, along both axes, of a step of up to 200.
                 assert!(off <= 2.1, "{angle}: {found} {expected}");
@@ -313,17 +313,17 @@ mod tests {
         let original = frame(dot);
         for angle in [0.4, -0.7, 2.0] {
             let rotation = Rotation::about(&TARGET, angle);
-            let turned = rotation.apply(&original, &everywhere(), Vec::new());
-            let brightest = (0..80 * 60).max_by_key(|&i| turned.pixels()[i]);
+            let rotated = rotation.apply(&original, &everywhere(), Vec::new());
+            let brightest = (0..80 * 60).max_by_key(|&i| rotated.pixels()[i]);
             let brightest = brightest.expect("there are pixels");
             let there = Particle {
                 x: (brightest % 80) as f64 + 0.5,
                 y: (brightest / 80) as f64 + 0.5,
                 scale: 1.0,
             };
-            let here = rotation.in_picture(&there);
+            let here = rotation.to_original(&there);
             assert!((here.x - 60.5).abs() < 1.0 && (here.y - 20.5).abs() < 1.0);
-            let shift = rotation.turned_shift((here.x - TARGET.x, here.y - TARGET.y));
+            let shift = rotation.rotated_displacement((here.x - TARGET.x, here.y - TARGET.y));
             assert!((TARGET.x + shift.0 - there.x).abs() < 1e-9);
             assert!((TARGET.y + shift.1 - there.y).abs() < 1e-9);
         }

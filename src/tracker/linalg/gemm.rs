@@ -26,7 +26,7 @@ pub(crate) fn align<T: Copy + Default>(values: &mut Vec<T>, count: usize) -> usi
 }
 
 /// Makes `values` hold at least `count` of them, whatever they are, from a cache line on: returns where that is.
-pub(crate) fn hold_aligned<T: Copy + Default>(values: &mut Vec<T>, count: usize) -> usize {
+pub(crate) fn reserve_aligned<T: Copy + Default>(values: &mut Vec<T>, count: usize) -> usize {
     let most = most_before_line::<T>() + count;
     if values.len() < most {
         values.resize(most, T::default());
@@ -69,12 +69,12 @@ pub(crate) trait Element: Copy + Default + AddAssign + Mul<Output = Self> {
     /// The sum of a register.
     fn sum<S: Simd>(simd: S, lanes: Self::Lanes<S>) -> Self;
     /// How many registers are summed up together.
-    const TOGETHER: usize;
-    /// The sum of each of the first `TOGETHER` registers, where [`reduce::can_sum`] says so.
+    const GROUP_SIZE: usize;
+    /// The sum of each of the first `GROUP_SIZE` registers, where [`reduce::can_sum`] says so.
     fn sum_each<S: Simd>(
         simd: S,
-        registers: [Self::Lanes<S>; reduce::TOGETHER],
-    ) -> [Self; reduce::TOGETHER];
+        registers: [Self::Lanes<S>; reduce::GROUP_SIZE],
+    ) -> [Self; reduce::GROUP_SIZE];
     /// A small number.
     fn from_index(index: usize) -> Self;
     /// The small number that this is.
@@ -87,7 +87,7 @@ macro_rules! element {
         impl Element for $number {
             type Lanes<S: Simd> = S::$lanes;
 
-            const TOGETHER: usize = $together;
+            const GROUP_SIZE: usize = $together;
 
             #[inline(always)]
             fn lanes<S: Simd>(values: &[Self]) -> (&[S::$lanes], &[Self]) {
@@ -127,8 +127,8 @@ macro_rules! element {
             #[inline(always)]
             fn sum_each<S: Simd>(
                 simd: S,
-                registers: [S::$lanes; reduce::TOGETHER],
-            ) -> [Self; reduce::TOGETHER] {
+                registers: [S::$lanes; reduce::GROUP_SIZE],
+            ) -> [Self; reduce::GROUP_SIZE] {
                 $sum_each(simd, registers)
             }
 
@@ -312,15 +312,15 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
     }
     let mut products = [[T::default(); B]; A];
     if reduce::can_sum::<S, T>(simd) {
-        for first in (0..A * B).step_by(T::TOGETHER) {
-            let mut registers = [T::zeros(simd); reduce::TOGETHER];
-            for (i, register) in registers.iter_mut().enumerate().take(T::TOGETHER) {
+        for first in (0..A * B).step_by(T::GROUP_SIZE) {
+            let mut registers = [T::zeros(simd); reduce::GROUP_SIZE];
+            for (i, register) in registers.iter_mut().enumerate().take(T::GROUP_SIZE) {
                 // A group at the end has the last sum more than once.
                 let at = (first + i).min(A * B - 1);
                 *register = sums[at / B][at % B];
             }
             let totals = T::sum_each(simd, registers);
-            for (i, total) in totals.iter().enumerate().take(T::TOGETHER) {
+            for (i, total) in totals.iter().enumerate().take(T::GROUP_SIZE) {
                 let at = (first + i).min(A * B - 1);
                 products[at / B][at % B] = *total;
             }

@@ -51,15 +51,15 @@ fn rotate(matrix: &mut [f64], vectors: &mut [f64], dim: usize, p: usize, q: usiz
     for r in (0..dim).filter(|&r| r != p && r != q) {
         let rp = r.min(p) * dim + r.max(p);
         let rq = r.min(q) * dim + r.max(q);
-        turn(matrix, rp, rq, cosine, sine);
+        orientation(matrix, rp, rq, cosine, sine);
     }
     for r in 0..dim {
-        turn(vectors, p * dim + r, q * dim + r, cosine, sine);
+        orientation(vectors, p * dim + r, q * dim + r, cosine, sine);
     }
 }
 
 #[inline(always)]
-fn turn(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
+fn orientation(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
     let (at_p, at_q) = (values[p], values[q]);
     values[p] = cosine * at_p - sine * at_q;
     values[q] = sine * at_p + cosine * at_q;

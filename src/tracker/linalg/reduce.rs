@@ -11,29 +11,29 @@ use pulp::Simd;
 use crate::tracker::linalg::gemm::Element;
 
 /// How many registers are brought together: as many as 128 bits have values, at most.
-pub(crate) const TOGETHER: usize = 4;
+pub(crate) const GROUP_SIZE: usize = 4;
 
 /// Whether the shuffles of these registers leave values where [`sum_each`] takes them to be; the library does not say.
 #[inline(always)]
 pub(crate) fn can_sum<S: Simd, T: Element>(simd: S) -> bool {
     let count = T::count::<S>();
-    if !count.is_multiple_of(T::TOGETHER) {
+    if !count.is_multiple_of(T::GROUP_SIZE) {
         return false;
     }
-    let mut registers = [T::splat(simd, T::default()); TOGETHER];
+    let mut registers = [T::splat(simd, T::default()); GROUP_SIZE];
     for (i, register) in registers.iter_mut().enumerate() {
         *register = T::splat(simd, T::from_index(1 << (4 * i)));
     }
     let sums = T::sum_each(simd, registers);
-    let mut sums = sums.iter().zip(0..T::TOGETHER);
+    let mut sums = sums.iter().zip(0..T::GROUP_SIZE);
     // A value of another register would show: there are 16 at most.
     sums.all(|(sum, i)| sum.to_index() == count << (4 * i))
 }
 
 /// The parts of 128 bits of a register, added up.
 #[inline(always)]
-pub(crate) fn fold<T: Element, const N: usize>(values: &[T]) -> [T; TOGETHER] {
-    let mut sums = [T::default(); TOGETHER];
+pub(crate) fn fold<T: Element, const N: usize>(values: &[T]) -> [T; GROUP_SIZE] {
+    let mut sums = [T::default(); GROUP_SIZE];
     for part in values.as_chunks::<N>().0 {
         for (sum, value) in sums.iter_mut().zip(part) {
             *sum += *value;
@@ -65,13 +65,13 @@ mod tests {
         }
         let count = T::count::<S>();
         let value = |register: usize, lane: usize| T::from_index(register * register + 3 * lane);
-        let values: Vec<T> = (0..TOGETHER * count)
+        let values: Vec<T> = (0..GROUP_SIZE * count)
             .map(|at| value(at / count, at % count))
             .collect();
-        let mut registers = [T::splat(simd, T::default()); TOGETHER];
+        let mut registers = [T::splat(simd, T::default()); GROUP_SIZE];
         registers.copy_from_slice(T::lanes::<S>(&values).0);
         let sums = T::sum_each(simd, registers);
-        for (register, sum) in sums.iter().enumerate().take(T::TOGETHER) {
+        for (register, sum) in sums.iter().enumerate().take(T::GROUP_SIZE) {
             let mut expected = T::default();
             for lane in 0..count {
                 expected += value(register, lane);

@@ -11,12 +11,12 @@ use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::motion::particles::{Particle, Reach};
-use crate::tracker::motion::pair_integral::{LANES, PairSums};
 use crate::tracker::image::thumbnail::{self, CELL};
+use crate::tracker::motion::pair_integral::{LANES, PairIntegral};
+use crate::tracker::motion::particles::{Particle, StateBounds};
 
 /// A part of fewer pixels of the small picture says nothing.
-const LEAST_PIXELS: f64 = 6.0;
+const MIN_PIXELS: f64 = 6.0;
 /// A correlation up to this is chance: any two places of a scene share slopes of light.
 const BY_CHANCE: f64 = 0.4;
 /// Variance of a place, in squared gray values, below which it is noise that would be correlated: added to each.
@@ -34,22 +34,22 @@ pub(crate) struct LastSeen {
 
 /// The small pictures of now and then, compared.
 #[derive(Debug, Default)]
-pub(crate) struct Arrival {
+pub(crate) struct ChangeTest {
     /// Of this frame.
     pixels: Vec<u8>,
     width: usize,
     /// The sums of the part of it that is compared, and whether there is one.
-    sums: PairSums,
+    sums: PairIntegral,
     is_compared: bool,
     /// Where the target was then.
     was: [f64; 4],
 }
 
-/// [`Arrival::discount`], to be compiled for the instructions that this machine has.
+/// [`ChangeTest::discount`], to be compiled for the instructions that this machine has.
 struct Discount<'a> {
-    arrival: &'a Arrival,
+    arrival: &'a ChangeTest,
     particles: &'a [Particle],
-    reach: &'a Reach,
+    bounds: &'a StateBounds,
     weight: f64,
     exponents: &'a mut [f64],
 }
@@ -63,7 +63,7 @@ impl WithSimd for Discount<'_> {
         for (exponents, particles) in exponents.zip(self.particles.chunks(LANES)) {
             // The last one stands in for those that a group lacks.
             let group = std::array::from_fn(|lane| particles[lane.min(particles.len() - 1)]);
-            let unchanged = self.arrival.unchanged(&group, self.reach);
+            let unchanged = self.arrival.unchanged(&group, self.bounds);
             for (exponent, unchanged) in exponents.iter_mut().zip(unchanged) {
                 *exponent -= self.weight * unchanged;
             }
@@ -72,10 +72,10 @@ impl WithSimd for Discount<'_> {
 }
 
 /// The box of `particle` in pixels of the small picture.
-fn bounds(particle: &Particle, reach: &Reach) -> [f64; 4] {
+fn edges(particle: &Particle, bounds: &StateBounds) -> [f64; 4] {
     let cell = CELL as f64;
-    let across = reach.box_width * particle.scale / 2.0;
-    let down = reach.box_height * particle.scale / 2.0;
+    let across = bounds.box_width * particle.scale / 2.0;
+    let down = bounds.box_height * particle.scale / 2.0;
     [
         (particle.x - across) / cell,
         (particle.y - down) / cell,
@@ -86,14 +86,14 @@ fn bounds(particle: &Particle, reach: &Reach) -> [f64; 4] {
 
 impl LastSeen {
     /// The target is at `target` in the frame that `arrival` has looked at.
-    pub fn see(&mut self, target: Particle, arrival: &Arrival) {
+    pub fn record_seen(&mut self, target: Particle, arrival: &ChangeTest) {
         self.pixels.clone_from(&arrival.pixels);
         self.width = arrival.width as u32;
         self.target = Some(target);
     }
 
     /// Whether this may be what a tracker of working images of this size has seen last, if it keeps that.
-    pub fn is_sound(&self, (width, height): (u32, u32), kept: bool) -> bool {
+    pub fn is_valid_for(&self, (width, height): (u32, u32), kept: bool) -> bool {
         let (columns, rows) = (width as usize / CELL, height as usize / CELL);
         let fits = self.width as usize == columns && self.pixels.len() == columns * rows;
         let finite = |target: &Particle| {
@@ -108,7 +108,7 @@ impl LastSeen {
     }
 }
 
-impl Arrival {
+impl ChangeTest {
     /// Makes the small picture of `frame`.
     pub fn take(&mut self, frame: &GrayFrame) {
         self.is_compared = false;
@@ -117,15 +117,21 @@ impl Arrival {
         self.sums.prepare(self.width, rows);
     }
 
-    /// Compares the small picture with the last one, `away` working pixels around the box of `carried`, which is where
+    /// Compares the small picture with the last one, `away` working pixels around the box of `displaced`, which is where
     /// the last box would be had it moved with the picture.
-    pub fn compare(&mut self, last: &LastSeen, carried: &Particle, away: f64, reach: &Reach) {
+    pub fn compare(
+        &mut self,
+        last: &LastSeen,
+        displaced: &Particle,
+        away: f64,
+        bounds: &StateBounds,
+    ) {
         let Some(target) = &last.target else { return };
         if self.width == 0 || last.pixels.len() != self.pixels.len() {
             return;
         }
         let cell = CELL as f64;
-        let [shift_x, shift_y] = [carried.x - target.x, carried.y - target.y]
+        let [shift_x, shift_y] = [displaced.x - target.x, displaced.y - target.y]
             .map(|shift| (shift / cell).round() as isize);
         let height = self.pixels.len() / self.width;
         // Where a pixel of now has one of then.
@@ -137,7 +143,7 @@ impl Arrival {
                 .min(len + shift);
             (first < end).then_some((first as usize, end as usize))
         };
-        let now = bounds(carried, reach);
+        let now = edges(displaced, bounds);
         let (Some((left, right)), Some((top, bottom))) = (
             span(now[0], now[2], self.width, shift_x),
             span(now[1], now[3], height, shift_y),
@@ -145,7 +151,7 @@ impl Arrival {
             return;
         };
         self.is_compared = true;
-        let was = bounds(target, reach);
+        let was = edges(target, bounds);
         let [across, down] = [shift_x, shift_y].map(|shift| shift as f64);
         self.was = [
             was[0] + across,
@@ -169,7 +175,7 @@ impl Arrival {
     pub fn discount(
         &self,
         particles: &[Particle],
-        reach: &Reach,
+        bounds: &StateBounds,
         weight: f64,
         exponents: &mut [f64],
     ) {
@@ -177,7 +183,7 @@ impl Arrival {
             Arch::new().dispatch(Discount {
                 arrival: self,
                 particles,
-                reach,
+                bounds,
                 weight,
                 exponents,
             });
@@ -185,10 +191,10 @@ impl Arrival {
     }
 
     #[inline(always)]
-    fn unchanged(&self, particles: &[Particle; LANES], reach: &Reach) -> [f64; LANES] {
+    fn unchanged(&self, particles: &[Particle; LANES], bounds: &StateBounds) -> [f64; LANES] {
         let (mut now, mut both) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
         for lane in 0..LANES {
-            let bounds = bounds(&particles[lane], reach);
+            let bounds = edges(&particles[lane], bounds);
             for side in 0..4 {
                 let (of_now, was) = (bounds[side], self.was[side]);
                 now[side][lane] = of_now;
@@ -197,7 +203,7 @@ impl Arrival {
             }
         }
         let (all, covered) = (self.sums.corners(&now), self.sums.corners(&both));
-        let (pixels, fewer) = (PairSums::pixels(&all), PairSums::pixels(&covered));
+        let (pixels, fewer) = (PairIntegral::pixels(&all), PairIntegral::pixels(&covered));
         let mut mean = [[0.0; LANES]; 5];
         for lane in 0..LANES {
             let (all, covered) = (self.sums.over(&all, lane), self.sums.over(&covered, lane));
@@ -217,7 +223,7 @@ impl Arrival {
             let area = (now[2][lane] - now[0][lane]) * (now[3][lane] - now[1][lane]);
             let alike = ((correlation - BY_CHANCE) / (1.0 - BY_CHANCE)).clamp(0.0, 1.0);
             let share = (beside / area).min(1.0) * alike;
-            unchanged[lane] = if beside < LEAST_PIXELS { 0.0 } else { share };
+            unchanged[lane] = if beside < MIN_PIXELS { 0.0 } else { share };
         }
         unchanged
     }
@@ -227,7 +233,7 @@ impl Arrival {
 mod tests {
     use super::*;
 
-    const REACH: Reach = Reach {
+    const BOUNDS: StateBounds = StateBounds {
         frame_width: 160.0,
         frame_height: 120.0,
         box_width: 30.0,
@@ -240,7 +246,7 @@ mod tests {
 
     /// A scene, moved right by `shift`, on which something striped covers the box of `target`.
     fn frame(shift: usize, target: &Particle) -> GrayFrame {
-        let area = REACH.area(target);
+        let area = BOUNDS.area(target);
         let gray = |x: usize, y: usize| {
             let (across, down) = (x as f64 + 0.5 - area.x, y as f64 + 0.5 - area.y);
             if (0.0..area.width).contains(&across) && (0.0..area.height).contains(&down) {
@@ -258,19 +264,19 @@ mod tests {
     }
 
     /// What has arrived in a frame, after one that had the target at `from`, when the picture moved by `shift`.
-    fn arrival(from: Particle, to: Particle, shift: usize) -> Arrival {
-        let (mut arrival, mut last) = (Arrival::default(), LastSeen::default());
+    fn arrival(from: Particle, to: Particle, shift: usize) -> ChangeTest {
+        let (mut arrival, mut last) = (ChangeTest::default(), LastSeen::default());
         arrival.take(&frame(0, &from));
-        last.see(from, &arrival);
+        last.record_seen(from, &arrival);
         arrival.take(&frame(shift, &to));
-        let carried = particle(from.x + shift as f64, from.y);
-        arrival.compare(&last, &carried, 60.0, &REACH);
+        let displaced = particle(from.x + shift as f64, from.y);
+        arrival.compare(&last, &displaced, 60.0, &BOUNDS);
         arrival
     }
 
-    fn unchanged(arrival: &Arrival, at: Particle) -> f64 {
+    fn unchanged(arrival: &ChangeTest, at: Particle) -> f64 {
         let mut exponent = [0.0];
-        arrival.discount(&[at], &REACH, 1.0, &mut exponent);
+        arrival.discount(&[at], &BOUNDS, 1.0, &mut exponent);
         -exponent[0]
     }
 
@@ -297,8 +303,8 @@ mod tests {
     }
 
     /// The same by its definition, pixel by pixel: `last` is the small picture of then, three pixels further left.
-    fn plain(arrival: &Arrival, last: &[u8], at: &Particle) -> f64 {
-        let (now, was) = (bounds(at, &REACH), arrival.was);
+    fn plain(arrival: &ChangeTest, last: &[u8], at: &Particle) -> f64 {
+        let (now, was) = (edges(at, &BOUNDS), arrival.was);
         let within = |bounds: [f64; 4], x: usize, y: usize| {
             let [left, top, right, bottom] = bounds.map(f64::round);
             (left..right).contains(&(x as f64)) && (top..bottom).contains(&(y as f64))
@@ -316,7 +322,7 @@ mod tests {
                 beside += 1.0;
             }
         }
-        if beside < LEAST_PIXELS {
+        if beside < MIN_PIXELS {
             return 0.0;
         }
         let mean = sums.map(|sum| sum / beside);
@@ -333,7 +339,7 @@ mod tests {
     fn what_is_unchanged_is_that_of_the_definition() {
         let (from, to) = (particle(40.0, 50.0), particle(70.0, 60.0));
         let arrival = arrival(from, to, 12);
-        let mut last = Arrival::default();
+        let mut last = ChangeTest::default();
         last.take(&frame(0, &from));
         let particles: Vec<Particle> = (0..203)
             .map(|i| Particle {
@@ -344,7 +350,7 @@ mod tests {
             .collect();
         let mut exponents: Vec<f64> = (0..203).map(|i| f64::from(i) * -0.1).collect();
         let before = exponents.clone();
-        arrival.discount(&particles, &REACH, 6.0, &mut exponents);
+        arrival.discount(&particles, &BOUNDS, 6.0, &mut exponents);
         let mut different = 0;
         for (i, particle) in particles.iter().enumerate() {
             let unchanged = plain(&arrival, &last.pixels, particle);
@@ -356,10 +362,10 @@ mod tests {
 
     #[test]
     fn nothing_is_said_without_a_frame_before_or_of_one_too_small() {
-        let mut arrival = Arrival::default();
+        let mut arrival = ChangeTest::default();
         let target = particle(50.0, 60.0);
         arrival.take(&frame(0, &target));
-        arrival.compare(&LastSeen::default(), &target, 60.0, &REACH);
+        arrival.compare(&LastSeen::default(), &target, 60.0, &BOUNDS);
         assert_eq!(unchanged(&arrival, particle(90.0, 60.0)), 0.0);
         for (width, height) in [(3, 50), (50, 3), (4, 4)] {
             let pixels = vec![7; width * height];
@@ -367,10 +373,10 @@ mod tests {
             let frame = frame.expect("a frame of this size");
             let mut last = LastSeen::default();
             arrival.take(&frame);
-            last.see(particle(1.0, 1.0), &arrival);
-            assert!(last.is_sound((width as u32, height as u32), true));
+            last.record_seen(particle(1.0, 1.0), &arrival);
+            assert!(last.is_valid_for((width as u32, height as u32), true));
             arrival.take(&frame);
-            arrival.compare(&last, &particle(1.0, 1.0), 60.0, &REACH);
+            arrival.compare(&last, &particle(1.0, 1.0), 60.0, &BOUNDS);
             assert_eq!(unchanged(&arrival, particle(2.0, 2.0)), 0.0);
         }
     }

@@ -18,23 +18,23 @@ const PARTS: usize = 4;
 
 /// The profiles of the last frame.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Camera {
+pub(crate) struct GlobalMotion {
     columns: Vec<f32>,
     rows: Vec<f32>,
 }
 
-/// [`Camera::look`], to be compiled for the instructions that this machine has.
-struct Look<'a> {
-    camera: &'a mut Camera,
+/// [`GlobalMotion::look`], to be compiled for the instructions that this machine has.
+struct QuantizedVector<'a> {
+    global_motion: &'a mut GlobalMotion,
     frame: &'a GrayFrame,
 }
 
-impl WithSimd for Look<'_> {
+impl WithSimd for QuantizedVector<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.camera.look_all(self.frame);
+        self.global_motion.look_all(self.frame);
     }
 }
 
@@ -53,18 +53,18 @@ impl WithSimd for Shift<'_> {
     }
 }
 
-impl Camera {
+impl GlobalMotion {
     /// The profiles of `frame`.
     pub fn new(frame: &GrayFrame) -> Self {
-        let mut camera = Self::default();
-        camera.look(frame);
-        camera
+        let mut global_motion = Self::default();
+        global_motion.look(frame);
+        global_motion
     }
 
     /// Becomes the profiles of `frame`.
     fn look(&mut self, frame: &GrayFrame) {
-        Arch::new().dispatch(Look {
-            camera: self,
+        Arch::new().dispatch(QuantizedVector {
+            global_motion: self,
             frame,
         });
     }
@@ -100,20 +100,20 @@ impl Camera {
         self.columns.iter_mut().for_each(|column| *column /= share);
     }
 
-    /// How far the picture moved since the last frame, in whole working pixels along x and along y. `room` is what the
+    /// How far the picture moved since the last frame, in whole working pixels along x and along y. `scratch` is what the
     /// profiles of this frame are put into first.
-    pub fn shift(&mut self, frame: &GrayFrame, room: &mut Self) -> (f64, f64) {
-        room.look(frame);
-        std::mem::swap(self, room);
+    pub fn shift(&mut self, frame: &GrayFrame, scratch: &mut Self) -> (f64, f64) {
+        scratch.look(frame);
+        std::mem::swap(self, scratch);
         let shift = |before, after| Arch::new().dispatch(Shift { before, after });
         (
-            shift(&room.columns, &self.columns),
-            shift(&room.rows, &self.rows),
+            shift(&scratch.columns, &self.columns),
+            shift(&scratch.rows, &self.rows),
         )
     }
 
     /// Whether this may be the profiles of frames of this size (in working pixels).
-    pub fn is_sound(&self, width: usize, height: usize) -> bool {
+    pub fn is_valid_for(&self, width: usize, height: usize) -> bool {
         let profile = |values: &[f32], len: usize| {
             values.len() == len && values.iter().all(|value| (0.0..=255.0).contains(value))
         };
@@ -158,16 +158,16 @@ fn mean<S: Simd, const UNSIGNED: bool>(simd: S, after: &[f32], before: &[f32], l
 #[inline(always)]
 fn shift<S: Simd>(simd: S, before: &[f32], after: &[f32]) -> f64 {
     // So that two thirds of the profiles always overlap.
-    let furthest = FURTHEST.min(before.len() / 3);
+    let radius = FURTHEST.min(before.len() / 3);
     let mut best = (0, f32::INFINITY);
     let mut unshifted = 0.0;
-    for step in 0..=2 * furthest {
-        let (forward, back) = (step.saturating_sub(furthest), furthest.saturating_sub(step));
+    for step in 0..=2 * radius {
+        let (forward, back) = (step.saturating_sub(radius), radius.saturating_sub(step));
         let overlap = before.len() - forward - back;
         let (after, before) = (&after[forward..][..overlap], &before[back..][..overlap]);
         let light = mean::<S, false>(simd, after, before, 0.0);
         let misfit = mean::<S, true>(simd, after, before, light);
-        if step == furthest {
+        if step == radius {
             unshifted = misfit;
         }
         if misfit < best.1 {
@@ -175,7 +175,7 @@ fn shift<S: Simd>(simd: S, before: &[f32], after: &[f32]) -> f64 {
         }
     }
     if best.1 < BETTER * unshifted {
-        best.0 as f64 - furthest as f64
+        best.0 as f64 - radius as f64
     } else {
         0.0
     }
@@ -199,14 +199,14 @@ mod tests {
         for (width, height) in [(33, 8), (75, 21), (320, 240)] {
             let luma = (0..width * height).map(|i| 255 - (i * 7919 / 31 % 97) as u8);
             let frame = GrayFrame::from_luma(width, height, luma.collect()).expect("a frame");
-            let camera = Camera::new(&frame);
+            let global_motion = GlobalMotion::new(&frame);
             let (width, height) = (width as usize, height as usize);
             let gray = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
-            for (x, found) in camera.columns.iter().enumerate() {
+            for (x, found) in global_motion.columns.iter().enumerate() {
                 let sum: f64 = (0..height).map(|y| gray(x, y)).sum();
                 assert!((f64::from(*found) - sum / height as f64).abs() < 1e-4);
             }
-            for (y, found) in camera.rows.iter().enumerate() {
+            for (y, found) in global_motion.rows.iter().enumerate() {
                 let sum: f64 = (0..width).map(|x| gray(x, y)).sum();
                 assert!((f64::from(*found) - sum / width as f64).abs() < 1e-4);
             }
@@ -215,9 +215,9 @@ mod tests {
 
     #[test]
     fn a_shift_of_the_whole_picture_is_found_in_spite_of_the_light() {
-        let mut camera = Camera::new(&scene(40, 40, 0));
-        let mut room = Camera::default();
-        let mut shift = |frame: &GrayFrame| camera.shift(frame, &mut room);
+        let mut global_motion = GlobalMotion::new(&scene(40, 40, 0));
+        let mut scratch = GlobalMotion::default();
+        let mut shift = |frame: &GrayFrame| global_motion.shift(frame, &mut scratch);
         assert_eq!(shift(&scene(40, 40, 9)), (0.0, 0.0));
         assert_eq!(shift(&scene(33, 40, 0)), (7.0, 0.0));
         assert_eq!(shift(&scene(51, 29, 5)), (-18.0, 11.0));
@@ -230,7 +230,7 @@ mod tests {
                 GrayFrame::from_luma(width, height, vec![gray; (width * height) as usize])
                     .expect("a frame")
             };
-            let shift = Camera::new(&flat(9)).shift(&flat(200), &mut Camera::default());
+            let shift = GlobalMotion::new(&flat(9)).shift(&flat(200), &mut GlobalMotion::default());
             assert_eq!(shift, (0.0, 0.0));
         }
     }

@@ -8,13 +8,13 @@
 //! a little further either way, and weighed as particles are. The bag's first subspace does not turn along, so the angle
 //! does not wander off with what was learned.
 
-use crate::tracker::workspace::Comparison;
-use crate::tracker::image::warp::Rotation;
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::state::State;
 use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::warp::Rotation;
 use crate::tracker::params::table::Params;
 use crate::tracker::params::table::Search;
+use crate::tracker::state::State;
+use crate::tracker::workspace::Workspace;
 
 /// Angles that are tried, in steps from the last one. The last one itself says no more: where it is right, the two look alike.
 const TRIED: [f64; 2] = [-1.0, 1.0];
@@ -37,37 +37,37 @@ pub(crate) fn tried(params: &Params) -> usize {
 
 /// Whether turns are looked for: where the paper's V is made of former frames, these are upright.
 pub(crate) fn is_on(params: &Params) -> bool {
-    params.turn_step > 0.0 && params.candidate_alone && params.search == Search::Answer
+    params.rotation_step > 0.0 && params.single_vector_candidate && params.search == Search::Answer
 }
 
 /// Whether `angle`, in radians, may be that of a tracker with `params`.
-pub(crate) fn is_sound(angle: f64, params: &Params) -> bool {
+pub(crate) fn is_valid_for(angle: f64, params: &Params) -> bool {
     angle == 0.0 || is_on(params) && angle.abs() <= std::f64::consts::PI
 }
 
 impl State {
     /// The turn that makes the target upright; none where it is.
     pub fn rotation(&self) -> Option<Rotation> {
-        let notable = self.turn.abs() >= LEAST.to_radians();
-        notable.then(|| Rotation::about(&self.answer, self.turn))
+        let notable = self.orientation.abs() >= LEAST.to_radians();
+        notable.then(|| Rotation::about(&self.answer, self.orientation))
     }
 
     /// The angle by which the target, found at the answer in `frame`, is turned there, in radians; `evidence` is what the best particle said.
-    pub fn measure_turn(
+    pub fn measure_orientation(
         &self,
         frame: &GrayFrame,
         evidence: &Evidence,
-        room: &mut Comparison,
+        workspace: &mut Workspace,
     ) -> f64 {
         if !is_on(&self.params) || evidence.first >= ALIKE {
-            return self.turn;
+            return self.orientation;
         }
-        let changes = TRIED.map(|steps| (steps * self.params.turn_step).to_radians());
-        let angles = changes.map(|change| self.turn + change);
+        let changes = TRIED.map(|steps| (steps * self.params.rotation_step).to_radians());
+        let angles = changes.map(|change| self.orientation + change);
         let mut weights = angles.map(|angle| -0.5 * (angle / USUAL.to_radians()).powi(2));
-        room.weigh_turned(frame, &self.answer, &angles, self, &mut weights);
+        workspace.weigh_rotated(frame, &self.answer, &angles, self, &mut weights);
         let change: f64 = weights.iter().zip(changes).map(|(w, c)| w * c).sum();
         // Half a turn is as far as there is.
-        (self.turn + GAIN * change).clamp(-std::f64::consts::PI, std::f64::consts::PI)
+        (self.orientation + GAIN * change).clamp(-std::f64::consts::PI, std::f64::consts::PI)
     }
 }

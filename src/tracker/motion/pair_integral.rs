@@ -18,7 +18,7 @@ const TIMES_ONE: Sums = [1, 1, 0, 0, 0, 0, 0, 0];
 
 /// The sums of a part of two pictures.
 #[derive(Debug, Default)]
-pub(crate) struct PairSums {
+pub(crate) struct PairIntegral {
     /// Left, top, and how many columns and rows of pixels.
     left: usize,
     top: usize,
@@ -31,9 +31,9 @@ pub(crate) struct PairSums {
 /// Corners of rectangles, as columns and rows of the part: left, top, right, bottom. None is before the one opposite.
 pub(crate) type Corners = [[u32; LANES]; 4];
 
-/// [`PairSums::compute`], to be compiled for the instructions that this machine has.
+/// [`PairIntegral::compute`], to be compiled for the instructions that this machine has.
 struct Compute<'a, R> {
-    sums: &'a mut PairSums,
+    sums: &'a mut PairIntegral,
     rows: R,
 }
 
@@ -46,10 +46,10 @@ impl<'a, R: ExactSizeIterator<Item = (&'a [u8], &'a [u8])>> WithSimd for Compute
     }
 }
 
-impl PairSums {
+impl PairIntegral {
     /// Makes room for pictures of so many pixels.
     pub fn prepare(&mut self, columns: usize, rows: usize) {
-        crate::tracker::workspace::empty(&mut self.sums, (columns + 1) * (rows + 1));
+        crate::tracker::workspace::clear_and_reserve(&mut self.sums, (columns + 1) * (rows + 1));
     }
 
     /// Becomes the sums of the part that begins at `left` and `top`, of which `rows` gives each row of now and of then;
@@ -157,7 +157,7 @@ mod tests {
                 .collect()
         };
         let (now, then) = (picture(3), picture(11));
-        let mut sums = PairSums::default();
+        let mut sums = PairIntegral::default();
         // What is left of a larger part is of no account.
         for (left, top, columns, rows) in [(0, 0, 23, 17), (3, 2, 14, 9), (20, 16, 1, 1)] {
             sums.prepare(width, height);
@@ -181,7 +181,7 @@ mod tests {
                     lanes(seed + 2),
                 ];
                 let corners = sums.corners(&rectangles);
-                let pixels = PairSums::pixels(&corners);
+                let pixels = PairIntegral::pixels(&corners);
                 for lane in 0..LANES {
                     let [x0, y0, x1, y1] = rectangles.map(|side| side[lane].round());
                     let mut expected = [0; 8];

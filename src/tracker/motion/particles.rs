@@ -5,16 +5,16 @@
 //! part of the state, and one frame given twice to the same state gives the same particles.
 //!
 //! A random walk knows no limits, so it is held: the box touches the frame by a pixel, its scale stays within
-//! [`Reach::scales`].
+//! [`StateBounds::scales`].
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::state::State;
-use crate::tracker::params::table::Params;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
+use crate::tracker::state::State;
 
 /// One hypothesis z = (x, y, s): the centre in working pixels, and the scale against the reference box.
 ///
@@ -31,7 +31,7 @@ pub(crate) struct Particle {
 
 /// How far particles may go: the working image, and the reference box whose aspect every particle keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Reach {
+pub(crate) struct StateBounds {
     /// Width of the working image.
     pub frame_width: f64,
     /// Height of the working image.
@@ -42,7 +42,7 @@ pub(crate) struct Reach {
     pub box_height: f64,
 }
 
-impl Reach {
+impl StateBounds {
     /// The least and the greatest scale: within 1/10 and 10, the shorter side of the box not below one working
     /// pixel, the longer not above four times that of the frame. Always contains 1.
     pub fn scales(&self) -> (f64, f64) {
@@ -55,7 +55,7 @@ impl Reach {
     }
 
     /// The nearest particle that is allowed.
-    pub fn hold(&self, particle: Particle) -> Particle {
+    pub fn clamp(&self, particle: Particle) -> Particle {
         let (least, greatest) = self.scales();
         let scale = particle.scale.clamp(least, greatest);
         let overhang = |side: f64| (side * scale / 2.0 - 1.0).max(0.0);
@@ -84,7 +84,7 @@ pub(crate) enum Draws {
     /// The particles of a frame.
     Particles,
     /// Areas that the background and the discriminant learn from.
-    Examples,
+    TrainingSamples,
 }
 
 /// The generator of the draws of frame `frame`.
@@ -93,7 +93,7 @@ pub(crate) fn generator(seed: u64, frame: u64, draws: Draws) -> ChaCha8Rng {
     // Frame numbers stay far below the bit that tells the two apart.
     generator.set_stream(match draws {
         Draws::Particles => frame,
-        Draws::Examples => frame | 1 << 63,
+        Draws::TrainingSamples => frame | 1 << 63,
     });
     generator
 }
@@ -106,14 +106,14 @@ pub(crate) fn propose(
     out: &mut Vec<Particle>,
 ) {
     let cloud = (&state.particles[..], &state.weights[..]);
-    resample(cloud, &state.params, &state.reach, generator, sums, out);
+    resample(cloud, &state.params, &state.bounds, generator, sums, out);
 }
 
 /// As [`propose`], of particles and their weights (which are at least 0 and sum to 1).
 fn resample(
     (previous, weights): (&[Particle], &[f64]),
     params: &Params,
-    reach: &Reach,
+    bounds: &StateBounds,
     generator: &mut ChaCha8Rng,
     sums: &mut Vec<f64>,
     out: &mut Vec<Particle>,
@@ -141,7 +141,7 @@ fn resample(
             y: origin.y + step(params.motion_std_y),
             scale: origin.scale + step(params.motion_std_scale),
         };
-        out.push(reach.hold(moved));
+        out.push(bounds.clamp(moved));
     }
 }
 
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
     use crate::tracker::params::presets::Preset;
 
-    const REACH: Reach = Reach {
+    const BOUNDS: StateBounds = StateBounds {
         frame_width: 320.0,
         frame_height: 240.0,
         box_width: 40.0,
@@ -170,7 +170,14 @@ mod tests {
         let previous = [particle(60.0), particle(160.0), particle(260.0)];
         let cloud = (&previous[..], &[0.7, 0.0, 0.3][..]);
         let mut draws = generator(params.seed, frame, Draws::Particles);
-        resample(cloud, params, &REACH, &mut draws, &mut Vec::new(), &mut out);
+        resample(
+            cloud,
+            params,
+            &BOUNDS,
+            &mut draws,
+            &mut Vec::new(),
+            &mut out,
+        );
         out
     }
 

@@ -8,8 +8,8 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::tracker::motion::particles::{Particle, Reach};
-use crate::tracker::features::extractor::View;
+use crate::tracker::features::extractor::Extractor;
+use crate::tracker::motion::particles::{Particle, StateBounds};
 use crate::tracker::params::table::Params;
 use crate::tracker::params::table::Search;
 
@@ -19,31 +19,31 @@ const NOTABLE_SHIFT: f64 = 2.0;
 /// A wider search has as many times the first particles, up to this: a target is seen from a third of its box away.
 const DENSEST: f64 = 4.0;
 /// Particles that are drawn around each peak: one of several is within a quarter of a cell.
-const AROUND_PEAK: usize = 6;
+const AROUND_MAXIMUM: usize = 6;
 /// The greatest number of modes.
-const MOST_MODES: usize = 50;
+const MAX_MODES: usize = 50;
 
 /// The search of one frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sought<'a> {
+pub(crate) struct SearchContext<'a> {
     /// The last answer.
     pub last: Particle,
     /// How far the whole picture moved, in working pixels.
     pub shift: (f64, f64),
     /// How many times as wide as usual the search is: more than once where the target is out of sight.
-    pub widening: f64,
+    pub search_scale: f64,
     pub params: &'a Params,
-    pub reach: &'a Reach,
+    pub bounds: &'a StateBounds,
 }
 
 fn normal(generator: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(generator)
 }
 
-impl Sought<'_> {
+impl SearchContext<'_> {
     /// Where the last answer would be had it moved with the picture.
     #[inline(always)]
-    pub fn carried(&self) -> Particle {
+    pub fn displaced(&self) -> Particle {
         Particle {
             x: self.last.x + self.shift.0,
             y: self.last.y + self.shift.1,
@@ -56,8 +56,8 @@ impl Sought<'_> {
     }
 
     /// How far from the last answer a particle may come to be, in working pixels, but for one draw in a thousand.
-    pub fn furthest(&self) -> f64 {
-        let draws = self.widening * self.params.motion_std_x.max(self.params.motion_std_y);
+    pub fn radius(&self) -> f64 {
+        let draws = self.search_scale * self.params.motion_std_x.max(self.params.motion_std_y);
         let shift = self.shift.0.abs().max(self.shift.1.abs());
         3.3 * (draws + self.params.refined_std) + shift
     }
@@ -68,7 +68,7 @@ impl Sought<'_> {
             self.params.particles as usize,
             self.params.first_particles(),
         );
-        let more = (first as f64 * (self.widening.min(DENSEST) - 1.0)) as usize;
+        let more = (first as f64 * (self.search_scale.min(DENSEST) - 1.0)) as usize;
         let more = more.min(self.most() - all);
         (all + more, first + more)
     }
@@ -83,7 +83,7 @@ impl Sought<'_> {
     pub fn most(&self) -> usize {
         let all = self.params.particles as usize;
         // The printed evaluation has room for N candidates.
-        if self.params.search == Search::Resampled || !self.params.candidate_alone {
+        if self.params.search == Search::Resampled || !self.params.single_vector_candidate {
             return all;
         }
         let first = self.params.first_particles() as f64;
@@ -93,54 +93,59 @@ impl Sought<'_> {
 
     /// How far from the last answer every place is looked at, in working pixels; 0 where that is not done.
     pub fn scanned(&self) -> f64 {
-        if self.params.scan_peaks == 0 {
+        if self.params.dense_maxima == 0 {
             return 0.0;
         }
-        let longer = self.reach.box_width.max(self.reach.box_height) * self.last.scale;
-        self.furthest().max(self.params.scan_reach * longer)
+        let longer = self.bounds.box_width.max(self.bounds.box_height) * self.last.scale;
+        self.radius().max(self.params.dense_radius * longer)
     }
 
-    /// Draws the first particles around the last answer, and around `peaks`, into `out`.
-    pub fn propose(&self, peaks: &[Particle], generator: &mut ChaCha8Rng, out: &mut Vec<Particle>) {
-        let carried = self.carried();
+    /// Draws the first particles around the last answer, and around `maxima`, into `out`.
+    pub fn propose(
+        &self,
+        maxima: &[Particle],
+        generator: &mut ChaCha8Rng,
+        out: &mut Vec<Particle>,
+    ) {
+        let displaced = self.displaced();
         out.clear();
-        out.push(self.reach.hold(self.last));
+        out.push(self.bounds.clamp(self.last));
         // A search of one particle has no room for another.
         if self.has_shift() && self.params.particles > 1 {
-            out.push(self.reach.hold(carried));
+            out.push(self.bounds.clamp(displaced));
         }
         let count = self.counts().1.max(out.len());
-        self.propose_around(peaks, count / 2, generator, out);
+        self.propose_around(maxima, count / 2, generator, out);
         while out.len() < count {
             let moved = self.has_shift() && out.len().is_multiple_of(2);
-            let from = if moved { carried } else { self.last };
+            let from = if moved { displaced } else { self.last };
             let params = self.params;
             let drawn = Particle {
-                x: from.x + self.widening * params.motion_std_x * normal(generator),
-                y: from.y + self.widening * params.motion_std_y * normal(generator),
+                x: from.x + self.search_scale * params.motion_std_x * normal(generator),
+                y: from.y + self.search_scale * params.motion_std_y * normal(generator),
                 scale: from.scale
-                    * (self.widening * params.motion_std_scale * normal(generator)).exp(),
+                    * (self.search_scale * params.motion_std_scale * normal(generator)).exp(),
             };
-            out.push(self.reach.hold(drawn));
+            out.push(self.bounds.clamp(drawn));
         }
     }
 
-    /// Draws particles around `peaks`, which are a cell apart, until there are `most`.
+    /// Draws particles around `maxima`, which are a cell apart, until there are `most`.
     fn propose_around(
         &self,
-        peaks: &[Particle],
+        maxima: &[Particle],
         most: usize,
         generator: &mut ChaCha8Rng,
         out: &mut Vec<Particle>,
     ) {
-        for peak in peaks {
-            let (width, height) = View::cell(peak, self.reach, self.params);
-            for _ in 0..AROUND_PEAK.min(most.saturating_sub(out.len())) {
+        for maximum in maxima {
+            let (width, height) = Extractor::cell(maximum, self.bounds, self.params);
+            for _ in 0..AROUND_MAXIMUM.min(most.saturating_sub(out.len())) {
                 let scale_std = self.params.motion_std_scale;
-                out.push(self.reach.hold(Particle {
-                    x: peak.x + 0.5 * width * normal(generator),
-                    y: peak.y + 0.5 * height * normal(generator),
-                    scale: peak.scale * (scale_std * normal(generator)).exp(),
+                out.push(self.bounds.clamp(Particle {
+                    x: maximum.x + 0.5 * width * normal(generator),
+                    y: maximum.y + 0.5 * height * normal(generator),
+                    scale: maximum.scale * (scale_std * normal(generator)).exp(),
                 }));
             }
         }
@@ -153,7 +158,7 @@ impl Sought<'_> {
         generator: &mut ChaCha8Rng,
         particles: &mut Vec<Particle>,
     ) {
-        let mut modes = [0; MOST_MODES];
+        let mut modes = [0; MAX_MODES];
         let count = (self.params.refined_modes as usize).min(particles.len());
         let modes = &mut modes[..count];
         best(weights, modes);
@@ -169,7 +174,7 @@ impl Sought<'_> {
                 y: from.y + params.refined_std * normal(generator),
                 scale: from.scale * (params.refined_std_scale * normal(generator)).exp(),
             };
-            particles.push(self.reach.hold(drawn));
+            particles.push(self.bounds.clamp(drawn));
         }
     }
 
@@ -181,9 +186,9 @@ impl Sought<'_> {
         }
         let squared =
             |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
-        let nearest = squared(&self.last).min(squared(&self.carried()));
+        let nearest = squared(&self.last).min(squared(&self.displaced()));
         // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
-        let variance = (self.widening * self.params.displacement_std).powi(2);
+        let variance = (self.search_scale * self.params.displacement_std).powi(2);
         -0.5 * nearest / variance.max(f64::MIN_POSITIVE)
     }
 
@@ -203,7 +208,7 @@ impl Sought<'_> {
         let scale = particle.scale.ln();
         if self.params.scale_change_std > 0.0 {
             let change = scale - last_scale;
-            exponent += (change / self.widening / self.params.scale_change_std).powi(2);
+            exponent += (change / self.search_scale / self.params.scale_change_std).powi(2);
         }
         if self.params.scale_std > 0.0 {
             exponent += scale.powi(2) / self.params.scale_std.powi(2).max(f64::MIN_POSITIVE);
@@ -275,7 +280,7 @@ mod tests {
 
     #[test]
     fn the_widest_search_costs_no_more_than_parameters_may() {
-        let reach = Reach {
+        let bounds = StateBounds {
             frame_width: 100.0,
             frame_height: 80.0,
             box_width: 20.0,
@@ -283,19 +288,19 @@ mod tests {
         };
         let most = |params: &Params| {
             assert_eq!(params.validate(), Ok(()));
-            let sought = Sought {
+            let search = SearchContext {
                 last: Particle {
                     x: 50.0,
                     y: 40.0,
                     scale: 1.0,
                 },
                 shift: (0.0, 0.0),
-                widening: DENSEST,
+                search_scale: DENSEST,
                 params,
-                reach: &reach,
+                bounds: &bounds,
             };
-            assert_eq!(sought.counts().0, sought.most());
-            sought.most()
+            assert_eq!(search.counts().0, search.most());
+            search.most()
         };
         let robust = Preset::Robust.params();
         assert_eq!(most(&robust), 500);
@@ -325,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_prior_of_any_width_is_greatest_at_the_last_answer_and_falls() {
-        let reach = Reach {
+        let bounds = StateBounds {
             frame_width: 100.0,
             frame_height: 80.0,
             box_width: 20.0,
@@ -343,14 +348,14 @@ mod tests {
                 scale_std: 0.0,
                 ..Preset::Robust.params()
             };
-            let sought = Sought {
+            let search = SearchContext {
                 last,
                 shift: (0.0, 0.0),
-                widening: 1.0,
+                search_scale: 1.0,
                 params: &params,
-                reach: &reach,
+                bounds: &bounds,
             };
-            let prior = |particle| sought.priors(&[particle]).next().expect("one of one");
+            let prior = |particle| search.priors(&[particle]).next().expect("one of one");
             assert_eq!(prior(last), 0.0, "{std}");
             let beside = Particle {
                 x: 53.0,

@@ -72,7 +72,7 @@ pub struct Params {
     /// Whether a candidate's subspace is its own vector alone. As one of P + 1 columns a candidate drowns in the
     /// history that it shares with all others. Then n = 1 for the candidate, and its one principal angle is that
     /// between its vector and the entry's subspace. Off: false.
-    pub candidate_alone: bool,
+    pub single_vector_candidate: bool,
 
     /// How many vectors of areas beside the target the metric is made of, 0 to 256. Vectors are whitened by their
     /// covariance, so that what the background has too counts less. Off: 0.
@@ -103,23 +103,23 @@ pub struct Params {
     /// The share of the newest frame in a filter that measures the scale along a pyramid of areas, 0 to 1: particles a
     /// few hundredths larger or smaller look nearly alike, and a box then grows or shrinks with what is behind the
     /// target. Off: 0.
-    pub scale_rate: f64,
+    pub scale_learning_rate: f64,
     /// Around how many of the places where the discriminant sees most some of the first particles are drawn, 0 to 16: it
     /// looks at every place, a cell apart, for there are gaps between particles. With gradients only. Off: 0.
-    pub scan_peaks: u32,
+    pub dense_maxima: u32,
     /// How far around the last answer it looks at every place, as a multiple of the box's longer side, 0 to 4; at least
     /// as far as particles come, at most 24 cells.
-    pub scan_reach: f64,
+    pub dense_radius: f64,
     /// First particles at places that are less likely than the best one, as seen there, by more than this are not looked at: the
     /// difference of logarithms, 0 to 1000. Off: 0.
-    pub scan_margin: f64,
+    pub prune_margin: f64,
     /// How much less likely a particle is whose place looks as it did when the target was last seen elsewhere: the logarithm,
     /// where all of its box is beside the last one and nothing in it has changed, 0 to 100. What comes to a place changes
     /// it. Off: 0.
-    pub arrival_weight: f64,
+    pub static_penalty: f64,
     /// Whether a shift of the whole picture is looked for, and half of the particles moved by it: a camera that swings
     /// moves a target further than targets move. Off: false.
-    pub camera_shift: bool,
+    pub global_motion: bool,
     /// The answer is the weighted mean of the particles within this distance of the most likely one, in pixels, 0 to
     /// 100. It is steadier than one particle. Off: 0, the arg max itself (equation 12).
     pub averaging_radius: f64,
@@ -129,19 +129,19 @@ pub struct Params {
     pub pinned: u32,
     /// By how many degrees, either way, the look that the user pointed at is turned to make its subspace, 0 to 90: what a
     /// target that tilts a little looks like is known from the first frame on then. Off: 0.
-    pub pose_angle: f64,
+    pub augmentation_angle: f64,
     /// By how many degrees, either way, a target is tried turned further in the picture, 0 to 30: one that tilts is
     /// followed as if the picture had turned around it. Where candidates stand alone. Off: 0.
-    pub turn_step: f64,
+    pub rotation_step: f64,
     /// The weight of a pinned subspace in the sum rule (equation 9), 0 to 100. Off: 1.
     pub pinned_weight: f64,
     /// The tracker learns from a frame only while the answer's distance to the first subspace is below this multiple
     /// of what is usual, 0 to 100. Off: 0.
-    pub trusted_ratio: f64,
+    pub update_distance_ratio: f64,
 
     /// The tracker learns only from frames with this score or a greater one, 0 to 1, where there is a discriminant, but for the first
     /// twenty. Off: 0.
-    pub learn_above: f64,
+    pub update_min_score: f64,
 
     /// Weight of a linear score that is learned from all candidates of the past frames and tells the target from what
     /// is beside it; the likelihood is multiplied by exp(weight · score), 0 to 100. Off: 0.
@@ -151,7 +151,7 @@ pub struct Params {
     pub discriminant_damping: f64,
     /// Below this score of the discriminant, at the best particle, the target counts as out of sight, 0 to 1: the box
     /// stays, nothing is learned, and the search widens from frame to frame until the target is found again. Off: 0.
-    pub lost_below: f64,
+    pub lost_threshold: f64,
 
     /// Seed of all random draws: the same seed and frames give the same boxes.
     pub seed: u64,
@@ -191,8 +191,8 @@ impl Params {
     }
 
     /// Whether the vectors that a subspace of the bag was made of are kept with it.
-    pub(crate) fn keeps_looks(&self) -> bool {
-        self.background_samples > 0 || self.candidate_alone
+    pub(crate) fn keeps_templates(&self) -> bool {
+        self.background_samples > 0 || self.single_vector_candidate
     }
 
     /// How many of the particles are drawn first; the others are drawn around the best of these.

@@ -20,16 +20,16 @@ pub struct ParamsError {
 }
 
 /// The greatest N.
-const MOST_PARTICLES: u32 = 1000;
+const MAX_PARTICLES: u32 = 1000;
 
 /// Most numbers in the vectors of one frame's candidates: N · D.
-const MOST_CANDIDATE_VALUES: usize = 1_100_000;
+const MAX_CANDIDATE_VALUES: usize = 1_100_000;
 
 /// Most numbers that a session keeps: those of the full bag and of the background.
-const MOST_KEPT_VALUES: u64 = 1_000_000;
+const MAX_KEPT_VALUES: u64 = 1_000_000;
 /// Most products with the background in a frame: of its samples with all candidates, and with all looks in the bag when
 /// it is refreshed.
-const MOST_WHITENED_VALUES: u64 = 110_000_000;
+const MAX_WHITENED_VALUES: u64 = 110_000_000;
 
 impl Params {
     /// Checks every parameter against its range. NaN and infinities are out of every range.
@@ -40,7 +40,7 @@ impl Params {
         count(
             "particles",
             self.particles,
-            1..=MOST_PARTICLES,
+            1..=MAX_PARTICLES,
             "from 1 to 1000",
         )?;
         count("patch_width", self.patch_width, 4..=64, "from 4 to 64")?;
@@ -67,7 +67,7 @@ impl Params {
             "from 1 to 1000",
         )?;
         count("refined_modes", self.refined_modes, 1..=50, "from 1 to 50")?;
-        count("scan_peaks", self.scan_peaks, 0..=16, "from 0 to 16")?;
+        count("dense_maxima", self.dense_maxima, 0..=16, "from 0 to 16")?;
         count("pinned", self.pinned, 0..=16, "from 0 to 16")?;
         real("alpha", self.alpha, 0.0..=1.0, "from 0 to 1")?;
         real("sigma", self.sigma, 0.0001..=100.0, "from 0.0001 to 100")?;
@@ -128,18 +128,28 @@ impl Params {
             "from 0 to 10",
         )?;
         real("scale_std", self.scale_std, 0.0..=10.0, "from 0 to 10")?;
-        real("scan_reach", self.scan_reach, 0.0..=4.0, "from 0 to 4")?;
+        real("dense_radius", self.dense_radius, 0.0..=4.0, "from 0 to 4")?;
         real(
-            "scan_margin",
-            self.scan_margin,
+            "prune_margin",
+            self.prune_margin,
             0.0..=1000.0,
             "from 0 to 1000",
         )?;
-        real("scale_rate", self.scale_rate, 0.0..=1.0, "from 0 to 1")?;
-        real("lost_below", self.lost_below, 0.0..=1.0, "from 0 to 1")?;
         real(
-            "arrival_weight",
-            self.arrival_weight,
+            "scale_learning_rate",
+            self.scale_learning_rate,
+            0.0..=1.0,
+            "from 0 to 1",
+        )?;
+        real(
+            "lost_threshold",
+            self.lost_threshold,
+            0.0..=1.0,
+            "from 0 to 1",
+        )?;
+        real(
+            "static_penalty",
+            self.static_penalty,
             0.0..=100.0,
             "from 0 to 100",
         )?;
@@ -149,8 +159,18 @@ impl Params {
             0.0..=100.0,
             "from 0 to 100",
         )?;
-        real("pose_angle", self.pose_angle, 0.0..=90.0, "from 0 to 90")?;
-        real("turn_step", self.turn_step, 0.0..=30.0, "from 0 to 30")?;
+        real(
+            "augmentation_angle",
+            self.augmentation_angle,
+            0.0..=90.0,
+            "from 0 to 90",
+        )?;
+        real(
+            "rotation_step",
+            self.rotation_step,
+            0.0..=30.0,
+            "from 0 to 30",
+        )?;
         real(
             "pinned_weight",
             self.pinned_weight,
@@ -158,12 +178,17 @@ impl Params {
             "from 0 to 100",
         )?;
         real(
-            "trusted_ratio",
-            self.trusted_ratio,
+            "update_distance_ratio",
+            self.update_distance_ratio,
             0.0..=100.0,
             "from 0 to 100",
         )?;
-        real("learn_above", self.learn_above, 0.0..=1.0, "from 0 to 1")?;
+        real(
+            "update_min_score",
+            self.update_min_score,
+            0.0..=1.0,
+            "from 0 to 1",
+        )?;
         real(
             "discriminant_weight",
             self.discriminant_weight,
@@ -176,7 +201,7 @@ impl Params {
             0.001..=1000.0,
             "from 0.001 to 1000",
         )?;
-        if self.particles as usize * self.feature_len() > MOST_CANDIDATE_VALUES {
+        if self.particles as usize * self.feature_len() > MAX_CANDIDATE_VALUES {
             return Err(ParamsError {
                 name: "particles",
                 value: f64::from(self.particles),
@@ -196,12 +221,12 @@ impl Params {
     pub(crate) fn most_particles(&self) -> usize {
         let len = self.feature_len();
         let samples = self.background_samples as usize;
-        let looks = self.bag_size as usize * (self.history as usize + 1);
-        let compared = (MOST_WHITENED_VALUES as usize)
+        let templates = self.bag_size as usize * (self.history as usize + 1);
+        let compared = (MAX_WHITENED_VALUES as usize)
             .checked_div(samples * len)
-            .map_or(usize::MAX, |most| most - looks);
-        (MOST_PARTICLES as usize)
-            .min(MOST_CANDIDATE_VALUES / len)
+            .map_or(usize::MAX, |most| most - templates);
+        (MAX_PARTICLES as usize)
+            .min(MAX_CANDIDATE_VALUES / len)
             .min(compared)
     }
 
@@ -216,7 +241,7 @@ impl Params {
             self.particles,
         ]
         .map(u64::from);
-        if (bag * columns + samples) * len > MOST_KEPT_VALUES {
+        if (bag * columns + samples) * len > MAX_KEPT_VALUES {
             return Err(ParamsError {
                 name: "bag_size",
                 value: f64::from(self.bag_size),
@@ -224,7 +249,7 @@ impl Params {
                            times feature length is at most 1000000",
             });
         }
-        if samples * (particles + bag * patches) * len > MOST_WHITENED_VALUES {
+        if samples * (particles + bag * patches) * len > MAX_WHITENED_VALUES {
             return Err(ParamsError {
                 name: "background_samples",
                 value: f64::from(self.background_samples),

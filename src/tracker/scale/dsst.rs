@@ -17,14 +17,14 @@
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::scale::pyramid::{self, FREQUENCIES, LEVELS, MIDDLE, Room, STEP, WAVES};
-use crate::tracker::params::table::Params;
 use crate::tracker::linalg::vector_ops;
+use crate::tracker::params::table::Params;
+use crate::tracker::scale::pyramid::{self, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch, WAVES};
 
 /// λ, against energies of about 1: it only keeps flat pyramids from dividing by nothing.
 const DAMPING: f32 = 0.01;
 /// The greatest change of the logarithm of the scale in a frame: what is seen further off is mostly a neighbour.
-const GREATEST_CHANGE: f64 = 0.06;
+const MAX_CHANGE: f64 = 0.06;
 /// The share of a change that is taken, so that noise evens out.
 const GAIN: f64 = 0.75;
 /// Responses that say nothing, and that are believed whole.
@@ -52,7 +52,7 @@ pub(crate) struct Found {
 /// [`ScaleFilter::learn`], to be compiled for the instructions that this machine has.
 struct Learn<'a> {
     filter: &'a mut ScaleFilter,
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
     rate: f64,
 }
 
@@ -61,14 +61,14 @@ impl WithSimd for Learn<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        self.filter.learn_all(simd, self.room, self.rate);
+        self.filter.learn_all(simd, self.scratch, self.rate);
     }
 }
 
 /// [`ScaleFilter::respond`], to be compiled for the instructions that this machine has.
 struct Respond<'a> {
     filter: &'a ScaleFilter,
-    room: &'a mut Room,
+    scratch: &'a mut Scratch,
 }
 
 impl WithSimd for Respond<'_> {
@@ -76,7 +76,7 @@ impl WithSimd for Respond<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; LEVELS] {
-        self.filter.respond_all(simd, self.room)
+        self.filter.respond_all(simd, self.scratch)
     }
 }
 
@@ -92,23 +92,23 @@ impl ScaleFilter {
         self.energies.clear();
     }
 
-    /// Learns the pyramid in `room`, whose middle is the target; `rate` is the share η of it.
-    pub fn learn(&mut self, room: &mut Room, rate: f64) {
+    /// Learns the pyramid in `scratch`, whose middle is the target; `rate` is the share η of it.
+    pub fn learn(&mut self, scratch: &mut Scratch, rate: f64) {
         Arch::new().dispatch(Learn {
             filter: self,
-            room,
+            scratch,
             rate,
         });
     }
 
     #[inline(always)]
-    fn learn_all<S: Simd>(&mut self, simd: S, room: &mut Room, rate: f64) {
-        let len = room.transform(simd);
+    fn learn_all<S: Simd>(&mut self, simd: S, scratch: &mut Scratch, rate: f64) {
+        let len = scratch.transform(simd);
         let rate = if self.has_learned() { rate as f32 } else { 1.0 };
         self.numerators.resize(FREQUENCIES * 2 * len, 0.0);
         self.energies.resize(FREQUENCIES, 0.0);
         let numerators = self.numerators.chunks_exact_mut(2 * len);
-        let spectrum = room.spectrum.chunks_exact(2 * len);
+        let spectrum = scratch.spectrum.chunks_exact(2 * len);
         for (frequency, ((numerator, energy), parts)) in
             numerators.zip(&mut self.energies).zip(spectrum).enumerate()
         {
@@ -126,9 +126,9 @@ impl ScaleFilter {
         }
     }
 
-    /// Where along the pyramid in `room` the target is.
-    pub fn find(&self, room: &mut Room) -> Found {
-        let response = self.respond(room);
+    /// Where along the pyramid in `scratch` the target is.
+    pub fn find(&self, scratch: &mut Scratch) -> Found {
+        let response = self.respond(scratch);
         let mut best = 0;
         for (level, height) in response.iter().enumerate() {
             if *height > response[best] {
@@ -150,16 +150,19 @@ impl ScaleFilter {
         }
     }
 
-    fn respond(&self, room: &mut Room) -> [f64; LEVELS] {
-        Arch::new().dispatch(Respond { filter: self, room })
+    fn respond(&self, scratch: &mut Scratch) -> [f64; LEVELS] {
+        Arch::new().dispatch(Respond {
+            filter: self,
+            scratch,
+        })
     }
 
     #[inline(always)]
-    fn respond_all<S: Simd>(&self, simd: S, room: &mut Room) -> [f64; LEVELS] {
-        let len = room.transform(simd);
+    fn respond_all<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [f64; LEVELS] {
+        let len = scratch.transform(simd);
         let mut spectrum = [(0.0, 0.0); FREQUENCIES];
         let numerators = self.numerators.chunks_exact(2 * len);
-        let seen = room.spectrum.chunks_exact(2 * len);
+        let seen = scratch.spectrum.chunks_exact(2 * len);
         for (((product, numerator), seen), energy) in spectrum
             .iter_mut()
             .zip(numerators)
@@ -189,8 +192,8 @@ impl ScaleFilter {
     }
 
     /// Whether this may be the filter of a tracker with `params`.
-    pub fn is_sound(&self, params: &Params, greatest: f32) -> bool {
-        let (numbers, energies) = if params.scale_rate > 0.0 {
+    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
+        let (numbers, energies) = if params.scale_learning_rate > 0.0 {
             let len = pyramid::params(params).feature_len();
             (FREQUENCIES * 2 * len, FREQUENCIES)
         } else {
@@ -210,30 +213,30 @@ impl Found {
     /// The logarithm of how much larger the target is than the pyramid's middle, as far as that is certain.
     pub fn believed(&self) -> f64 {
         let certainty = (self.response - DOUBTFUL) / (CERTAIN - DOUBTFUL);
-        let change = self.change.clamp(-GREATEST_CHANGE, GREATEST_CHANGE);
+        let change = self.change.clamp(-MAX_CHANGE, MAX_CHANGE);
         GAIN * certainty.clamp(0.0, 1.0) * change
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::tracker::scale::pyramid::BELL;
     use super::*;
+    use crate::tracker::scale::pyramid::BELL;
     use std::f64::consts::TAU;
 
     const LEN: usize = 40;
 
     /// A pyramid of a smooth random picture whose target is `off` levels above the middle.
-    fn pyramid(off: f64) -> Room {
+    fn pyramid(off: f64) -> Scratch {
         let value = |level: usize, i: usize| {
             let at = level as f64 - off;
             let phase = (i * i * 37 + i * 11) as f64;
             (1.2 + (0.25 * at * (1.0 + (i % 7) as f64 * 0.3) + phase).sin()) as f32
         };
         let features = (0..LEVELS).flat_map(|level| (0..LEN).map(move |i| value(level, i)));
-        Room {
+        Scratch {
             features: features.collect(),
-            ..Room::default()
+            ..Scratch::default()
         }
     }
 
@@ -269,9 +272,9 @@ mod tests {
                 let g = fourier(&bell, frequency);
                 let (mut product, mut energy) = ((0.0, 0.0), f64::from(DAMPING));
                 for i in 0..LEN {
-                    let of = |room: &Room| {
+                    let of = |scratch: &Scratch| {
                         let value = |level: usize| {
-                            window(level) * f64::from(room.features[level * LEN + i])
+                            window(level) * f64::from(scratch.features[level * LEN + i])
                         };
                         fourier(&value, frequency)
                     };

@@ -7,9 +7,9 @@ use std::sync::LazyLock;
 
 use pulp::Simd;
 
+use crate::tracker::linalg::vector_ops;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::Params;
-use crate::tracker::linalg::vector_ops;
 
 /// Areas of a pyramid, and the logarithm of the ratio of two neighbours: together a quarter up and down, several times
 /// what a target changes between frames.
@@ -25,7 +25,7 @@ pub(crate) const BELL: f64 = 1.2;
 
 /// Room for pyramids; means nothing from one to the next.
 #[derive(Debug, Default)]
-pub(crate) struct Room {
+pub(crate) struct Scratch {
     pub areas: Vec<Particle>,
     /// The feature vectors of a pyramid, smallest area first.
     pub features: Vec<f32>,
@@ -68,12 +68,12 @@ pub(crate) struct Waves {
 }
 
 pub(crate) static WAVES: LazyLock<Waves> = LazyLock::new(|| {
-    let turn = |frequency: usize, level: usize| {
+    let orientation = |frequency: usize, level: usize| {
         let angle = TAU * (frequency * level % LEVELS) as f64 / LEVELS as f64;
         (angle.cos(), -angle.sin())
     };
     let turns =
-        std::array::from_fn(|frequency| std::array::from_fn(|level| turn(frequency, level)));
+        std::array::from_fn(|frequency| std::array::from_fn(|level| orientation(frequency, level)));
     // The ends of a pyramid do not meet: Hann's window fades them out.
     let window = |level: usize| {
         let along = TAU * (level + 1) as f64 / (LEVELS + 1) as f64;
@@ -86,13 +86,18 @@ pub(crate) static WAVES: LazyLock<Waves> = LazyLock::new(|| {
     let mut windowed = Vec::with_capacity(2 * FREQUENCIES * LEVELS);
     for row in &turns {
         let values = || row.iter().enumerate();
-        windowed.extend(values().map(|(level, turn)| (window(level) * turn.0) as f32));
-        windowed.extend(values().map(|(level, turn)| (window(level) * turn.1) as f32));
+        windowed
+            .extend(values().map(|(level, orientation)| (window(level) * orientation.0) as f32));
+        windowed
+            .extend(values().map(|(level, orientation)| (window(level) * orientation.1) as f32));
     }
     let wanted = turns.map(|row| {
         let terms = row.iter().enumerate();
-        terms.fold((0.0, 0.0), |sum, (level, turn)| {
-            (sum.0 + bell(level) * turn.0, sum.1 + bell(level) * turn.1)
+        terms.fold((0.0, 0.0), |sum, (level, orientation)| {
+            (
+                sum.0 + bell(level) * orientation.0,
+                sum.1 + bell(level) * orientation.1,
+            )
         })
     });
     Waves {
@@ -102,7 +107,7 @@ pub(crate) static WAVES: LazyLock<Waves> = LazyLock::new(|| {
     }
 });
 
-impl Room {
+impl Scratch {
     /// Brings the pyramid's vectors to length 1 and transforms them along the scale. Returns D.
     #[inline(always)]
     pub fn transform<S: Simd>(&mut self, simd: S) -> usize {

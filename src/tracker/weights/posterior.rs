@@ -44,8 +44,8 @@ impl WithSimd for Weigh<'_> {
 impl Posterior {
     /// Forgets the last frame, and makes room for `most` particles and so many entries of the bag.
     pub fn begin(&mut self, most: usize, entries: usize) {
-        crate::tracker::workspace::empty(&mut self.likelihoods, most * entries);
-        crate::tracker::workspace::empty(&mut self.entries, entries);
+        crate::tracker::workspace::clear_and_reserve(&mut self.likelihoods, most * entries);
+        crate::tracker::workspace::clear_and_reserve(&mut self.entries, entries);
     }
 
     /// Makes `weights`, which begin as an exponent for each particle, the product of its exponential and of the sum over
@@ -125,8 +125,8 @@ impl Posterior {
 
 #[cfg(test)]
 mod tests {
-    use crate::tracker::weights::likelihood;
     use super::*;
+    use crate::tracker::weights::likelihood;
 
     #[test]
     fn weights_are_those_of_the_sum_rule_times_an_exponential() {
