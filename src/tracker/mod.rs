@@ -41,18 +41,23 @@
 //! ```
 
 mod appearance;
+mod candidates;
 mod classifier;
 mod confidence;
 mod error;
 mod estimate;
 mod features;
+mod hypotheses;
 mod image;
+mod input;
 mod learn;
 mod linalg;
 mod motion;
+mod observe;
 mod params;
 mod scale;
 mod snapshot;
+mod start;
 mod state;
 mod step;
 #[expect(
@@ -79,8 +84,8 @@ pub use evaluation::Evaluation;
 pub use features::gray::patch;
 pub use image::frame::{FrameError, GrayFrame, WORKING_SIDE, working_size};
 pub use image::rect::Rect;
+pub use input::LEAST_BOX_SIDE;
 pub use params::presets::Preset;
+pub use params::table::ParamsError;
 pub use params::table::{Features, Params, Search};
-pub use params::validate::ParamsError;
-pub use state::LEAST_BOX_SIDE;
 pub use tracker::Tracker;

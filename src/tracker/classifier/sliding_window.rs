@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::CHANNELS;
+use crate::tracker::features::hog::{CHANNELS, GRAY_WEIGHT};
 use crate::tracker::features::hog_cells::MIN_CONTRAST;
 use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
 use crate::tracker::linalg::vector_ops;
@@ -49,8 +49,8 @@ impl WithSimd for Scores<'_> {
             self.params.patch_height as usize,
         );
         let planes = &mut self.sliding_window.planes;
-        planes.take(self.grid, size);
-        let scorer = Scorer::new(self.discriminant, self.params, self.cell_pixels);
+        planes.load(self.grid, size);
+        let scorer = Scorer::new(self.discriminant, self.cell_pixels);
         let columns = self.grid.columns + 1 - size.0;
         let last = self.out.len() / columns - 1;
         for (block, rows) in self.out.chunks_mut(ROWS * columns).enumerate() {
@@ -184,7 +184,7 @@ struct Scorer {
 
 impl Scorer {
     #[inline(always)]
-    fn new(discriminant: &Discriminant, params: &Params, cell_pixels: f32) -> Self {
+    fn new(discriminant: &Discriminant, cell_pixels: f32) -> Self {
         let (weights, origin) = (discriminant.weights(), discriminant.origin());
         let grays = |vector: &[f32]| -> f32 {
             let cells = vector.as_chunks::<CHANNELS>().0.iter();
@@ -195,7 +195,7 @@ impl Scorer {
             origin_score: vector_ops::dot(weights, origin),
             origin_square: vector_ops::dot(origin, origin),
             count: (weights.len() / CHANNELS) as f32,
-            gray_weight: params.gray_weight as f32,
+            gray_weight: GRAY_WEIGHT,
             least_deviation: MIN_CONTRAST * cell_pixels,
         }
     }
@@ -241,7 +241,7 @@ impl Scorer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::classifier::dense_search;
+    use crate::tracker::classifier::channel_planes::MAX_OFFSET;
     use crate::tracker::features::extractor::Extractor;
     use crate::tracker::image::frame::GrayFrame;
     use crate::tracker::motion::particles::{Particle, StateBounds};
@@ -289,7 +289,7 @@ mod tests {
             extractor.grid(
                 &center,
                 (across, down),
-                dense_search::MAX_AWAY,
+                MAX_OFFSET,
                 &bounds,
                 &params,
                 &mut grid,
@@ -318,7 +318,7 @@ mod tests {
                 for (c, gray) in grays.iter().enumerate() {
                     let values = &grid.values[cell(c) * CHANNELS..][..DIRECTIONS];
                     vector.extend_from_slice(values);
-                    vector.push((gray - mean) / deviation * params.gray_weight as f32);
+                    vector.push((gray - mean) / deviation * GRAY_WEIGHT);
                 }
                 let left = vector
                     .iter()

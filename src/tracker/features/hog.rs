@@ -8,6 +8,9 @@ use crate::tracker::features::integral::{DIRECTIONS, GRAY, IntegralChannels};
 use crate::tracker::image::rect::Rect;
 use crate::tracker::params::table::Params;
 
+/// The weight of the gray value beside the directions: a blurred target has few gradients.
+pub(crate) const GRAY_WEIGHT: f32 = 0.3;
+
 /// Values of a cell: the directions, then its gray value.
 pub(crate) const CHANNELS: usize = DIRECTIONS + 1;
 
@@ -100,7 +103,7 @@ impl Hog {
             cells: self,
             sums,
             areas,
-            gray_weight: params.gray_weight as f32,
+            gray_weight: GRAY_WEIGHT,
             out,
             centering,
         });
@@ -260,7 +263,7 @@ mod tests {
                     "{value} {expected}"
                 );
             }
-            let gray = (cells[index][DIRECTIONS] - mean) * params.gray_weight / variance.sqrt();
+            let gray = (cells[index][DIRECTIONS] - mean) * f64::from(GRAY_WEIGHT) / variance.sqrt();
             assert!((f64::from(values[DIRECTIONS]) - gray).abs() < 2e-3);
         }
     }

@@ -10,11 +10,14 @@
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
+use crate::tracker::image::downsample::downsample;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::image::thumbnail::{self, CELL};
 use crate::tracker::motion::pair_integral::{LANES, PairIntegral};
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
+/// Working pixels, along x and along y, that are one of the small image: noise is averaged away, and a small target
+/// still has some.
+pub(crate) const CELL: usize = 4;
 /// A part of fewer pixels of the small picture says nothing.
 const MIN_PIXELS: f64 = 6.0;
 /// A correlation up to this is chance: any two places of a scene share slopes of light.
@@ -86,7 +89,7 @@ fn edges(particle: &Particle, bounds: &StateBounds) -> [f64; 4] {
 
 impl LastSeen {
     /// The target is at `target` in the frame that `arrival` has looked at.
-    pub fn record_seen(&mut self, target: Particle, arrival: &ChangeTest) {
+    pub fn record(&mut self, target: Particle, arrival: &ChangeTest) {
         self.pixels.clone_from(&arrival.pixels);
         self.width = arrival.width as u32;
         self.target = Some(target);
@@ -110,9 +113,9 @@ impl LastSeen {
 
 impl ChangeTest {
     /// Makes the small picture of `frame`.
-    pub fn take(&mut self, frame: &GrayFrame) {
+    pub fn load(&mut self, frame: &GrayFrame) {
         self.is_compared = false;
-        self.width = thumbnail::shrink(frame, &mut self.pixels);
+        self.width = downsample(frame, CELL, &mut self.pixels);
         let rows = self.pixels.len() / self.width.max(1);
         self.sums.prepare(self.width, rows);
     }
@@ -266,9 +269,9 @@ mod tests {
     /// What has arrived in a frame, after one that had the target at `from`, when the picture moved by `shift`.
     fn arrival(from: Particle, to: Particle, shift: usize) -> ChangeTest {
         let (mut arrival, mut last) = (ChangeTest::default(), LastSeen::default());
-        arrival.take(&frame(0, &from));
-        last.record_seen(from, &arrival);
-        arrival.take(&frame(shift, &to));
+        arrival.load(&frame(0, &from));
+        last.record(from, &arrival);
+        arrival.load(&frame(shift, &to));
         let displaced = particle(from.x + shift as f64, from.y);
         arrival.compare(&last, &displaced, 60.0, &BOUNDS);
         arrival
@@ -340,7 +343,7 @@ mod tests {
         let (from, to) = (particle(40.0, 50.0), particle(70.0, 60.0));
         let arrival = arrival(from, to, 12);
         let mut last = ChangeTest::default();
-        last.take(&frame(0, &from));
+        last.load(&frame(0, &from));
         let particles: Vec<Particle> = (0..203)
             .map(|i| Particle {
                 x: f64::from(i * 37 % 190) - 15.3,
@@ -364,7 +367,7 @@ mod tests {
     fn nothing_is_said_without_a_frame_before_or_of_one_too_small() {
         let mut arrival = ChangeTest::default();
         let target = particle(50.0, 60.0);
-        arrival.take(&frame(0, &target));
+        arrival.load(&frame(0, &target));
         arrival.compare(&LastSeen::default(), &target, 60.0, &BOUNDS);
         assert_eq!(unchanged(&arrival, particle(90.0, 60.0)), 0.0);
         for (width, height) in [(3, 50), (50, 3), (4, 4)] {
@@ -372,10 +375,10 @@ mod tests {
             let frame = GrayFrame::from_luma(width as u32, height as u32, pixels);
             let frame = frame.expect("a frame of this size");
             let mut last = LastSeen::default();
-            arrival.take(&frame);
-            last.record_seen(particle(1.0, 1.0), &arrival);
+            arrival.load(&frame);
+            last.record(particle(1.0, 1.0), &arrival);
             assert!(last.is_valid_for((width as u32, height as u32), true));
-            arrival.take(&frame);
+            arrival.load(&frame);
             arrival.compare(&last, &particle(1.0, 1.0), 60.0, &BOUNDS);
             assert_eq!(unchanged(&arrival, particle(2.0, 2.0)), 0.0);
         }
