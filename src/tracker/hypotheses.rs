@@ -110,7 +110,7 @@ impl State {
             workspace.original.clear();
             let original = new.iter().map(|&particle| to_original(particle, rotation));
             workspace.original.extend(original);
-            workspace.change_test.discount(
+            workspace.change_test.penalize(
                 &workspace.original,
                 &self.bounds,
                 self.params.static_penalty,

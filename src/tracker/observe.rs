@@ -17,7 +17,7 @@ impl State {
     /// The displacement of the whole image since the last frame, in working pixels.
     pub fn displacement(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> (f64, f64) {
         match &mut self.global_motion {
-            Some(profiles) => profiles.shift(frame, &mut workspace.global_motion),
+            Some(profiles) => profiles.displacement(frame, &mut workspace.global_motion),
             None => (0.0, 0.0),
         }
     }

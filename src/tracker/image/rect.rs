@@ -56,9 +56,15 @@ impl Rect {
 
     /// The area, in square pixels, that both boxes cover.
     pub fn intersection(&self, other: &Self) -> f64 {
-        let width = (self.x + self.width).min(other.x + other.width) - self.x.max(other.x);
-        let height = (self.y + self.height).min(other.y + other.height) - self.y.max(other.y);
-        width.max(0.0) * height.max(0.0)
+        self.common(other).area()
+    }
+
+    /// The part that both boxes cover; without width or height where there is none.
+    pub(crate) fn common(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
+        let width = (self.x + self.width).min(other.x + other.width) - x;
+        let height = (self.y + self.height).min(other.y + other.height) - y;
+        Self::new(x, y, width.max(0.0), height.max(0.0))
     }
 
     /// Intersection over union, in [0, 1]; 0 if either box has no area.
