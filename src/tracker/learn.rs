@@ -18,6 +18,7 @@ use crate::tracker::estimate::Status;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::change_test::LastSeen;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::particles::{self, Draws, Particle, StateBounds};
@@ -25,7 +26,7 @@ use crate::tracker::params::table::Params;
 use crate::tracker::scale::dsst::ScaleFilter;
 use crate::tracker::scale::pyramid;
 use crate::tracker::state::State;
-use crate::tracker::workspace::{self, Workspace};
+use crate::tracker::workspace::Workspace;
 
 /// Areas around the first box that the discriminant starts from, and how far they are off: a third of them each of
 /// these shares of the box (standard deviations), so that near misses, misses and the surroundings are all known.
@@ -49,7 +50,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Makes room for what `most` particles teach.
     pub fn begin(&mut self, most: usize) {
-        workspace::clear_and_reserve(&mut self.fit.labels, most);
+        clear_and_reserve(&mut self.fit.labels, most);
     }
 }
 

@@ -19,6 +19,7 @@ use crate::tracker::image::frame_views;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::learn;
 use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::orientation;
@@ -103,12 +104,6 @@ thread_local! {
 /// Runs `work` with this thread's comparison.
 pub(crate) fn with<T>(work: impl FnOnce(&mut Workspace) -> T) -> T {
     WORKSPACE.with_borrow_mut(work)
-}
-
-/// Empties `workspace` and makes it large enough for `most`.
-pub(crate) fn clear_and_reserve<T>(workspace: &mut Vec<T>, most: usize) {
-    workspace.clear();
-    workspace.reserve(most);
 }
 
 impl Workspace {

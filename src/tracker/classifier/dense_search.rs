@@ -13,11 +13,11 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::sliding_window::SlidingWindow;
 use crate::tracker::features::extractor::{Extractor, Grid};
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::proposal::SearchContext;
 use crate::tracker::params::table::Features;
 use crate::tracker::params::table::Params;
-use crate::tracker::workspace;
 
 /// Places in each direction at most: a look further than that costs more than the rest of a step.
 pub(crate) const MAX_AWAY: usize = 24;
@@ -136,8 +136,8 @@ impl DenseSearch {
             &mut self.grid,
         );
         let (columns, rows) = (2 * across + 1, 2 * down + 1);
-        workspace::clear_and_reserve(&mut self.values, (2 * MAX_AWAY + 1).pow(2));
-        workspace::clear_and_reserve(&mut self.left, (2 * MAX_AWAY + 1).pow(2));
+        clear_and_reserve(&mut self.values, (2 * MAX_AWAY + 1).pow(2));
+        clear_and_reserve(&mut self.left, (2 * MAX_AWAY + 1).pow(2));
         self.values.resize(columns * rows, 0.0);
         let cell_pixels = (cell_width * cell_height) as f32;
         let values = &mut self.values;

@@ -8,8 +8,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::linalg::vector_ops;
-use crate::tracker::workspace;
 
 /// What is left of a squared length below this share of it is rounding: the vector is the origin.
 const MIN_REMAINDER: f32 = 1e-6;
@@ -37,8 +37,8 @@ impl TrainingSamples {
         self.origin.clear();
         self.origin.extend_from_slice(discriminant.origin());
         vector_ops::add(&mut self.origin, -1.0, mean);
-        workspace::clear_and_reserve(&mut self.scales, most);
-        workspace::clear_and_reserve(&mut self.scores, most);
+        clear_and_reserve(&mut self.scales, most);
+        clear_and_reserve(&mut self.scores, most);
     }
 
     /// The vectors whose products are asked for: the weights and the origin.

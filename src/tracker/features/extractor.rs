@@ -8,11 +8,11 @@ use crate::tracker::features::hog::{CHANNELS, Hog};
 use crate::tracker::features::integral::{DIRECTIONS, IntegralChannels};
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 use crate::tracker::params::table::Features;
 use crate::tracker::params::table::Params;
 use crate::tracker::scale::pyramid;
-use crate::tracker::workspace;
 
 /// How much larger than the largest particle the areas of a frame may be: scales change by a few hundredths a frame.
 const SCALE_MARGIN: f64 = 1.08;
@@ -160,8 +160,8 @@ impl Extractor {
         let (width, height) = Self::cell(center, bounds, params);
         let area = Rect::centered(x, y, width * f64::from(columns), height * f64::from(rows));
         let most = (most_columns * most_rows) as usize;
-        workspace::clear_and_reserve(&mut grid.values, most * CHANNELS);
-        workspace::clear_and_reserve(&mut grid.grays, most);
+        clear_and_reserve(&mut grid.values, most * CHANNELS);
+        clear_and_reserve(&mut grid.grays, most);
         grid.columns = columns as usize;
         grid.values
             .resize((columns * rows) as usize * CHANNELS, 0.0);

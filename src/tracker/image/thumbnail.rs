@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::workspace;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 
 /// Working pixels, along x and along y, that are one of the small picture: noise is averaged away, and a target of the
 /// shortest side that is followed well still has some.
@@ -50,7 +50,7 @@ impl WithSimd for Means<'_> {
 pub(crate) fn shrink(frame: &GrayFrame, out: &mut Vec<u8>) -> usize {
     let width = frame.width() as usize;
     let (columns, rows) = (width / CELL, frame.height() as usize / CELL);
-    workspace::clear_and_reserve(out, columns * rows);
+    clear_and_reserve(out, columns * rows);
     out.resize(columns * rows, 0);
     if columns > 0 {
         Arch::new().dispatch(Means {

@@ -3,6 +3,8 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::tracker::linalg::scratch::clear_and_reserve;
+
 /// Rectangles whose corners are found together.
 pub(crate) const LANES: usize = 8;
 
@@ -49,7 +51,7 @@ impl<'a, R: ExactSizeIterator<Item = (&'a [u8], &'a [u8])>> WithSimd for Compute
 impl PairIntegral {
     /// Makes room for pictures of so many pixels.
     pub fn prepare(&mut self, columns: usize, rows: usize) {
-        crate::tracker::workspace::clear_and_reserve(&mut self.sums, (columns + 1) * (rows + 1));
+        clear_and_reserve(&mut self.sums, (columns + 1) * (rows + 1));
     }
 
     /// Becomes the sums of the part that begins at `left` and `top`, of which `rows` gives each row of now and of then;

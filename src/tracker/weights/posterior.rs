@@ -7,6 +7,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::linalg::exp;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 
 /// Room for the weights of a frame.
 #[derive(Debug, Default)]
@@ -44,8 +45,8 @@ impl WithSimd for Weigh<'_> {
 impl Posterior {
     /// Forgets the last frame, and makes room for `most` particles and so many entries of the bag.
     pub fn begin(&mut self, most: usize, entries: usize) {
-        crate::tracker::workspace::clear_and_reserve(&mut self.likelihoods, most * entries);
-        crate::tracker::workspace::clear_and_reserve(&mut self.entries, entries);
+        clear_and_reserve(&mut self.likelihoods, most * entries);
+        clear_and_reserve(&mut self.entries, entries);
     }
 
     /// Makes `weights`, which begin as an exponent for each particle, the product of its exponential and of the sum over
