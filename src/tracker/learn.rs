@@ -15,6 +15,7 @@ use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::estimate::Status;
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
@@ -127,7 +128,8 @@ impl State {
         workspace.arrival.take(frame);
         self.record_seen(&workspace.arrival);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
-        let views = FrameViews::of(frame, self, &mut workspace.views);
+        let factor = Extractor::downsample_factor(&self.answer, &self.bounds, &self.params);
+        let views = FrameViews::new(frame, factor, &mut workspace.views);
         let frame = views.original();
         workspace.extractor.compute_channels(
             frame,

@@ -26,7 +26,7 @@ impl State {
         });
         let rotation = self.rotation();
         let to_original =
-            |place: Particle| rotation.map_or(place, |rotation| rotation.to_original(&place));
+            |place: Particle| rotation.map_or(place, |rotation| place.to_original(&rotation));
         let search = SearchContext {
             last: self.answer,
             shift: rotation.map_or(shift, |rotation| rotation.rotated_displacement(shift)),
@@ -39,10 +39,11 @@ impl State {
         workspace.rotation = rotation;
         let radius = search.radius() + self.sampling_radius(number);
         let radius = radius.max(search.scanned());
-        let mut views = FrameViews::of(frame, self, &mut workspace.views);
+        let factor = Extractor::downsample_factor(&self.answer, &self.bounds, &self.params);
+        let mut views = FrameViews::new(frame, factor, &mut workspace.views);
         if let Some(rotation) = &rotation {
             let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
-            views.orientation(rotation, &window, &mut workspace.views);
+            views.rectify(rotation, &window, &mut workspace.views);
         }
 
         // (A) Where it may be.

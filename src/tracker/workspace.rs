@@ -121,7 +121,8 @@ impl Workspace {
         clear_and_reserve(&mut self.places, most);
         clear_and_reserve(&mut self.to_original, most);
         if orientation::is_on(params) {
-            self.views.begin(&state.bounds);
+            let pixels = state.bounds.frame_width * state.bounds.frame_height;
+            self.views.reserve_rectified(pixels as usize);
         }
         self.posterior.begin(most, entries);
         clear_and_reserve(&mut self.weights, most);
@@ -273,7 +274,7 @@ impl Workspace {
             let mut particles = particles;
             if let Some(rotation) = &self.rotation {
                 self.to_original.clear();
-                let moved = particles.iter().map(|place| rotation.to_original(place));
+                let moved = particles.iter().map(|place| place.to_original(rotation));
                 self.to_original.extend(moved);
                 particles = &self.to_original;
             }
@@ -335,7 +336,7 @@ impl Workspace {
         let window = Extractor::window(&[*place], 0.0, bounds, params);
         for &angle in angles {
             let pixels = std::mem::take(&mut self.tried_pixels);
-            let rotated = Rotation::about(place, angle).apply(frame, &window, pixels);
+            let rotated = Rotation::about((place.x, place.y), angle).apply(frame, &window, pixels);
             self.extractor
                 .compute_channels(&rotated, &[*place], 0.0, bounds, params);
             let next = self.particles.len();

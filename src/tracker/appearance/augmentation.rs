@@ -27,7 +27,7 @@ pub(crate) fn rotated(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayF
         frame.downsample() * f64::from(frame.width()),
         frame.downsample() * f64::from(frame.height()),
     );
-    Rotation::about(target, angle).apply(frame, &everywhere, Vec::new())
+    Rotation::about((target.x, target.y), angle).apply(frame, &everywhere, Vec::new())
 }
 
 #[cfg(test)]

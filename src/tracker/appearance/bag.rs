@@ -57,7 +57,7 @@ impl Entry {
         };
         self.templates.resize_with(count, QuantizedVector::default);
         for (look, vector) in self.templates.iter_mut().zip(vectors) {
-            look.keep(vector);
+            look.set(vector);
         }
         if params.single_vector_candidate {
             self.rebuild(background, params, scratch);

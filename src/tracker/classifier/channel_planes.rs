@@ -3,9 +3,8 @@
 use pulp::Simd;
 
 use crate::tracker::classifier::dense_search::MAX_AWAY;
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, LANES};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::CHANNELS;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, LANES};
 
 /// After the directions and the gray values: energies of the directions, gray values and their squares, summed over as
 /// many cells to the right as a window is wide.

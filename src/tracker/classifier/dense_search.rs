@@ -125,7 +125,7 @@ impl DenseSearch {
             return;
         }
         let center = search.displaced();
-        let (cell_width, cell_height) = Extractor::cell(&center, search.bounds, params);
+        let (cell_width, cell_height) = Extractor::cell_size(&center, search.bounds, params);
         let (across, down) = places(search.scanned(), (cell_width, cell_height), params);
         extractor.grid(
             &center,

@@ -11,10 +11,9 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::CHANNELS;
 use crate::tracker::features::hog_cells::MIN_CONTRAST;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
@@ -295,7 +294,7 @@ mod tests {
                 &mut grid,
             );
             let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
-            let (cell_width, cell_height) = Extractor::cell(&center, &bounds, &params);
+            let (cell_width, cell_height) = Extractor::cell_size(&center, &bounds, &params);
             let cell_pixels = (cell_width * cell_height) as f32;
             SlidingWindow::default().scores(
                 &grid,

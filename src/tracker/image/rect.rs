@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A box: top-left corner and size in pixels. May reach over the edge of the frame.
 ///
 /// Pixel `(0, 0)` covers the square from `(0.0, 0.0)` to `(1.0, 1.0)`. Annotations that count pixels from 1,
-/// as those of the OTB benchmark do, need 1 taken from `x` and `y`.
+/// as those of the OTB benchmark do, need 1 subtracted from `x` and `y`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rect {
     /// Left edge.
@@ -79,7 +79,7 @@ impl Rect {
         (x - other_x).hypot(y - other_y)
     }
 
-    /// The same box where x is stretched by `horizontal` and y by `vertical`.
+    /// The same box with x multiplied by `horizontal` and y by `vertical`.
     pub fn scaled(&self, horizontal: f64, vertical: f64) -> Self {
         Self::new(
             self.x * horizontal,

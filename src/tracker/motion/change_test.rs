@@ -10,11 +10,14 @@
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
+use crate::tracker::image::downsample::downsample;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::image::thumbnail::{self, CELL};
 use crate::tracker::motion::pair_integral::{LANES, PairIntegral};
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
+/// Working pixels along a side of a pixel of the small picture: noise is averaged away, and a target of the shortest side
+/// that is followed well still has some.
+const CELL: usize = 4;
 /// A part of fewer pixels of the small picture says nothing.
 const MIN_PIXELS: f64 = 6.0;
 /// A correlation up to this is chance: any two places of a scene share slopes of light.
@@ -112,7 +115,7 @@ impl ChangeTest {
     /// Makes the small picture of `frame`.
     pub fn take(&mut self, frame: &GrayFrame) {
         self.is_compared = false;
-        self.width = thumbnail::shrink(frame, &mut self.pixels);
+        self.width = downsample(frame, CELL, &mut self.pixels);
         let rows = self.pixels.len() / self.width.max(1);
         self.sums.prepare(self.width, rows);
     }

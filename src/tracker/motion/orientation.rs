@@ -49,7 +49,7 @@ impl State {
     /// The turn that makes the target upright; none where it is.
     pub fn rotation(&self) -> Option<Rotation> {
         let notable = self.orientation.abs() >= LEAST.to_radians();
-        notable.then(|| Rotation::about(&self.answer, self.orientation))
+        notable.then(|| Rotation::about((self.answer.x, self.answer.y), self.orientation))
     }
 
     /// The angle by which the target, found at the answer in `frame`, is turned there, in radians; `evidence` is what the best particle said.

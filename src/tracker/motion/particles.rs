@@ -13,6 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::image::rect::Rect;
+use crate::tracker::image::warp::Rotation;
 use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
 
@@ -27,6 +28,14 @@ pub(crate) struct Particle {
     pub y: f64,
     /// Scale; the reference box has 1.
     pub scale: f64,
+}
+
+impl Particle {
+    /// This particle of a rotated image, where it is in the original image.
+    pub fn to_original(&self, rotation: &Rotation) -> Self {
+        let (x, y) = rotation.to_original((self.x, self.y));
+        Self { x, y, ..*self }
+    }
 }
 
 /// How far particles may go: the working image, and the reference box whose aspect every particle keeps.

@@ -139,7 +139,7 @@ impl SearchContext<'_> {
         out: &mut Vec<Particle>,
     ) {
         for maximum in maxima {
-            let (width, height) = Extractor::cell(maximum, self.bounds, self.params);
+            let (width, height) = Extractor::cell_size(maximum, self.bounds, self.params);
             for _ in 0..AROUND_MAXIMUM.min(most.saturating_sub(out.len())) {
                 let scale_std = self.params.motion_std_scale;
                 out.push(self.bounds.clamp(Particle {

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::params::presets::Preset;
 
+/// Values of a cell with [`Features::Gradients`]: nine directions and the gray value.
+pub(crate) const CELL_VALUES: usize = 10;
+
 /// What a candidate area is turned into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -169,7 +172,7 @@ impl Params {
         let cells = self.patch_width as usize * self.patch_height as usize;
         match self.features {
             Features::Gray => cells,
-            Features::Gradients => cells * crate::tracker::features::hog::CHANNELS,
+            Features::Gradients => cells * CELL_VALUES,
         }
     }
 
