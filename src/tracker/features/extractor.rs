@@ -39,7 +39,7 @@ pub(crate) struct Grid {
     pub columns: usize,
     /// The channels of each cell, normalised, with a gray value of 0.
     pub values: Vec<f32>,
-    /// The gray sum of each cell, not normalised.
+    /// The gray sum of each cell, up to a constant, not normalised.
     pub grays: Vec<f32>,
 }
 

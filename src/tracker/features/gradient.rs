@@ -12,24 +12,30 @@ pub(crate) struct GradientRow {
     pub bins: Vec<f32>,
     /// Their lengths, in gray levels: 0 to 255 √2.
     pub strengths: Vec<f32>,
-    /// The gray values, after that of the pixel before the row.
+    /// The gray values minus an offset, after that of the pixel before the row.
     pub gray: Vec<f32>,
 }
 
 impl GradientRow {
     /// Computes the gradients of `pixels` in row `y` by central differences, not halved. Zeros follow up to `padded`
-    /// pixels. Beyond the frame's edge the edge's pixel counts.
+    /// pixels. Beyond the frame's edge the edge's pixel counts. `offset` is subtracted from the gray values.
     #[inline(always)]
-    pub fn compute(&mut self, frame: &GrayFrame, pixels: Range<usize>, y: usize, padded: usize) {
+    pub fn compute(
+        &mut self,
+        frame: &GrayFrame,
+        pixels: Range<usize>,
+        y: usize,
+        padded: usize,
+        offset: f32,
+    ) {
         let (width, height) = (frame.width() as usize, frame.height() as usize);
         let row = |y: usize| &frame.pixels()[y * width..][..width];
         let line = row(y);
+        let gray = |&value: &u8| f32::from(value) - offset;
         self.gray.clear();
-        self.gray
-            .push(f32::from(line[pixels.start.saturating_sub(1)]));
-        self.gray
-            .extend(line[pixels.clone()].iter().map(|&gray| f32::from(gray)));
-        self.gray.push(f32::from(line[pixels.end.min(width - 1)]));
+        self.gray.push(gray(&line[pixels.start.saturating_sub(1)]));
+        self.gray.extend(line[pixels.clone()].iter().map(gray));
+        self.gray.push(gray(&line[pixels.end.min(width - 1)]));
 
         let count = pixels.len();
         self.bins.resize(count, 0.0);

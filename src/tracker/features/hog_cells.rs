@@ -30,7 +30,8 @@ const STRIP: usize = 8;
 /// The cells of one area.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HogCells {
-    /// The channels of each cell, summed over its pixels, row by row.
+    /// The channels of each cell, summed over its pixels, row by row. The integral image's mean gray is subtracted from
+    /// every pixel, and pixels beyond its window are black.
     pub cells: Vec<Lanes>,
     norm: BlockNorm,
     grays: GrayMoments,
@@ -91,9 +92,28 @@ impl HogCells {
             first += 1;
         }
         self.norm.sum_vertically();
+        self.cell_area = (area.width * area.height) as f32 / self.cells.len() as f32;
         let [sum, squares] = totals.map(|total| total.0[GRAY]);
         self.grays = GrayMoments { sum, squares };
-        self.cell_area = (area.width * area.height) as f32 / self.cells.len() as f32;
+        if !integral.contains(area) {
+            self.blacken_outside(integral, columns);
+        }
+    }
+
+    /// Makes the pixels beyond the window black. In the integral image they have the mean gray.
+    #[cold]
+    fn blacken_outside(&mut self, integral: &IntegralChannels, columns: usize) {
+        self.grays = GrayMoments::default();
+        for (index, cell) in self.cells.iter_mut().enumerate() {
+            let (column, row) = (index % columns, index / columns);
+            let x = |edge: usize| integral.width_before(self.x_edges.get(edge));
+            let y = |edge: usize| integral.height_before(self.y_edges.get(edge));
+            let inside = (x(column + 1) - x(column)) * (y(row + 1) - y(row));
+            let gray = &mut cell.0[GRAY];
+            *gray -= integral.mean_gray() * (self.cell_area - inside);
+            self.grays.sum += *gray;
+            self.grays.squares += *gray * *gray;
+        }
     }
 
     /// Sums the cells of `N` columns from `first` on, and their energies. Adds the cells and their squares to `totals`.
