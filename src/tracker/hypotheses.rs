@@ -38,7 +38,7 @@ impl State {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut workspace.dense_search;
                 dense_search.run(extractor, search, &self.discriminant);
-                let cell = Extractor::cell(&self.answer, bounds, params);
+                let cell = Extractor::cell_size(&self.answer, bounds, params);
                 search.propose(dense_search.maxima(), cell, draws, particles);
             }
         }

@@ -2,14 +2,12 @@
 
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::features::extractor::Extractor;
-use crate::tracker::image::downsample;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search::SearchContext;
-use crate::tracker::params::table::Features;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
@@ -69,19 +67,9 @@ impl State {
         Extractor::window(&[*center], radius, &self.bounds, &self.params)
     }
 
-    /// How many working pixels along each side are one pixel of the views: with gray features 1.
+    /// How many working pixels along each side are one pixel of the views.
     pub fn downsample_factor(&self) -> usize {
-        if self.params.features == Features::Gray {
-            return 1;
-        }
-        let first = Particle {
-            scale: 1.0,
-            ..self.answer
-        };
-        let (width, height) = Extractor::cell(&first, &self.bounds, &self.params);
-        let side = width.min(height);
-        let frame_side = self.bounds.frame_width.min(self.bounds.frame_height);
-        downsample::factor(side, side * self.answer.scale, frame_side)
+        Extractor::downsample_factor(&self.answer, &self.bounds, &self.params)
     }
 }
 

@@ -84,7 +84,7 @@ impl Background {
             let full = self.samples.len() >= params.metric_samples();
             let oldest = if full { self.samples.pop_front() } else { None };
             let mut look = oldest.unwrap_or_default();
-            look.keep(vector);
+            look.set(vector);
             self.samples.push_back(look);
         }
         self.learn(params, scratch);
@@ -141,7 +141,7 @@ impl Background {
         }
         let vectors = out.chunks_exact_mut(self.mean.len());
         for (look, vector) in self.samples.iter().zip(vectors) {
-            look.write_without(&self.mean, vector);
+            look.write(&self.mean, vector);
         }
     }
 

@@ -54,7 +54,7 @@ impl Entry {
             self.templates
                 .resize_with(vectors.len(), QuantizedVector::default);
             for (template, vector) in self.templates.iter_mut().zip(vectors) {
-                template.keep(vector);
+                template.set(vector);
             }
             self.rebuild(background, params, scratch);
         } else {

@@ -205,7 +205,7 @@ mod tests {
         let mut out = vec![0.0; vectors.len()];
         for (vector, out) in vectors.chunks(20).zip(out.chunks_mut(20)) {
             let mut look = crate::tracker::features::quantized::QuantizedVector::default();
-            look.keep(vector);
+            look.set(vector);
             look.add_to(out, 1.0);
         }
         columns(&out)

@@ -121,7 +121,7 @@ impl DenseSearch {
             return;
         }
         let center = search.displaced();
-        let cell = Extractor::cell(&center, search.bounds, params);
+        let cell = Extractor::cell_size(&center, search.bounds, params);
         let places = SearchGrid::new(center, search.dense_radius(), cell, params);
         let grid = &mut self.grid;
         extractor.grid(

@@ -11,10 +11,9 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, GRAY_WEIGHT, Lanes};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::{CHANNELS, GRAY_WEIGHT};
 use crate::tracker::features::hog_cells::MIN_CONTRAST;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
@@ -178,7 +177,6 @@ struct Scorer {
     origin_square: f32,
     /// Cells of a window.
     count: f32,
-    gray_weight: f32,
     least_deviation: f32,
 }
 
@@ -195,7 +193,6 @@ impl Scorer {
             origin_score: vector_ops::dot(weights, origin),
             origin_square: vector_ops::dot(origin, origin),
             count: (weights.len() / CHANNELS) as f32,
-            gray_weight: GRAY_WEIGHT,
             least_deviation: MIN_CONTRAST * cell_pixels,
         }
     }
@@ -219,7 +216,7 @@ impl Scorer {
         let variance = simd.max_f32s(variance, zero);
         let least_deviation = simd.splat_f32s(self.least_deviation);
         let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
-        let scale = simd.div_f32s(simd.splat_f32s(self.gray_weight), deviation);
+        let scale = simd.div_f32s(simd.splat_f32s(GRAY_WEIGHT), deviation);
         let mut whole = products.directions;
         for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
             let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
@@ -295,7 +292,7 @@ mod tests {
                 &mut grid,
             );
             let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
-            let (cell_width, cell_height) = Extractor::cell(&center, &bounds, &params);
+            let (cell_width, cell_height) = Extractor::cell_size(&center, &bounds, &params);
             let cell_pixels = (cell_width * cell_height) as f32;
             SlidingWindow::default().scores(
                 &grid,

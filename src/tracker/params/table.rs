@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::params::presets::Preset;
 
+/// Values of a cell with [`Features::Gradients`]: nine directions and the gray value.
+pub(crate) const CELL_VALUES: usize = 10;
+
 /// What a candidate area is turned into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -224,8 +227,7 @@ impl Features {
     pub(crate) fn channels(self) -> usize {
         match self {
             Self::Gray => 1,
-            // Nine directions and the gray value.
-            Self::Gradients => 10,
+            Self::Gradients => CELL_VALUES,
         }
     }
 }

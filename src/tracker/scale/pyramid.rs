@@ -43,11 +43,6 @@ pub(crate) fn params(params: &Params) -> Params {
     }
 }
 
-/// How much larger than its middle the largest area of a pyramid is.
-pub(crate) fn largest() -> f64 {
-    (STEP * MIDDLE as f64).exp()
-}
-
 /// Writes the areas of the pyramid around `center` to `out`, smallest first.
 pub(crate) fn areas(center: &Particle, out: &mut Vec<Particle>) {
     out.clear();
@@ -119,5 +114,16 @@ impl Scratch {
         let spectrum = &mut self.spectrum;
         vector_ops::become_combinations(simd, spectrum, &WAVES.windowed, &self.features, len);
         len
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::features::extractor::PYRAMID_MARGIN;
+
+    #[test]
+    fn the_window_of_a_frame_holds_the_largest_level() {
+        assert_eq!((STEP * MIDDLE as f64).exp(), PYRAMID_MARGIN);
     }
 }
