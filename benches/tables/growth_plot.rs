@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use crate::growth::Row;
+use crate::growth_row::Row;
 use crate::style::{self, Drawn, FONT, INK, MARGIN, TITLE};
 
 const PANEL: (u32, u32) = (330, 260);
