@@ -1,7 +1,7 @@
 //! `/openapi.json`, and `/docs`: Swagger UI out of the binary, so that it works without any other host.
 
-use super::openapi;
-use super::problem::Problem;
+use super::api;
+use super::problems::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
@@ -11,7 +11,7 @@ use std::sync::{Arc, LazyLock};
 use utoipa_swagger_ui::Config;
 
 static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| {
-    let document = openapi::document().to_pretty_json();
+    let document = api::document().to_pretty_json();
     document.expect("the document is plain JSON").into()
 });
 

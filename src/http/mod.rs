@@ -16,10 +16,11 @@
 //! # }
 //! ```
 
+mod advance;
 mod answer;
-mod body;
+mod answer_problems;
+mod api;
 mod config;
-mod context;
 mod create;
 mod docs;
 mod drain;
@@ -27,8 +28,8 @@ mod frames;
 mod health;
 mod openapi;
 mod page;
-mod problem;
-mod problem_kind;
+mod problems;
+mod request_id;
 mod router;
 mod server;
 mod session;
@@ -36,11 +37,12 @@ mod session_path;
 mod snapshot;
 mod state;
 mod target;
+mod target_box;
 mod upload;
 mod work;
 
 pub use config::{Config, ConfigError};
-pub use openapi::document as openapi_document;
-pub use problem_kind::Kind as ProblemKind;
+pub use api::document as openapi_document;
+pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

@@ -1,8 +1,7 @@
-//! A session as bytes: the tracker's snapshot and what the session adds to it.
+//! A session as bytes: the tracker's snapshot and the answers to the last request.
 //!
-//! Layout: [`MAGIC`], one version byte, the postcard encoding of the content, and the XXH3-64 of all that
-//! (little endian). Snapshots come from clients, so a damaged one must be told from a good one: the
-//! checksum finds accidents, and the tracker validates its own part against everything else.
+//! Layout: [`MAGIC`], one version byte, the postcard encoding of the content, and the XXH3-64 of all of these (little
+//! endian). Snapshots come from clients. The checksum finds accidental damage; the tracker validates its own part.
 
 use super::replay::Answered;
 use crate::tracker::{Tracker, TrackerError};
@@ -16,7 +15,7 @@ const CHECKSUM_BYTES: usize = 8;
 
 /// Why bytes are not a session.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EnvelopeError {
+pub enum SnapshotError {
     /// Not a snapshot, or cut short, or changed on the way.
     #[error("it is damaged or cut short")]
     Damaged,
@@ -28,47 +27,61 @@ pub enum EnvelopeError {
     Tracker(#[from] TrackerError),
 }
 
+/// What a snapshot holds.
+#[derive(Debug)]
+pub(super) struct SessionSnapshot {
+    pub(super) tracker: Tracker,
+    /// The answers to the last request, oldest first; at least one.
+    pub(super) recent: Vec<Answered>,
+}
+
 #[derive(Serialize, Deserialize)]
 struct Content<'a> {
     tracker: &'a [u8],
     recent: Vec<Answered>,
 }
 
-/// The bytes of a session.
-pub fn seal(tracker: &Tracker, recent: &[Answered]) -> Vec<u8> {
-    let content = Content {
-        tracker: &tracker.snapshot(),
-        recent: recent.to_vec(),
-    };
-    let mut bytes = MAGIC.to_vec();
-    bytes.push(VERSION);
-    let mut bytes = postcard::to_extend(&content, bytes).expect("plain data is always encodable");
-    bytes.extend_from_slice(&xxh3_64(&bytes).to_le_bytes());
-    bytes
-}
+impl SessionSnapshot {
+    /// The bytes of a session.
+    pub(super) fn encode(tracker: &Tracker, recent: &[Answered]) -> Vec<u8> {
+        let content = Content {
+            tracker: &tracker.snapshot(),
+            recent: recent.to_vec(),
+        };
+        let mut bytes = MAGIC.to_vec();
+        bytes.push(VERSION);
+        let mut bytes =
+            postcard::to_extend(&content, bytes).expect("plain data is always encodable");
+        bytes.extend_from_slice(&xxh3_64(&bytes).to_le_bytes());
+        bytes
+    }
 
-/// The session of `bytes`.
-///
-/// # Errors
-/// See [`EnvelopeError`].
-pub fn open(bytes: &[u8]) -> Result<(Tracker, Vec<Answered>), EnvelopeError> {
-    let body = bytes.strip_prefix(MAGIC).ok_or(EnvelopeError::Damaged)?;
-    let (&version, body) = body.split_first().ok_or(EnvelopeError::Damaged)?;
-    if version != VERSION {
-        return Err(EnvelopeError::Version(version));
+    /// The session of `bytes`.
+    ///
+    /// # Errors
+    /// See [`SnapshotError`].
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, SnapshotError> {
+        let body = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::Damaged)?;
+        let (&version, body) = body.split_first().ok_or(SnapshotError::Damaged)?;
+        if version != VERSION {
+            return Err(SnapshotError::Version(version));
+        }
+        let (content, checksum) = body
+            .split_last_chunk::<CHECKSUM_BYTES>()
+            .ok_or(SnapshotError::Damaged)?;
+        let summed = &bytes[..bytes.len() - CHECKSUM_BYTES];
+        if xxh3_64(summed).to_le_bytes() != *checksum {
+            return Err(SnapshotError::Damaged);
+        }
+        let content: Content = postcard::from_bytes(content).map_err(|_| SnapshotError::Damaged)?;
+        let tracker = Tracker::restore(content.tracker)?;
+        let last = content.recent.last().ok_or(SnapshotError::Damaged)?;
+        if last.estimate != tracker.estimate() {
+            return Err(SnapshotError::Damaged);
+        }
+        Ok(Self {
+            tracker,
+            recent: content.recent,
+        })
     }
-    let (content, checksum) = body
-        .split_last_chunk::<CHECKSUM_BYTES>()
-        .ok_or(EnvelopeError::Damaged)?;
-    let sealed = &bytes[..bytes.len() - CHECKSUM_BYTES];
-    if xxh3_64(sealed).to_le_bytes() != *checksum {
-        return Err(EnvelopeError::Damaged);
-    }
-    let content: Content = postcard::from_bytes(content).map_err(|_| EnvelopeError::Damaged)?;
-    let tracker = Tracker::restore(content.tracker)?;
-    let last = content.recent.last().ok_or(EnvelopeError::Damaged)?;
-    if last.estimate != tracker.estimate() {
-        return Err(EnvelopeError::Damaged);
-    }
-    Ok((tracker, content.recent))
 }

@@ -1,20 +1,9 @@
-//! Errors as problem documents (RFC 9457): one small constructor a kind. What a client reads says what to
-//! do; the real cause is kept for the log.
+//! What went wrong with a request: one small constructor for each kind of problem that a handler finds itself.
 
-use super::problem_kind::Kind;
-use crate::ingest::IngestError;
-use crate::sessions::{EnvelopeError, ReplayError};
-use crate::tracker::TrackerError;
-use axum::Json;
-use axum::http::HeaderValue;
-use axum::http::header::{CONTENT_TYPE, RETRY_AFTER};
+use super::kind::Kind;
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
 use std::error::Error;
 use std::sync::Arc;
-
-/// The media type of problem documents.
-pub const MEDIA_TYPE: &str = "application/problem+json";
 
 /// What went wrong with a request.
 #[derive(Debug, Clone)]
@@ -25,42 +14,12 @@ pub struct Problem {
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     index: Option<usize>,
-    /// The real cause, for the log alone.
+    /// The cause, for the log only.
     cause: Option<Arc<dyn Error + Send + Sync>>,
 }
 
-/// A problem document (RFC 9457).
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-#[schema(as = Problem)]
-pub struct Document {
-    /// Names the kind of problem and never changes: `urn:bagtrack:problem:…`.
-    #[schema(example = "urn:bagtrack:problem:session-not-found")]
-    r#type: String,
-    /// The kind of problem in a few words.
-    title: &'static str,
-    /// The status code of the response.
-    #[schema(minimum = 400, maximum = 599)]
-    status: u16,
-    /// What happened this time, and what to do.
-    detail: String,
-    /// The path of the request.
-    #[schema(example = "/sessions")]
-    instance: String,
-    /// The id of the request; also in the header `x-request-id`.
-    #[schema(example = "1da43888-6f49-40f8-a05c-7bb628ba4f6a")]
-    request_id: String,
-    /// With a wrong frame number: the number of the next frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    expected_frame: Option<u64>,
-    /// Which frame of the request is meant, counted from 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
-    index: Option<usize>,
-}
-
 impl Problem {
-    fn new(kind: Kind, detail: impl Into<String>) -> Self {
+    pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         Self {
             kind,
             detail: detail.into(),
@@ -77,13 +36,15 @@ impl Problem {
 
     /// No frame came.
     pub fn missing_frame() -> Self {
-        let detail = "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON field `frame`.";
+        let detail = "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON \
+            field `frame`.";
         Self::new(Kind::MissingFrame, detail)
     }
 
     /// No box came.
     pub fn missing_box() -> Self {
-        let detail = "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query or as a field.";
+        let detail = "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query \
+            or as a field.";
         Self::new(Kind::MissingBox, detail)
     }
 
@@ -94,7 +55,8 @@ impl Problem {
 
     /// No live session has this id.
     pub fn session_not_found() -> Self {
-        let detail = "The session was never opened here, was deleted or has expired; open a new one with POST /sessions.";
+        let detail = "The session was never opened here, was deleted or has expired; open a new one with POST \
+            /sessions.";
         Self::new(Kind::SessionNotFound, detail)
     }
 
@@ -127,94 +89,15 @@ impl Problem {
         Self::new(Kind::TooManyFrames, detail)
     }
 
-    /// The frame number does not fit.
-    pub fn replay(error: ReplayError) -> Self {
-        let (kind, detail, expected) = match error {
-            ReplayError::OutOfOrder { got, expected } => (
-                Kind::FrameOutOfOrder,
-                format!("This session expects frame {expected}, and frame {got} was sent."),
-                expected,
-            ),
-            ReplayError::Differs { got, expected } => (
-                Kind::FrameDiffers,
-                format!(
-                    "Frame {got} was answered for other bytes; a new frame has the number {expected}."
-                ),
-                expected,
-            ),
-        };
-        let mut problem = Self::new(kind, detail);
-        problem.expected_frame = Some(expected);
-        problem
-    }
-
-    /// The bytes are not a frame.
-    pub fn ingest(error: &IngestError) -> Self {
-        let (kind, detail) = match error {
-            IngestError::UnknownFormat => (
-                Kind::UnsupportedImage,
-                "The type is taken from the bytes; send a JPEG, PNG or WebP image.".to_owned(),
-            ),
-            IngestError::TooLarge(limit) => (
-                Kind::FrameTooLarge,
-                format!("{limit}. Send a smaller frame."),
-            ),
-            damaged => (
-                Kind::FrameDamaged,
-                format!("{damaged}. Send the whole file again."),
-            ),
-        };
-        Self::new(kind, detail)
-    }
-
-    /// The tracker did not take the frame, the box or the parameters.
-    pub fn tracker(error: TrackerError) -> Self {
-        match error {
-            TrackerError::Params(error) => Self::invalid_parameter(error.to_string()),
-            TrackerError::Target(_) => Self::new(Kind::InvalidBox, format!("{error}.")),
-            TrackerError::FrameSize { .. } => {
-                let detail = format!("{error}. Open a new session for frames of another size.");
-                Self::new(Kind::FrameSizeMismatch, detail)
-            }
-            other => Self::internal(Arc::new(other)),
-        }
-    }
-
     /// A parameter is unknown, has the wrong type or is out of its range.
     pub fn invalid_parameter(detail: impl Into<String>) -> Self {
         Self::new(Kind::InvalidParameter, detail)
     }
 
-    /// The bytes are not a session.
-    pub fn invalid_snapshot(error: EnvelopeError) -> Self {
-        let detail = format!("{error}. Send the bytes of GET /sessions/{{id}}/snapshot unchanged.");
-        Self::new(Kind::InvalidSnapshot, detail).caused_by(Arc::new(error))
-    }
-
-    /// All places at the session are taken.
-    pub fn session_busy() -> Self {
-        let detail = "Wait for the answers to the frames already sent. The session is unchanged.";
-        Self::new(Kind::SessionBusy, detail)
-    }
-
-    /// All places in the queue are taken.
-    pub fn queue_full() -> Self {
-        Self::new(
-            Kind::QueueFull,
-            "Try again after the time in `Retry-After`. Nothing was changed.",
-        )
-    }
-
-    /// There is no room for another session.
-    pub fn too_many_sessions() -> Self {
-        let detail =
-            "Delete sessions that have ended, or try again after the time in `Retry-After`.";
-        Self::new(Kind::TooManySessions, detail)
-    }
-
     /// The work took too long.
     pub fn work_timeout() -> Self {
-        let detail = "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is never tracked twice.";
+        let detail = "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is \
+            never tracked twice.";
         Self::new(Kind::WorkTimeout, detail)
     }
 
@@ -228,7 +111,7 @@ impl Problem {
         Self::panicked().caused_by(cause)
     }
 
-    /// The service failed, and the log has it already.
+    /// The service failed, and the log already has the cause.
     pub fn panicked() -> Self {
         let detail = "The fault is the service's. The log has the cause under this request id.";
         Self::new(Kind::Internal, detail)
@@ -247,8 +130,13 @@ impl Problem {
         self
     }
 
-    fn caused_by(mut self, cause: Arc<dyn Error + Send + Sync>) -> Self {
+    pub(super) fn caused_by(mut self, cause: Arc<dyn Error + Send + Sync>) -> Self {
         self.cause = Some(cause);
+        self
+    }
+
+    pub(super) fn expecting_frame(mut self, number: u64) -> Self {
+        self.expected_frame = Some(number);
         self
     }
 
@@ -257,7 +145,22 @@ impl Problem {
         self.kind
     }
 
-    /// The real cause and its causes, for the log.
+    /// What happened this time, and what to do.
+    pub fn detail(&self) -> &str {
+        &self.detail
+    }
+
+    /// The number of the next frame, where a frame number was wrong.
+    pub fn expected_frame(&self) -> Option<u64> {
+        self.expected_frame
+    }
+
+    /// Which frame of the request is meant, counted from 0.
+    pub fn index(&self) -> Option<usize> {
+        self.index
+    }
+
+    /// The cause and its causes, for the log.
     pub fn cause(&self) -> Option<String> {
         let mut error: &dyn Error = self.cause.as_deref()?;
         let mut text = error.to_string();
@@ -267,36 +170,10 @@ impl Problem {
         }
         Some(text)
     }
-
-    /// The document, for the request at this path with this id.
-    pub fn document(&self, instance: String, request_id: String) -> Document {
-        Document {
-            r#type: self.kind.urn(),
-            title: self.kind.title(),
-            status: self.kind.status().as_u16(),
-            detail: self.detail.clone(),
-            instance,
-            request_id,
-            expected_frame: self.expected_frame,
-            index: self.index,
-        }
-    }
-
-    /// The response, for the request at this path with this id.
-    pub fn respond(&self, instance: String, request_id: String) -> Response {
-        let document = Json(self.document(instance, request_id));
-        let mut response = (self.kind.status(), document).into_response();
-        let headers = response.headers_mut();
-        headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-        if let Some(seconds) = self.kind.retry_after() {
-            headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
-        }
-        response
-    }
 }
 
 impl IntoResponse for Problem {
-    /// The status alone: the outermost middleware writes the document, since it knows the request.
+    /// The status alone: an outer layer writes the document, since it knows the request.
     fn into_response(self) -> Response {
         let mut response = self.kind.status().into_response();
         response.extensions_mut().insert(self);
