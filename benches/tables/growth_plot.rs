@@ -1,4 +1,5 @@
-//! The figure of the growth table: a panel for each row, logarithmic on both axes, with what is expected as a dashed line.
+//! The figure of the growth table: a panel for each row, logarithmic on both axes, with what is expected as a dashed
+//! line.
 
 use plotters::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Where the log of `serve` goes: to standard error, by a thread of its own.
 //!
-//! What can go wrong: whoever reads standard error stalls. Nothing that logs ever waits for it: up to [`MAX_LINES`] lines
-//! are kept, further ones are dropped and counted, and the log tells how many as soon as it is read again.
+//! What can go wrong: whoever reads standard error stalls. Nothing that logs ever waits for it: up to [`MAX_LINES`]
+//! lines are kept, further ones are dropped and counted, and the log tells how many as soon as it is read again.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{self, BufWriter, IsTerminal};
@@ -78,13 +78,17 @@ impl Log {
 }
 
 impl DroppedLines {
-    /// Logs how many lines were dropped, if that is more than at the last time. Where this line is dropped too, the next
-    /// one tells it.
+    /// Logs how many lines were dropped, if that is more than at the last time. Where this line is dropped too, the
+    /// next one tells it.
     pub fn report(&mut self) {
         let total = self.counter.dropped_lines();
         if total > self.told {
             let dropped = total - self.told;
-            tracing::warn!(dropped, total, "log lines were dropped: nobody read them in time");
+            tracing::warn!(
+                dropped,
+                total,
+                "log lines were dropped: they were not read in time"
+            );
             self.told = total;
         }
     }
@@ -100,7 +104,10 @@ impl DroppedLines {
 }
 
 fn log_panic(panic: &PanicHookInfo<'_>) {
-    let place = panic.location().map(ToString::to_string).unwrap_or_default();
+    let place = panic
+        .location()
+        .map(ToString::to_string)
+        .unwrap_or_default();
     let message = panic.payload_as_str().unwrap_or("a value that is not text");
     let backtrace = Backtrace::capture();
     if backtrace.status() == BacktraceStatus::Captured {

@@ -27,8 +27,8 @@ pub struct Answered {
 }
 
 impl NextFrames {
-    /// The answers: the stored ones if the request was answered before, else those of the tracker. All frames are decoded
-    /// before the first is tracked.
+    /// The answers: the stored ones if the request was answered before, else those of the tracker. All frames are
+    /// decoded before the first is tracked.
     ///
     /// # Errors
     /// The problem of the first bad frame. The session is unchanged.
@@ -37,8 +37,11 @@ impl NextFrames {
         locked: &mut LockedSession,
         limits: &Limits,
     ) -> Result<Answered, Problem> {
-        let fingerprints: Vec<Fingerprint> =
-            self.files.iter().map(|file| Fingerprint::of(file)).collect();
+        let fingerprints: Vec<Fingerprint> = self
+            .files
+            .iter()
+            .map(|file| Fingerprint::of(file))
+            .collect();
         let decision =
             locked
                 .state()
@@ -57,7 +60,9 @@ impl NextFrames {
             Some(target) => {
                 let (fingerprint, frame) = &frames[0];
                 let estimate = state.retarget(*fingerprint, frame, target);
-                estimate.map(|estimate| vec![estimate]).map_err(|error| (0, error))
+                estimate
+                    .map(|estimate| vec![estimate])
+                    .map_err(|error| (0, error))
             }
             None => state.step(&frames),
         };

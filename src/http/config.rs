@@ -88,7 +88,10 @@ pub struct Config {
     pub max_connections: usize,
     /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
     /// commas; `*` for all.
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ','))]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')
+    )]
     pub cors_origins: Vec<String>,
     /// Time for a client to send its request head; a connection that is idle for longer is closed too.
     #[cfg_attr(feature = "cli", arg(
@@ -271,13 +274,13 @@ impl Config {
         self.workers.unwrap_or_else(cores)
     }
 
-    /// The number of threads that serve connections. Reading and answering a request takes them about a tenth of the time
-    /// that its frame takes a worker, and fewer threads are woken less often.
+    /// The number of threads that serve connections. Reading and answering a request takes them about a tenth of the
+    /// time that its frame takes a worker, and fewer threads are woken less often.
     pub fn network_threads(&self) -> usize {
         self.worker_count().div_ceil(8).clamp(1, cores())
     }
 
-    /// What a frame may cost.
+    /// The limits of one frame.
     pub fn frame_limits(&self) -> ingest::Limits {
         ingest::Limits {
             max_bytes: self.max_frame_bytes,
@@ -315,14 +318,20 @@ mod tests {
         // Another process, since the environment of this one cannot be changed while other tests run.
         let tests = std::env::current_exe().unwrap();
         let mut command = std::process::Command::new(tests);
-        command.args(["the_defaults_do_not_come_from_the_environment", "--nocapture"]);
+        command.args([
+            "the_defaults_do_not_come_from_the_environment",
+            "--nocapture",
+        ]);
         command.env(CHILD, "1");
         command.env("BAGTRACK_WORKERS", "3");
         command.env("BAGTRACK_QUEUE", "no number");
         let output = command.output().unwrap();
         let said = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success(), "{output:?}");
-        assert!(said.contains("the defaults are as they should be"), "{said}");
+        assert!(
+            said.contains("the defaults are as they should be"),
+            "{said}"
+        );
     }
 
     #[test]

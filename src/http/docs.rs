@@ -1,4 +1,4 @@
-//! `/openapi.json`, and `/docs`: Swagger UI out of the binary, so that it works without any other host.
+//! `/openapi.json`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
 use super::api;
 use super::problems::problem::Problem;
@@ -15,7 +15,7 @@ static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| {
     document.expect("the document is plain JSON").into()
 });
 
-// The default validator would be another host.
+// The default validator is on another host.
 static SWAGGER: LazyLock<Arc<Config<'static>>> =
     LazyLock::new(|| Arc::new(Config::new(["/openapi.json"]).validator_url("none")));
 

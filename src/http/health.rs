@@ -1,14 +1,14 @@
-//! `/healthz` and `/readyz`: whether the process runs, and whether it wants requests.
+//! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
 use super::openapi::problem_responses::{self, problem_responses};
-use super::problems::problem::Problem;
 use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
 
-/// The service is well.
+/// The service runs.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 pub struct Health {
     /// Always `ok`.

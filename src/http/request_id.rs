@@ -1,5 +1,5 @@
-//! The id of a request: the client's `x-request-id` where it can be used, so that a trace can be followed through several
-//! services, else a new one.
+//! The id of a request: the client's `x-request-id` where it can be used, so that a trace can be followed through
+//! several services, else a new one.
 
 use axum::extract::Request;
 use axum::http::header::HeaderName;
@@ -16,7 +16,10 @@ pub async fn remove_unusable_id(mut request: Request) -> Request {
         (1..=MAX_ID_BYTES).contains(&id.len()) && id.iter().all(is_allowed)
     };
     let headers = request.headers_mut();
-    if headers.get(REQUEST_ID).is_some_and(|id| !is_usable(id.as_bytes())) {
+    if headers
+        .get(REQUEST_ID)
+        .is_some_and(|id| !is_usable(id.as_bytes()))
+    {
         headers.remove(REQUEST_ID);
     }
     request

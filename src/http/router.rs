@@ -1,7 +1,7 @@
 //! All routes, and the layers that every request passes through.
 
-use super::api::api;
 use super::answer_problems::{answer_problems, panic_response};
+use super::api::api;
 use super::drain::drain_refused;
 use super::problems::problem::Problem;
 use super::request_id::{self, REQUEST_ID, remove_unusable_id};
@@ -9,13 +9,15 @@ use super::state::AppState;
 use super::{docs, page};
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request};
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, LOCATION, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_TYPE, LOCATION, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
+};
 use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware;
 use axum::response::Response;
 use axum::routing::get;
-use tower_http::catch_panic::CatchPanicLayer;
 use std::time::Duration;
+use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::set_header::SetResponseHeaderLayer;

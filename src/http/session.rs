@@ -2,8 +2,8 @@
 
 use super::answer::{Answer, ImageSize};
 use super::openapi::problem_responses::{self, problem_responses};
-use super::problems::problem::Problem;
 use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload::overrides::ParamOverrides;
@@ -15,7 +15,7 @@ use axum::http::{StatusCode, Uri};
 use serde::Serialize;
 use uuid::Uuid;
 
-/// Where a session stands.
+/// The state of a session.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 pub struct SessionView {
     /// The session's id.

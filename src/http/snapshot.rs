@@ -1,8 +1,8 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
 use super::openapi::problem_responses::{self, problem_responses};
-use super::problems::problem::Problem;
 use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload::texts::refuse_query;

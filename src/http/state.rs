@@ -48,7 +48,7 @@ impl AppState {
         }))
     }
 
-    /// From now on `/readyz` answers 503.
+    /// Makes `/readyz` answer 503 from now on.
     pub fn drain(&self) {
         self.draining.store(true, Ordering::Release);
     }

@@ -1,8 +1,8 @@
 //! Boxes as they are sent and received.
 
 use crate::tracker::Rect;
-use serde::de::{Deserialize, Deserializer, Error};
 use serde::Serialize;
+use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;
 use std::str::FromStr;
 

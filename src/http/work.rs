@@ -33,7 +33,10 @@ where
 {
     let waiting = async {
         let mut locked = permit.lock().await?;
-        state.admission.run(queue, move || work(&mut locked)).await?
+        state
+            .admission
+            .run(queue, move || work(&mut locked))
+            .await?
     };
     timeout(state.config.work_timeout, waiting)
         .await

@@ -10,7 +10,7 @@ pub(super) fn catch_decoder_panic<T>(
     format: Format,
     decode: impl FnOnce() -> Result<T, IngestError>,
 ) -> Result<T, IngestError> {
-    // Whatever `decode` borrows is dropped or overwritten after an error, so nobody sees it half changed.
+    // Whatever `decode` borrows is dropped or overwritten after an error, so no half-changed value is read.
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err(format.damaged("its structure is not supported")))
 }

@@ -15,8 +15,8 @@ thread_local! {
 
 /// Decodes one uploaded frame.
 ///
-/// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the working image. A thread keeps some of
-/// them for its next frame, at most 32 MiB.
+/// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the working image. A thread keeps some
+/// of them for its next frame, at most 32 MiB.
 ///
 /// # Errors
 /// See [`IngestError`].

@@ -8,7 +8,8 @@
 //! - *Luma*: Rec. 601, `Y = 0.299 R + 0.587 G + 0.114 B`, rounded. For JPEG this is its own Y channel. Colour profiles
 //!   and gamma are not applied. 16 bits are rounded to 8. Transparency is blended over black, as a canvas does when it
 //!   writes a JPEG.
-//! - *Upright*: the EXIF orientation of a JPEG, PNG or WebP is applied, so boxes are in the pixels that a browser shows.
+//! - *Upright*: the EXIF orientation of a JPEG, PNG or WebP is applied, so boxes are in the pixels that a browser
+//!   shows.
 //! - *Animations*: the first image.
 //!
 //! What can go wrong: the bytes are hostile. They may claim a huge size, be cut short, or cost far more to decode than

@@ -13,7 +13,10 @@ use image::{DynamicImage, ImageDecoder, ImageError};
 use std::borrow::Cow;
 use std::io::Cursor;
 
-pub(super) fn decode_png(bytes: &[u8], limits: &Limits) -> Result<StoredLuma<'static>, IngestError> {
+pub(super) fn decode_png(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<StoredLuma<'static>, IngestError> {
     check_png_whole(bytes).map_err(|reason| Format::Png.damaged(reason))?;
     // Also bounds compressed side chunks (text, colour profiles), which are read with the header.
     let mut decoder_limits = image::Limits::no_limits();
@@ -23,7 +26,10 @@ pub(super) fn decode_png(bytes: &[u8], limits: &Limits) -> Result<StoredLuma<'st
     decode(decoder, Format::Png, 0, limits)
 }
 
-pub(super) fn decode_webp(bytes: &[u8], limits: &Limits) -> Result<StoredLuma<'static>, IngestError> {
+pub(super) fn decode_webp(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<StoredLuma<'static>, IngestError> {
     check_webp_whole(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;

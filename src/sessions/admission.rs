@@ -1,9 +1,9 @@
 //! Which requests may work: a queue before the workers.
 //!
-//! A request first takes a place in the queue and a share of the bytes that all bodies may have together; it is refused
-//! at once when either is used up. Then it waits for a worker. All its permits move into the work itself. A request that
-//! times out or whose client goes away does not stop work that has begun, so its permits stay taken until that work has
-//! ended, and never more threads work than there are workers.
+//! A request first takes a place in the queue and a share of the bytes that all bodies may have together; it is
+//! refused at once when either is used up. Then it waits for a worker. All its permits move into the work itself. A
+//! request that times out or whose client goes away does not stop work that has begun, so its permits stay taken until
+//! that work has ended, and never more threads work than there are workers.
 
 use super::workers::Workers;
 use std::any::Any;
@@ -54,8 +54,8 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, with at most `body_bytes` bytes of bodies together; at most `workers` of them
-    /// at work.
+    /// At most `queue` requests at a time, with at most `body_bytes` bytes of bodies together; at most `workers` of
+    /// them at work.
     pub fn new(queue: usize, body_bytes: usize, workers: usize) -> Self {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
@@ -92,14 +92,11 @@ impl Admission {
         F: FnOnce() -> T + Send + 'static,
     {
         let acquired = self.workers.clone().acquire_owned().await;
-        let permits = (
-            queue,
-            acquired.expect("the semaphore is never closed"),
-        );
+        let permits = (queue, acquired.expect("the semaphore is never closed"));
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         self.threads.start(Box::new(move || {
-            // A panic drops `work`, so nobody sees what it left half changed.
+            // A panic drops `work`, so no half-changed value is read.
             let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
             drop(permits);
             // It cannot be sent when the client has gone.
@@ -140,7 +137,10 @@ mod tests {
     async fn bodies_share_their_byte_budget() {
         let admission = Admission::new(9, 5 * BYTES_PER_PERMIT, 1);
         let large = admission.enter(4 * BYTES_PER_PERMIT).unwrap();
-        assert_eq!(admission.enter(BYTES_PER_PERMIT + 1).unwrap_err(), QueueFull);
+        assert_eq!(
+            admission.enter(BYTES_PER_PERMIT + 1).unwrap_err(),
+            QueueFull
+        );
         assert!(admission.enter(BYTES_PER_PERMIT).is_ok());
         drop(large);
         assert!(admission.enter(5 * BYTES_PER_PERMIT).is_ok());

@@ -24,8 +24,8 @@ pub struct Registry {
 }
 
 impl Registry {
-    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when it was
-    /// not used for `idle`.
+    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when it
+    /// was not used for `idle`.
     pub fn new(max_sessions: usize, max_requests: usize, idle: Duration, clock: Clock) -> Self {
         Self {
             sessions: Mutex::default(),
@@ -82,8 +82,8 @@ impl Registry {
         None
     }
 
-    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if there
-    /// is no such session.
+    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
+    /// there is no such session.
     pub fn remove(&self, id: Uuid) -> bool {
         let removed = self.map().remove(&id);
         let Some(session) = removed else { return false };
@@ -106,7 +106,7 @@ impl Registry {
         ended.len()
     }
 
-    /// Number of sessions in the map, expired ones that nobody has asked for included.
+    /// Number of sessions in the map, those included that have expired since the last sweep.
     pub fn len(&self) -> usize {
         self.map().len()
     }

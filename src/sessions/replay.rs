@@ -7,8 +7,8 @@
 use crate::tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 
-/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It is not a cryptographic one: a client that forges a
-/// collision gets a wrong stored answer for its own session only.
+/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It is not a cryptographic one: a client that forges
+/// a collision gets a wrong stored answer for its own session only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint(u128);
 
@@ -60,11 +60,11 @@ pub enum ReplayError {
     },
 }
 
-/// Decides about a request with the frames `posted`, which the client numbers from `number` on. `recent` are the answers
-/// to the last request, at least one. `given` is the box, where the request corrects it.
+/// Decides about a request with the frames `posted`, which the client numbers from `number` on. `recent` are the
+/// answers to the last request, at least one. `given` is the box, where the request corrects it.
 ///
-/// A request is a replay if its last frame is the session's last frame, all its frames are in the last request, and their
-/// bytes (and the box) are the same.
+/// A request is a replay if its last frame is the session's last frame, all its frames are in the last request, and
+/// their bytes (and the box) are the same.
 ///
 /// # Errors
 /// See [`ReplayError`].
@@ -143,7 +143,9 @@ mod tests {
         let recent = [answered(5, b"a"), answered(6, b"b"), answered(7, b"c")];
         let frames = |decision| -> Vec<u64> {
             match decision {
-                Ok(ReplayDecision::Replay(answers)) => answers.iter().map(|a: &Estimate| a.frame).collect(),
+                Ok(ReplayDecision::Replay(answers)) => {
+                    answers.iter().map(|a: &Estimate| a.frame).collect()
+                }
                 other => panic!("{other:?}"),
             }
         };

@@ -53,7 +53,10 @@ impl std::fmt::Debug for Session {
 #[cfg(test)]
 impl Drop for Session {
     fn drop(&mut self) {
-        let on_drop = self.on_drop.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let on_drop = self
+            .on_drop
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner);
         on_drop.take().into_iter().for_each(|probe| probe());
     }
 }

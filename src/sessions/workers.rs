@@ -34,8 +34,8 @@ impl Workers {
         Self(Arc::new(Shared { state, max_threads }))
     }
 
-    /// Runs `job` on a thread: at once if one is idle or can be started, else after the jobs that wait already. Drops the
-    /// job if there is no thread at all and the system gives none.
+    /// Runs `job` on a thread: at once if one is idle or can be started, else after the jobs that wait already. Drops
+    /// the job if there is no thread at all and the system gives none.
     pub(super) fn start(&self, job: Job) {
         let mut state = self.0.lock();
         if let Some(slot) = state.idle.pop() {

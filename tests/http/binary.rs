@@ -136,7 +136,15 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
             let statuses = futures_util::future::join_all((0..10).map(|_| ask())).await;
             assert!(statuses.iter().all(|status| *status == 404), "{statuses:?}");
         }
-        assert!(client.get(format!("{url}/healthz")).send().await.unwrap().status().is_success());
+        assert!(
+            client
+                .get(format!("{url}/healthz"))
+                .send()
+                .await
+                .unwrap()
+                .status()
+                .is_success()
+        );
     };
     let answered = tokio::time::timeout(std::time::Duration::from_secs(60), all).await;
     if answered.is_err() {
@@ -145,16 +153,22 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
     }
 
     let reader = std::thread::spawn(move || {
-        let lines = log.lines().map(|line| serde_json::from_str(&line.unwrap()).unwrap());
+        let lines = log
+            .lines()
+            .map(|line| serde_json::from_str(&line.unwrap()).unwrap());
         lines.collect::<Vec<Value>>()
     });
     let ended = Command::new("kill").arg(child.id().to_string()).status();
     assert!(ended.unwrap().success());
     assert!(child.wait().unwrap().success());
     let lines = reader.join().unwrap();
-    let dropped = lines.iter().filter_map(|line| line["fields"]["total"].as_u64());
+    let dropped = lines
+        .iter()
+        .filter_map(|line| line["fields"]["total"].as_u64());
     let dropped = dropped.max().expect("it says that lines were dropped");
-    let of_requests = lines.iter().filter(|line| line["span"]["path"] == "/nowhere");
+    let of_requests = lines
+        .iter()
+        .filter(|line| line["span"]["path"] == "/nowhere");
     let written = of_requests.count() as u64;
     assert!(written > 1000 && dropped > 0, "{written} and {dropped}");
     assert!(written + dropped >= 2 * REQUESTS, "{written} and {dropped}");

@@ -63,7 +63,10 @@ async fn the_box_follows_the_target() {
         );
     }
     // A box that never moves is right in the first frames and has lost the target in these.
-    let (first, last) = (Rect::new(20.0, 15.0, 16.0, 12.0), Rect::new(52.0, 31.0, 16.0, 12.0));
+    let (first, last) = (
+        Rect::new(20.0, 15.0, 16.0, 12.0),
+        Rect::new(52.0, 31.0, 16.0, 12.0),
+    );
     assert_eq!(first.overlap(&last), 0.0);
 }
 

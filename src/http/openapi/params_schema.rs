@@ -4,8 +4,8 @@ use crate::http::upload::overrides::{ParamOverrides, by_name};
 use crate::tracker::Preset;
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 impl ToSchema for ParamOverrides {

@@ -85,7 +85,8 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
             unreachable!("settings are a struct with named fields")
         };
         body.description = Some("Frames as base64 or data URLs, and the settings.".to_owned());
-        body.properties.insert("frame".to_owned(), base64(FILE).into());
+        body.properties
+            .insert("frame".to_owned(), base64(FILE).into());
         match S::FRAMES {
             FrameCount::One => body.required.push("frame".to_owned()),
             FrameCount::Several => {

@@ -3,7 +3,9 @@
 use super::kind::Kind;
 use super::problem::Problem;
 use crate::ingest::IngestError;
-use crate::sessions::{QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions, WorkLost};
+use crate::sessions::{
+    QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions, WorkLost,
+};
 use crate::tracker::TrackerError;
 use std::sync::Arc;
 
@@ -32,9 +34,10 @@ impl From<IngestError> for Problem {
                 let detail = "The type is taken from the bytes; send a JPEG, PNG or WebP image.";
                 Self::new(Kind::UnsupportedImage, detail)
             }
-            IngestError::TooLarge(limit) => {
-                Self::new(Kind::FrameTooLarge, format!("{limit}. Send a smaller frame."))
-            }
+            IngestError::TooLarge(limit) => Self::new(
+                Kind::FrameTooLarge,
+                format!("{limit}. Send a smaller frame."),
+            ),
             damaged => {
                 let detail = format!("{damaged}. Send the whole file again.");
                 Self::new(Kind::FrameDamaged, detail)

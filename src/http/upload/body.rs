@@ -19,8 +19,8 @@ pub(super) async fn read(body: Body, max_bytes: usize) -> Result<Bytes, Problem>
     }
 }
 
-/// The problem that an error of reading a body is, or of parsing it as it comes. The reason is somewhere in the chain of
-/// its causes.
+/// The problem that an error of reading a body is, or of parsing it as it comes. The reason is somewhere in the chain
+/// of its causes.
 pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Problem {
     let mut cause = Some(error);
     while let Some(error) = cause {

@@ -1,7 +1,7 @@
 //! JSON uploads: `frame` and `frames` are base64, all other fields are settings.
 
+use super::fields::Fields;
 use super::settings::{FrameCount, Settings};
-use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};

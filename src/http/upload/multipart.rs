@@ -1,7 +1,7 @@
 //! Multipart uploads: `frame` parts are files, all others are settings.
 
 use super::body;
-use super::uploaded::Fields;
+use super::fields::Fields;
 use crate::http::problems::problem::Problem;
 use axum::extract::multipart::MultipartError;
 use axum::extract::{FromRequest, Multipart, Request};

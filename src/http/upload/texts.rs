@@ -41,7 +41,9 @@ impl Texts {
         let text = text.trim();
         if name.len() > MAX_NAME_BYTES || self.0.len() >= MAX_SETTINGS {
             let start: String = name.chars().take(MAX_NAME_BYTES).collect();
-            return Err(Problem::malformed(format!("There is no setting `{start}`.")));
+            return Err(Problem::malformed(format!(
+                "There is no setting `{start}`."
+            )));
         }
         if text.len() > MAX_TEXT_BYTES {
             let detail = format!("`{name}` is longer than {MAX_TEXT_BYTES} bytes.");
@@ -60,9 +62,8 @@ impl Texts {
     /// # Errors
     /// One is unknown, or its text is no value of its type.
     pub fn parse<S: Settings>(self) -> Result<S, Problem> {
-        serde_json::from_value(Value::Object(self.0)).map_err(|error| {
-            Problem::malformed(format!("The settings cannot be read: {error}."))
-        })
+        serde_json::from_value(Value::Object(self.0))
+            .map_err(|error| Problem::malformed(format!("The settings cannot be read: {error}.")))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The frames and settings of a request, whichever form they came in.
 
+use super::fields::Fields;
 use super::settings::{FrameCount, Settings};
 use super::texts::Texts;
 use super::{body, json, multipart};
@@ -20,13 +21,6 @@ pub struct Upload<S> {
     pub settings: S,
     /// Whether the content type says that the file is a session snapshot.
     pub is_snapshot: bool,
-}
-
-/// The files of a body, and the texts of its settings and those of the query.
-#[derive(Debug, Default)]
-pub(super) struct Fields {
-    pub(super) files: Vec<Bytes>,
-    pub(super) texts: Texts,
 }
 
 impl<S: Settings> Upload<S> {

@@ -1,0 +1,13 @@
+//! What a body holds before its settings are parsed.
+
+use super::texts::Texts;
+use axum::body::Bytes;
+
+/// The files of a body, and the texts of its settings and of those of the query.
+#[derive(Debug)]
+pub(super) struct Fields {
+    /// The files, in order.
+    pub(super) files: Vec<Bytes>,
+    /// The texts.
+    pub(super) texts: Texts,
+}
