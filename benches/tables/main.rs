@@ -13,6 +13,7 @@ mod decode;
 mod fit;
 mod growth;
 mod growth_plot;
+mod growth_row;
 mod memory;
 mod ratios;
 #[path = "../scene/mod.rs"]

@@ -1,8 +1,8 @@
-//! The catalogue of problems: each has a type, a status and a title that never change.
+//! The catalogue of problem kinds: each has a type, a status and a title that never change.
 
 use axum::http::StatusCode;
 
-/// A kind of problem; one a problem type of the interface.
+/// A kind of problem: one problem type of the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[expect(missing_docs, reason = "`title` says what each one is")]
 pub enum Kind {

@@ -1,16 +1,16 @@
-//! A last guard around the decoders: they index by what a hostile file says, and a panic in one of them is that
-//! file's fault, not ours.
+//! Decoders index by numbers that a hostile file holds. Should one of them panic, the file is damaged, and the service
+//! goes on.
 
-use super::IngestError;
+use super::error::IngestError;
 use super::sniff::Format;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Runs a decoder, with a panic in it turned into an error.
-pub(super) fn unless_it_panics<T>(
+pub(super) fn catch_decoder_panic<T>(
     format: Format,
     decode: impl FnOnce() -> Result<T, IngestError>,
 ) -> Result<T, IngestError> {
-    // What `decode` borrows is dropped by the callers on an error, so nobody sees it half changed.
+    // Whatever `decode` borrows is dropped or overwritten after an error, so no half-changed value is read.
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err(format.damaged("its structure is not supported")))
 }
@@ -21,7 +21,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_damaged_image() {
-        let result: Result<(), IngestError> = unless_it_panics(Format::WebP, || {
+        let result: Result<(), IngestError> = catch_decoder_panic(Format::WebP, || {
             let nothing: [u8; 0] = [];
             let index = std::hint::black_box(3);
             Err(Format::WebP.damaged(nothing[index..].len().to_string()))
