@@ -10,8 +10,9 @@ use super::arrival::Arrival;
 use super::camera::Camera;
 use super::centering::Centering;
 use super::examples::Examples;
+use super::grassmann::Evaluation;
+use super::likelihood::{self, Likelihoods};
 use super::motion::Particle;
-use super::posterior::Posterior;
 use super::rotation::Rotation;
 use super::scan::Scan;
 use super::score::Evidence;
@@ -20,9 +21,7 @@ use super::solitary::Solitary;
 use super::state::State;
 use super::trust::Trust;
 use super::view::View;
-use super::{
-    Evaluation, Features, GrayFrame, Params, kernel, learning, likelihood, pictures, turn,
-};
+use super::{Features, GrayFrame, Params, kernel, learning, pictures, turn};
 
 /// P at most.
 const GREATEST_HISTORY: usize = 10;
@@ -77,7 +76,7 @@ pub(super) struct Comparison {
     in_picture: Vec<Particle>,
     /// The exponent of each particle that its place alone says.
     places: Vec<f64>,
-    posterior: Posterior,
+    likelihoods: Likelihoods,
     /// The weights of all particles; they sum to 1.
     pub weights: Vec<f64>,
     /// For what is learned from a frame.
@@ -122,7 +121,7 @@ impl Comparison {
         if turn::is_on(params) {
             self.pictures.begin(&state.reach);
         }
-        self.posterior.begin(most, entries);
+        self.likelihoods.reserve(most, entries);
         empty(&mut self.weights, most);
         let mean = offset(state);
         self.examples.begin(&state.discriminant, mean, most);
@@ -305,15 +304,7 @@ impl Comparison {
         let pinned = (params.pinned as usize, params.pinned_weight);
         let entries = self.distances.len() / self.particles.len();
         let distances = &self.distances[first * entries..];
-        self.posterior.weigh(distances, sigma, pinned, weights);
-        let total: f64 = weights.iter().sum();
-        if total > 0.0 {
-            weights.iter_mut().for_each(|weight| *weight /= total);
-        } else {
-            // Every product underflowed: nothing is known to be better.
-            let equal = 1.0 / weights.len() as f64;
-            weights.fill(equal);
-        }
+        self.likelihoods.weigh(distances, sigma, pinned, weights);
     }
 
     /// Weighs what is at `place` in `frame` turned by each of `angles`, in radians: `weights` begin as the logarithms of their

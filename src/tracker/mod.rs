@@ -6,18 +6,18 @@
 //!
 //! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale. Each frame draws N from the last ones by
 //!   their weights and moves each by a Gaussian step.
-//! - **(B)** *Affine subspaces* (`patch`, `subspace`, `candidate`): a candidate area becomes a vector v of D gray values
+//! - **(B)** *Affine subspaces* (`patch`, `subspace`): a candidate area becomes a vector v of D gray values
 //!   (`patch` is the only file that knows how). With the patches tracked in the P previous frames it makes the matrix
 //!   V (equation 2); the mean of its columns and its n dominant left singular vectors are the candidate's affine
 //!   subspace (equation 1). V is not centred.
 //! - **(C)** *The bag* (`bag`): up to K affine subspaces that were tracked before, a new one every W frames.
-//! - **(D)** *Distance* (`distance`): α times the squared distance of origins plus 1 - α times the squared Grassmann
+//! - **(D)** *Distance* (`grassmann`): α times the squared distance of origins plus 1 - α times the squared Grassmann
 //!   geodesic distance of bases, both brought to \[0, 1\] (equations 4 to 8). *Likelihood* (`likelihood`): exp(-dist / σ),
 //!   normalised over the candidates for each entry of the bag, summed over the bag; the greatest sum is the answer,
 //!   and the sums are the weights for the next frame (equations 9 to 12).
 //!
 //! How (B) and (D) are computed from inner products alone, without decomposing V for any candidate, is told in
-//! `products` and `candidate`. [`Evaluation`] is that computation by itself.
+//! `grassmann`. [`Evaluation`] is that computation by itself.
 //!
 //! What the paper leaves open:
 //! - Everything happens in the working image ([`GrayFrame`]), at most [`WORKING_SIDE`] pixels on its longer side; boxes
@@ -40,14 +40,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod abreast;
 mod angle;
 mod area;
 mod arrival;
 mod background;
 mod bag;
 mod camera;
-mod candidate;
 mod cells;
 mod centering;
 mod coarse;
@@ -55,18 +53,15 @@ mod combination;
 mod comparison;
 mod directions;
 mod discriminant;
-mod distance;
-mod dominant;
 mod downscale;
 mod eigen;
 mod energies;
-mod evaluation;
 mod examples;
 mod exponential;
 mod find;
 mod frame;
 mod gradients;
-mod history;
+mod grassmann;
 mod kernel;
 mod learning;
 mod likelihood;
@@ -77,15 +72,11 @@ mod motion;
 mod pair_sums;
 mod params;
 mod patch;
-#[cfg(target_arch = "x86_64")]
-mod permute;
 mod pictures;
 mod places;
 mod planes;
 mod poses;
-mod posterior;
 mod presets;
-mod products;
 mod pyramid;
 mod ranges;
 mod rect;
@@ -94,7 +85,6 @@ mod scale;
 mod scan;
 mod score;
 mod search;
-mod singular;
 mod snapshot;
 mod solitary;
 mod state;
@@ -107,8 +97,8 @@ mod view;
 mod whitening;
 mod windows;
 
-pub use evaluation::Evaluation;
 pub use frame::{FrameError, GrayFrame, Rect, WORKING_SIDE, working_size};
+pub use grassmann::Evaluation;
 pub use params::{Features, Params, Search};
 pub use patch::patch;
 pub use presets::Preset;
@@ -220,6 +210,21 @@ impl Tracker {
     /// The last answer.
     pub fn estimate(&self) -> Estimate {
         self.state.estimate
+    }
+
+    /// The particles of the last frame, in the order in which they were drawn: the box of each, in the pixels of the
+    /// uploaded frame, and its weight. Weights are at least 0 and sum to 1; the next particles are drawn by them.
+    ///
+    /// After [`new`](Self::new) and [`retarget`](Self::retarget) all are at the box given, with equal weights. There are
+    /// none with [`Search::Answer`]: then the next particles come from the answer, and the last ones are not kept.
+    pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
+        let State {
+            particles, weights, ..
+        } = &self.state;
+        let boxes = particles
+            .iter()
+            .map(|particle| self.state.target_of(particle));
+        boxes.zip(weights.iter().copied())
     }
 
     /// The parameters of this tracker.
