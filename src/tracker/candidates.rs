@@ -8,9 +8,9 @@ use std::ops::Range;
 use crate::tracker::appearance::point_distance::PointDistance;
 use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::evaluation::Evaluation;
 use crate::tracker::features::centering::Centering;
 use crate::tracker::features::extractor::Extractor;
+use crate::tracker::grassmann::evaluation::Evaluation;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::scratch::clear_and_reserve;
@@ -18,8 +18,7 @@ use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
 use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
-use crate::tracker::weights::likelihood;
-use crate::tracker::weights::posterior::Posterior;
+use crate::tracker::weights::likelihood::{self, Likelihoods};
 
 /// P at most.
 const MAX_HISTORY: usize = 10;
@@ -41,7 +40,7 @@ pub(crate) struct Candidates {
     evaluation: Option<(Params, Evaluation)>,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
-    posterior: Posterior,
+    likelihoods: Likelihoods,
     /// The weights; they sum to 1.
     pub weights: Vec<f64>,
 }
@@ -58,7 +57,7 @@ impl Candidates {
         clear_and_reserve(&mut self.squares, count);
         clear_and_reserve(&mut self.distances, count * entries);
         clear_and_reserve(&mut self.weights, count);
-        self.posterior.begin(count, entries);
+        self.likelihoods.reserve(count, entries);
         let (weights, origin) = (state.discriminant.weights(), state.discriminant.origin());
         let mean = state.background.mean();
         self.samples.begin(weights, origin, mean, count);
@@ -193,15 +192,7 @@ impl Candidates {
         }
         let pinned = (params.pinned_entries(), params.pinned_weight);
         let distances = &self.distances[first * self.entries()..];
-        self.posterior.weigh(distances, sigma, pinned, weights);
-        let total: f64 = weights.iter().sum();
-        if total > 0.0 {
-            weights.iter_mut().for_each(|weight| *weight /= total);
-        } else {
-            // Every product underflowed: nothing is known to be better.
-            let equal = 1.0 / weights.len() as f64;
-            weights.fill(equal);
-        }
+        self.likelihoods.weigh(distances, sigma, pinned, weights);
     }
 
     /// Forgets all particles but the first `count`.

@@ -46,6 +46,7 @@ mod confidence;
 mod error;
 mod estimate;
 mod features;
+mod grassmann;
 mod hypotheses;
 mod image;
 mod input;
@@ -59,32 +60,19 @@ mod snapshot;
 mod start;
 mod state;
 mod step;
-#[expect(
-    clippy::module_inception,
-    reason = "the type that the scratch is named after"
-)]
+#[expect(clippy::module_inception, reason = "named after its type")]
 mod tracker;
 mod weights;
 mod workspace;
 
-mod abreast;
-mod candidate;
-mod distance;
-mod dominant;
-mod evaluation;
-mod history;
-mod products;
-mod singular;
-
 pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
-pub use evaluation::Evaluation;
 pub use features::gray::patch;
+pub use grassmann::evaluation::Evaluation;
 pub use image::frame::{FrameError, GrayFrame, WORKING_SIDE, working_size};
 pub use image::rect::Rect;
 pub use input::LEAST_BOX_SIDE;
 pub use params::presets::Preset;
-pub use params::table::ParamsError;
-pub use params::table::{Features, Params, Search};
+pub use params::table::{Features, Parameter, Params, ParamsError, Search};
 pub use tracker::Tracker;

@@ -6,8 +6,8 @@ use crate::tracker::confidence::score::Evidence;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::learn::Found;
+use crate::tracker::motion::orientation;
 use crate::tracker::motion::random::{self, Draws};
-use crate::tracker::motion::{orientation, proposal};
 use crate::tracker::observe::to_original;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
@@ -42,7 +42,7 @@ impl State {
         let found = if is_lost {
             search.displaced()
         } else {
-            let mean = proposal::average(&candidates.particles, &candidates.weights, best);
+            let mean = search.answer(&candidates.particles, &candidates.weights, best);
             self.measure_scale(image, mean, workspace)
         };
         let answer = self.bounds.clamp(to_original(found, rotation.as_ref()));

@@ -28,8 +28,6 @@ pub(crate) mod channels;
 pub(crate) mod extractor;
 pub(crate) mod gradient;
 pub(crate) mod gray;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod gray_avx512;
 pub(crate) mod hog;
 pub(crate) mod hog_cells;
 pub(crate) mod integral;

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::normal;
 use crate::tracker::motion::search::{REFINED_STD, SearchContext};
+use crate::tracker::params::table::Search;
 
 /// Particles drawn around each maximum: one of several is within a quarter of a cell.
 const AROUND_MAXIMUM: usize = 6;
@@ -15,7 +16,7 @@ const AROUND_MAXIMUM: usize = 6;
 const MODES: usize = 5;
 /// Standard deviation, in the second round, of the logarithm of the scale.
 const REFINED_STD_SCALE: f64 = 0.01;
-/// The answer is the mean of the particles this near to the most likely one, in working pixels: steadier than one.
+/// An answer is the mean of the particles this near to the most likely one, in working pixels: steadier than one.
 const AVERAGING_RADIUS: f64 = 3.0;
 
 impl SearchContext<'_> {
@@ -80,6 +81,31 @@ impl SearchContext<'_> {
         }
     }
 
+    /// The answer: the particle at `best` (equation 12) or, searching from the last answer, the weighted mean of those
+    /// around it, of scales the geometric one.
+    pub fn answer(&self, particles: &[Particle], weights: &[f64], best: usize) -> Particle {
+        let center = particles[best];
+        if self.params.search == Search::Resampled {
+            return center;
+        }
+        let (mut x, mut y, mut log_scale, mut total) = (0.0, 0.0, 0.0, 0.0);
+        for (particle, &weight) in particles.iter().zip(weights) {
+            let squared = (particle.x - center.x).powi(2) + (particle.y - center.y).powi(2);
+            if squared < AVERAGING_RADIUS * AVERAGING_RADIUS {
+                x += weight * particle.x;
+                y += weight * particle.y;
+                log_scale += weight * particle.scale.ln();
+                total += weight;
+            }
+        }
+        if total <= 0.0 {
+            return center;
+        }
+        let scale = (log_scale / total).exp();
+        let (x, y) = (x / total, y / total);
+        Particle { x, y, scale }
+    }
+
     /// A draw around `center`; the standard deviations are of x, of y and of the logarithm of the scale.
     fn draw(
         &self,
@@ -102,28 +128,6 @@ fn greatest(weights: &[f64], out: &mut [usize]) {
         let left = (0..weights.len()).filter(|&i| place == 0 || precedes(out[place - 1], i));
         let next = left.reduce(|best, i| if precedes(i, best) { i } else { best });
         out[place] = next.expect("no more indices than weights");
-    }
-}
-
-/// The weighted mean, of scales the geometric one, of the particles around the one at `best`.
-pub(crate) fn average(particles: &[Particle], weights: &[f64], best: usize) -> Particle {
-    let center = particles[best];
-    let (mut x, mut y, mut log_scale, mut total) = (0.0, 0.0, 0.0, 0.0);
-    for (particle, &weight) in particles.iter().zip(weights) {
-        let squared = (particle.x - center.x).powi(2) + (particle.y - center.y).powi(2);
-        if squared < AVERAGING_RADIUS * AVERAGING_RADIUS {
-            x += weight * particle.x;
-            y += weight * particle.y;
-            log_scale += weight * particle.scale.ln();
-            total += weight;
-        }
-    }
-    if total > 0.0 {
-        let scale = (log_scale / total).exp();
-        let (x, y) = (x / total, y / total);
-        Particle { x, y, scale }
-    } else {
-        center
     }
 }
 
