@@ -32,9 +32,9 @@ pub(crate) struct Particle {
 
 impl Particle {
     /// This particle of a rotated image, where it is in the original image.
-    pub fn to_original(&self, rotation: &Rotation) -> Self {
+    pub fn to_original(self, rotation: &Rotation) -> Self {
         let (x, y) = rotation.to_original((self.x, self.y));
-        Self { x, y, ..*self }
+        Self { x, y, ..self }
     }
 }
 
