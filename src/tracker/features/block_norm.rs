@@ -1,8 +1,8 @@
 //! The block normalisation of a gradient histogram: the factor of each cell's directions.
 //!
-//! The energy of a cell is the sum of the squares of its directions. A cell is divided by three times the root of the mean
-//! energy of the 3 x 3 cells around it, which takes local contrast out. At the rim of the area the mean is over the cells
-//! that there are.
+//! The energy of a cell is the sum of the squares of its directions. A cell is divided by three times the root of the
+//! mean energy of the 3 x 3 cells around it, which takes local contrast out. At the rim of the area the mean is over
+//! the cells that there are.
 
 use pulp::Simd;
 

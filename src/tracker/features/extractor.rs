@@ -1,7 +1,7 @@
 //! From particles to their feature vectors: gray patches or gradient histograms, as the parameters say.
 //!
-//! [`compute_channels`](Extractor::compute_channels) comes first in each frame. It covers a window of the frame; feature
-//! vectors are for areas in that window.
+//! [`compute_channels`](Extractor::compute_channels) comes first in each frame. It covers a window of the frame;
+//! feature vectors are for areas in that window.
 
 use crate::tracker::features::centering::{Centering, center_all};
 use crate::tracker::features::channels::{CHANNELS, GRAY};
@@ -18,7 +18,7 @@ use crate::tracker::params::table::Params;
 
 /// How much larger than the largest particle the areas of a frame may be. Scales change by a few percent a frame.
 const SCALE_MARGIN: f64 = 1.08;
-/// How much larger than its particle the largest level of a scale pyramid is; the scale room checks this.
+/// How much larger than its particle the largest level of a scale pyramid is; a test of `scale/pyramid.rs` checks this.
 pub(crate) const PYRAMID_MARGIN: f64 = 1.271_249_150_321_404_7;
 
 /// Computes the feature vectors of one frame's particles; its memory is kept from one frame to the next.
@@ -105,8 +105,8 @@ impl Extractor {
         self.describe(frame, particles, bounds, params, out, None);
     }
 
-    /// Writes the feature vectors of `particles`, of length D each, to `out`, which has room for just these. Then centers
-    /// them, where that is asked for.
+    /// Writes the feature vectors of `particles`, of length D each, to `out`, which has room for just these. Then
+    /// centers them, where that is asked for.
     pub fn describe(
         &mut self,
         frame: &GrayFrame,

@@ -22,8 +22,8 @@ pub(crate) struct Hog {
 }
 
 impl Hog {
-    /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to `out`:
-    /// `columns * rows * CHANNELS` values each. Then centers them, where that is asked for.
+    /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to
+    /// `out`: `columns * rows * CHANNELS` values each. Then centers them, where that is asked for.
     pub fn describe(
         &mut self,
         integral: &IntegralChannels,

@@ -1,9 +1,9 @@
 //! The integral image of the gradient histogram's channels, over a window of a frame.
 //!
-//! Each pixel's gradient strength goes to its direction's channels ([`binning`](crate::tracker::features::binning)), and
-//! its gray value to a channel beside them. Cells of hundreds of overlapping candidates are sums over the same pixels. So
-//! the channels are summed once a frame, and the sum over a cell is four look-ups. Look-ups between corners are
-//! interpolated: cells of a small target are a few pixels wide, and rounding them would shift the target.
+//! Each pixel's gradient strength goes to its direction's channels ([`binning`](crate::tracker::features::binning)),
+//! and its gray value to a channel beside them. Cells of hundreds of overlapping candidates are sums over the same
+//! pixels. So the channels are summed once a frame, and the sum over a cell is four look-ups. Look-ups between corners
+//! are interpolated: cells of a small target are a few pixels wide, and rounding them would shift the target.
 //!
 //! Sums are single-precision numbers, which hold every whole number up to 2^24 = 16.8 million. A window has at most
 //! 320 x 320 pixels. Gray values are summed minus the window's mean, so no sum is above 7 million, and every sum at a
@@ -191,7 +191,8 @@ impl IntegralRow<'_> {
     }
 }
 
-/// How many of the window's `count` pixels along an axis are before `coord`. The last corner may be beyond the last pixel.
+/// How many of the window's `count` pixels along an axis are before `coord`. The last corner may be beyond the last
+/// pixel.
 fn pixels_before(coord: SampleCoord, spacing: usize, count: usize) -> f32 {
     let at_corner = |corner: usize| (corner * spacing).min(count) as f32;
     let before = at_corner(coord.corner);

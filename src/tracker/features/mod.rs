@@ -1,8 +1,8 @@
 //! From areas of a frame to feature vectors: what the tracker compares.
 //!
-//! In: a [`GrayFrame`](crate::tracker::image::frame::GrayFrame) and particles, in working pixels. Out: for each particle a
-//! vector of D `f32` values, one after the other. D is H₁ · H₂ gray values in [0, 1] (section III-B), or H₁ · H₂ cells of
-//! ten values: nine gradient directions in [0, 0.4] and a gray value of mean 0.
+//! In: a [`GrayFrame`](crate::tracker::image::frame::GrayFrame) and particles, in working pixels. Out: for each
+//! particle a vector of D `f32` values, one after the other. These are H₁ x H₂ gray values in [0, 1] (section III-B),
+//! or H₁ x H₂ cells of ten values: nine gradient directions in [0, 0.4] and a gray value of mean 0.
 //!
 //! | file | holds |
 //! |---|---|
@@ -17,9 +17,9 @@
 //! | [`channels`] | the order of the channels |
 //! | [`quantized`] | a vector in 8 bits a value, as the state keeps it |
 //!
-//! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's edge:
-//! gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and black. Areas
-//! outside the window that was computed for the frame are treated as if the frame ended there.
+//! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
+//! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and
+//! black. Areas outside the window that was computed for the frame are treated as if the frame ended there.
 
 pub(crate) mod binning;
 pub(crate) mod block_norm;

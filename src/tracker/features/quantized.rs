@@ -1,7 +1,7 @@
 //! A feature vector in 8 bits a value, as the state keeps it.
 //!
-//! A session keeps more than a hundred vectors, of the bag's subspaces and of the background. Each has a scale of its own,
-//! so a value is off by at most 1/254 of the vector's largest.
+//! A session keeps more than a hundred vectors, of the bag's subspaces and of the background. Each has a scale of its
+//! own, so a value is off by at most 1/254 of the vector's largest.
 
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};

@@ -14,8 +14,8 @@ const WEIGHT_SUM: u32 = 256;
 /// Pixels that are interpolated together.
 const GROUP_SIZE: usize = 16;
 
-/// The coordinates of a row's samples along one axis, evenly spaced, as fixed-point numbers. 0 is the centre of the first
-/// pixel.
+/// The coordinates of a row's samples along one axis, evenly spaced, as fixed-point numbers. 0 is the centre of the
+/// first pixel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axis {
     start: i32,
@@ -25,8 +25,8 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// Samples from `start` on, each `step` (pixels) after the one before. The frame has `len` pixels along this axis, at
-    /// least 2. The step is at most 1, and `start` and the last sample are within 16,000 pixels of 0.
+    /// Samples from `start` on, each `step` (pixels) after the one before. The frame has `len` pixels along this axis,
+    /// at least 2. The step is at most 1, and `start` and the last sample are within 16,000 pixels of 0.
     #[inline(always)]
     pub fn new(start: f64, step: f64, len: u32) -> Self {
         let fixed = |value: f64| (value * f64::from(1_u32 << FRACTION_BITS)).round() as i32;
@@ -64,8 +64,8 @@ impl Axis {
         clamp(first)..clamp(end).max(clamp(first))
     }
 
-    /// The pixel before sample `index`, clamped to the frame, and the weight of the next pixel. The last pixel counts as
-    /// the next one of the last but one, so that there always is a next one.
+    /// The pixel before sample `index`, clamped to the frame, and the weight of the next pixel. The last pixel counts
+    /// as the next one of the last but one, so that there always is a next one.
     #[inline(always)]
     fn clamped(&self, index: usize) -> (usize, u32) {
         let at = self.at(index).clamp(0, self.last << FRACTION_BITS);

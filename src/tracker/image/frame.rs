@@ -55,9 +55,9 @@ impl GrayFrame {
         Ok(Self::new(size, working, pixels))
     }
 
-    /// The working image of a frame of `source` = width, height, from a reduced image of it that a decoder gives: `luma`
-    /// of `size` = width, height, not smaller than the working image. The memory of `scratch` is used again, whatever it
-    /// holds.
+    /// The working image of a frame of `source` = width, height, from a reduced image of it that a decoder gives:
+    /// `luma` of `size` = width, height, not smaller than the working image. The memory of `scratch` is used again,
+    /// whatever it holds.
     ///
     /// # Errors
     /// As [`Self::from_luma`]; also a reduced image that is smaller than the working image or larger than the frame.

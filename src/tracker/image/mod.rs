@@ -1,8 +1,8 @@
 //! The images that the tracker works on.
 //!
 //! In: luma values of an uploaded frame, 8 bits a pixel, row by row. Out: 8-bit images of at most
-//! [`WORKING_SIDE`](frame::WORKING_SIDE) = 320 pixels on the longer side. Coordinates are floating-point *working pixels*
-//! from the top-left corner; pixel (0, 0) covers the square from (0, 0) to (1, 1).
+//! [`WORKING_SIDE`](frame::WORKING_SIDE) = 320 pixels on the longer side. Coordinates are floating-point *working
+//! pixels* from the top-left corner; pixel (0, 0) covers the square from (0, 0) to (1, 1).
 //!
 //! | file | holds |
 //! |---|---|

@@ -28,7 +28,7 @@ impl Rotation {
 
     /// The point of the original that is at (`x`, `y`) in the rotated image.
     #[inline(always)]
-    pub fn to_original(&self, (x, y): (f64, f64)) -> (f64, f64) {
+    pub fn to_original(self, (x, y): (f64, f64)) -> (f64, f64) {
         let (x, y) = (x - self.x, y - self.y);
         (
             self.x + self.cos * x - self.sin * y,
@@ -37,13 +37,13 @@ impl Rotation {
     }
 
     /// The displacement in the rotated image of one in the original.
-    pub fn rotated_displacement(&self, (x, y): (f64, f64)) -> (f64, f64) {
+    pub fn rotated_displacement(self, (x, y): (f64, f64)) -> (f64, f64) {
         (self.cos * x + self.sin * y, self.cos * y - self.sin * x)
     }
 
     /// `frame` rotated within `window` (working pixels of the rotated image); outside it is a copy of `frame`. Gray
-    /// values are interpolated bilinearly; beyond the edge the edge's pixel counts. A frame one pixel wide or high stays
-    /// as it is. The memory of `pixels` is used again, whatever it holds.
+    /// values are interpolated bilinearly; beyond the edge the edge's pixel counts. A frame one pixel wide or high
+    /// stays as it is. The memory of `pixels` is used again, whatever it holds.
     pub fn apply(&self, frame: &GrayFrame, window: &Rect, mut pixels: Vec<u8>) -> GrayFrame {
         pixels.clear();
         pixels.extend_from_slice(frame.pixels());
