@@ -23,6 +23,7 @@ mod answer;
 mod answer_problems;
 mod api;
 mod config;
+mod config_validation;
 mod create;
 mod docs;
 mod drain;
@@ -44,7 +45,8 @@ mod upload;
 mod work;
 
 pub use api::document as openapi_document;
-pub use config::{Config, ConfigError};
+pub use config::Config;
+pub use config_validation::ConfigError;
 pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

@@ -3,7 +3,8 @@
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
 //! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
 
-use super::config::{Config, ConfigError};
+use super::config::Config;
+use super::config_validation::ConfigError;
 use super::router::router;
 use super::state::AppState;
 use crate::sessions::Clock;
