@@ -3,7 +3,7 @@
 use super::calibration::{HIT_OVERLAP, Judged};
 use super::measures;
 use super::sequence::Sequence;
-use crate::tracker::{Params, Tracker, TrackerError};
+use crate::tracker::{Evidence, Params, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -39,6 +39,10 @@ pub struct ScoredFrame {
     pub overlap: f64,
     /// The tracker's score, 0 to 1.
     pub score: f64,
+    /// What the score means.
+    pub status: Status,
+    /// What it is made of.
+    pub evidence: Option<Evidence>,
 }
 
 /// What one seed gave.
@@ -103,6 +107,8 @@ impl SeedRun {
                 center_error: measures::center_error(&estimate.target, annotated),
                 overlap: measures::overlap(&estimate.target, annotated),
                 score: f64::from(estimate.score),
+                status: estimate.status,
+                evidence: tracker.evidence(),
             });
         }
         if scored.is_empty() {

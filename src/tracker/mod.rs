@@ -73,6 +73,7 @@ mod products;
 mod singular;
 
 pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
+pub use confidence::score::{Evidence, PREDICTORS, ScoreModel};
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
 pub use evaluation::Evaluation;

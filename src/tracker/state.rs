@@ -125,7 +125,7 @@ impl State {
         }
         let (update_gate, params) = (&self.update_gate, &self.params);
         score < below + FOUND_MARGIN
-            || !update_gate.recognizes(evidence.first, self.search_scale(), params)
+            || !update_gate.recognizes(evidence.first_distance, self.search_scale(), params)
     }
 
     /// Whether frame `number`, whose answer has `score`, is believed enough to be learned from. Without a discriminant a

@@ -17,8 +17,8 @@ use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
 impl State {
-    /// Finds the target in `frame`, the next one, and learns from it.
-    pub fn find(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> Estimate {
+    /// Finds the target in `frame`, the next one, and learns from it. Returns also what the score is made of.
+    pub fn find(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> (Estimate, Evidence) {
         let number = self.estimate.frame + 1;
         let global_motion = self.global_motion.as_mut();
         let shift = global_motion.map_or((0.0, 0.0), |global_motion| {
@@ -79,7 +79,10 @@ impl State {
             scale: answer.scale,
             ..evidence
         };
-        let trusted = !lost && self.update_gate.judge(evidence.first, number, &self.params);
+        let trusted = !lost
+            && self
+                .update_gate
+                .judge(evidence.first_distance, number, &self.params);
         let (score, status) = self.usual.judge(&evidence, lost, trusted);
 
         // (C) What is to be remembered of it.
@@ -104,7 +107,7 @@ impl State {
             score,
             status,
         };
-        self.estimate
+        (self.estimate, evidence)
     }
 
     /// Opens the view on `seen` and draws the first particles.

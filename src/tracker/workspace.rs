@@ -362,9 +362,9 @@ impl Workspace {
         let entries = self.distances.len() / self.particles.len();
         let distances = &self.distances[index * entries..][..entries];
         Evidence {
-            first: distances[0],
-            lately: update_gate.usual,
-            nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
+            first_distance: distances[0],
+            mean_first_distance: update_gate.usual,
+            nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.examples.scores().get(index).copied(),
             scale: self.particles[index].scale,
         }

@@ -59,7 +59,7 @@ impl State {
         evidence: &Evidence,
         workspace: &mut Workspace,
     ) -> f64 {
-        if !is_on(&self.params) || evidence.first >= ALIKE {
+        if !is_on(&self.params) || evidence.first_distance >= ALIKE {
             return self.orientation;
         }
         let changes = TRIED.map(|steps| (steps * self.params.rotation_step).to_radians());
