@@ -4,6 +4,7 @@ mod command;
 
 use command::{bagtrack, clip, fails, folder, succeeds, text};
 use serde_json::Value;
+use std::cmp::Ordering;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -87,17 +88,39 @@ fn the_score_is_held_against_the_overlap() {
     let score = json(&args)["score"].clone();
     assert_eq!(score["frames"], 28);
     assert_eq!(score["ece_leave_one_out"], Value::Null);
-    let (auc, error) = (number(&score["roc_auc"]), number(&score["ece"]));
-    assert!(
-        (0.0..=1.0).contains(&auc) && (0.0..=1.0).contains(&error),
-        "{score}"
-    );
+    // The scores as `track` tells them: of each hit, the share of misses that have a lower one.
+    let scores = ["0", "1"].map(|seed| {
+        let mut track = vec!["track", text(&dir), "--format", "json", "--seed", seed];
+        track.extend(["--preset", "paper"]);
+        track.extend(still.iter().flat_map(|set| ["--set", set]));
+        let lines = succeeds(&track);
+        let scores = lines.lines().skip(1).map(|line| {
+            let line: Value = serde_json::from_str(line).expect("each line is JSON");
+            number(&line["score"])
+        });
+        scores.collect::<Vec<f64>>()
+    });
+    let misses = || scores.iter().flat_map(|scores| &scores[1..]);
+    let won = scores.iter().flat_map(|scores| {
+        misses().map(|miss| match scores[0].total_cmp(miss) {
+            Ordering::Less => 0.0,
+            Ordering::Equal => 0.5,
+            Ordering::Greater => 1.0,
+        })
+    });
+    close(&score["roc_auc"], won.sum::<f64>() / (2.0 * 26.0));
+    let error = number(&score["ece"]);
     // Misses alone have no ROC curve, and then the calibration error is the mean score.
     let truth = truth.replace("52,61,40,40", "201,161,40,40");
     fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
     let misses = json(&args)["score"].clone();
     assert_eq!(misses["roc_auc"], Value::Null);
     assert!(number(&misses["ece"]) > error, "{misses} after {score}");
+    let mean = scores.concat().iter().sum::<f64>() / 28.0;
+    assert!(
+        (number(&misses["ece"]) - mean).abs() < 1e-6,
+        "{misses}, not {mean}"
+    );
     // Two sequences: one to learn from.
     let other = clip(parent.path(), "other", &["--frames", "15"]);
     let mut both = args.clone();

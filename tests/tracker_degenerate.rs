@@ -4,7 +4,7 @@ mod tracker_scene;
 
 use bagtrack::tracker::{Estimate, GrayFrame, LEAST_BOX_SIDE, Params, Rect, Tracker, TrackerError};
 use proptest::prelude::*;
-use tracker_scene::{flat, frame, params, variants};
+use tracker_scene::{flat, frame, params, robust, variants};
 
 fn assert_sound(answer: &Estimate) {
     assert!(answer.target.is_valid(), "{answer:?}");
@@ -56,14 +56,62 @@ fn a_black_start_has_answers_when_the_light_comes_on() {
     run_variants(&frames, tracker_scene::target(0), 3);
 }
 
+/// Every patch of a flat frame is the same, so all candidates are at the same distance.
 #[test]
-fn equal_distances_give_equal_weights_and_the_first_particle() {
-    // Every patch of a flat frame is the same, so nothing distinguishes the candidates: the cloud only diffuses.
-    let target = Rect::new(20.0, 10.0, 16.0, 16.0);
-    for (name, params) in variants(4) {
-        for answer in run(&vec![flat(64, 48, 90); 3], target, params) {
+fn equal_distances_give_the_first_particle() {
+    let target = Rect::new(140.0, 100.0, 40.0, 40.0);
+    let frames = [flat(320, 240, 90), flat(320, 240, 90)];
+    for seed in 0..20 {
+        // Particles are drawn one after the other, so the only one of one is the first of many.
+        let [one, many] = [1, 100].map(|particles| {
+            let params = Params {
+                particles,
+                ..params(seed)
+            };
+            run(&frames, target, params)[0].target
+        });
+        assert_eq!(many, one, "seed {seed}");
+        assert!(one.center_distance(&target) > 0.0, "seed {seed}");
+    }
+}
+
+#[test]
+fn equal_distances_give_equal_weights() {
+    // Of two particles the first is the answer. If the next one comes from either of them with the same chance, a step of
+    // the answer is one step of the motion, or, from the other particle, the difference of that to the answer more: its
+    // variance is 1 + 2 / 2 of that of the motion. With all weight on the first it would be 1, on the second 3.
+    let target = Rect::new(140.0, 100.0, 40.0, 40.0);
+    let frames = vec![flat(320, 240, 90); 3];
+    let steps = (0..600).flat_map(|seed| {
+        let params = Params {
+            particles: 2,
+            motion_std_x: 5.0,
+            motion_std_y: 5.0,
+            motion_std_scale: 0.0,
+            ..params(seed)
+        };
+        let answers = run(&frames, target, params);
+        let (from, to) = (answers[0].target, answers[1].target);
+        [(to.x - from.x) / 5.0, (to.y - from.y) / 5.0]
+    });
+    let steps: Vec<f64> = steps.collect();
+    let variance = steps.iter().map(|step| step * step).sum::<f64>() / steps.len() as f64;
+    println!("variance {variance:.3}");
+    assert!((variance - 2.0).abs() < 0.4, "{variance}");
+}
+
+#[test]
+fn nothing_draws_the_box_away_where_nothing_can_be_told_apart() {
+    // Every place is as likely as the last one, and the prior on the displacement prefers that.
+    let target = Rect::new(140.0, 100.0, 40.0, 40.0);
+    for seed in 0..4 {
+        for answer in run(&vec![flat(320, 240, 90); 5], target, robust(seed)) {
             let distance = answer.target.center_distance(&target);
-            assert!(distance < 40.0, "{name}: {answer:?}");
+            assert!(distance < 0.1, "seed {seed}: {answer:?}");
+            assert!(
+                (answer.target.width / 40.0 - 1.0).abs() < 0.01,
+                "seed {seed}: {answer:?}"
+            );
         }
     }
 }

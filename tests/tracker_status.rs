@@ -3,7 +3,7 @@
 //! it came back.
 
 use bagtrack::sample::{Clip, Scene, Settings};
-use bagtrack::tracker::{Estimate, GrayFrame, Preset, Status, Tracker};
+use bagtrack::tracker::{Estimate, GrayFrame, Preset, ScoreModel, Status, Tracker};
 
 /// Frames that the status may take to notice: a quarter of a second of a usual video.
 const NOTICED: u32 = 6;
@@ -77,4 +77,44 @@ fn is_lost_and_found_again(scene: Scene) {
         }
         assert!(lost >= LEAST_LOST, "seed {seed}: lost in {lost} frames");
     }
+}
+
+#[test]
+fn the_score_is_what_its_model_makes_of_the_evidence() {
+    let clip = Clip::new(Settings {
+        scene: Scene::Covered,
+        ..Settings::default()
+    })
+    .expect("the settings are in order");
+    let start = |preset: Preset| {
+        let first = frame(&clip, 0);
+        Tracker::new(&first, clip.target(0), preset.params()).expect("a box inside")
+    };
+    let mut tracker = start(Preset::Robust);
+    assert_eq!(tracker.evidence(), None);
+    let mut lost = 0;
+    for index in 1..clip.frames() {
+        let answer = tracker.step(&frame(&clip, index)).expect("one size");
+        let evidence = tracker.evidence().expect("it was given by a step");
+        let is_lost = answer.status == Status::Lost;
+        let predictors = evidence.predictors().expect("there is a discriminant");
+        let score = ScoreModel::TRACKER.score(&predictors, is_lost);
+        assert_eq!(score as f32, answer.score, "frame {index}");
+        let scale = answer.target.width / clip.target(0).width;
+        assert!((evidence.scale - scale).abs() < 1e-9, "frame {index}");
+        assert!(evidence.nearest_distance <= evidence.first_distance);
+        lost += u32::from(is_lost);
+    }
+    assert!(lost >= LEAST_LOST);
+    let restored = Tracker::restore(&tracker.snapshot()).expect("an own snapshot");
+    assert_eq!(restored.evidence(), None);
+    let last = clip.frames() - 1;
+    tracker
+        .retarget(&frame(&clip, last), clip.target(last))
+        .expect("a box inside");
+    assert_eq!(tracker.evidence(), None);
+    let mut paper = start(Preset::Paper);
+    paper.step(&frame(&clip, 1)).expect("one size");
+    let evidence = paper.evidence().expect("it was given by a step");
+    assert_eq!((evidence.discriminant, evidence.predictors()), (None, None));
 }

@@ -4,7 +4,8 @@ use super::params::ParamFlags;
 use super::{output, progress};
 use bagtrack::eval::plots::{self, Evaluated};
 use bagtrack::eval::{
-    self, Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation,
+    self, Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns,
+    Variant, ablation,
 };
 use bagtrack::ingest::Limits;
 use bagtrack::tracker::Params;
@@ -38,13 +39,17 @@ pub struct Args {
     /// A table for people, JSON, or a table as markdown.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
-    /// What the tracker is without each of its mends: the means over the sequences, a row each.
+    /// What the tracker is without each of its extensions: the means over the sequences, a row each.
     #[arg(long)]
     ablate: bool,
     /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the
     /// preset as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
     #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
     sweep: Option<PathBuf>,
+    /// Fits the coefficients of the score to the frames of all sequences and seeds, and compares them with
+    /// the tracker's.
+    #[arg(long, conflicts_with_all = ["ablate", "sweep", "plots"])]
+    fit_score: bool,
     /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these
     /// names.
     #[arg(long, value_name = "DIR")]
@@ -80,8 +85,16 @@ fn share(text: &str) -> Result<f64, String> {
 /// Runs `eval`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let base = args.params.params()?;
+    if args.fit_score && base.discriminant_weight <= 0.0 {
+        return Err(ScoreFitError::NoDiscriminant.into());
+    }
     let variants = variants(&args, &base)?;
     let evaluated = evaluate(&args, &base, &variants)?;
+    if args.fit_score {
+        let report = ScoreReport::new(args.params.preset, &evaluated[0].runs)?;
+        let report = report.played(args.playback());
+        return print(args.format, &report, ScoreReport::markdown);
+    }
     if let Some(dir) = &args.plots {
         plots::draw(dir, &evaluated)?;
     }

@@ -5,6 +5,7 @@
 //!
 //! Out: a [`Report`] with the figures as a table or as JSON, among them how good the [score](calibration) is. A
 //! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants. [`plots`] draws them.
+//! [`ScoreReport`] fits the score's coefficients anew.
 //!
 //! What can go wrong: with frames and annotations that do not belong together the figures would mean nothing. So a
 //! sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, with a message that
@@ -22,6 +23,9 @@ mod playback;
 pub mod plots;
 mod report;
 mod run;
+mod score_fit;
+mod score_report;
+mod score_table;
 mod sequence;
 mod sweep;
 mod table;
@@ -34,6 +38,8 @@ pub use outcome::{HIT_OVERLAP, Outcome};
 pub use playback::Playback;
 pub use report::Report;
 pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};
+pub use score_fit::{Sample, fit as fit_score};
+pub use score_report::{ScoreFitError, ScoreReport};
 pub use sequence::{Sequence, SequenceError, parse_boxes};
 pub use sweep::{SweepError, parse_sweep};
 pub use variant::{AssignError, Assignment, Variant, assign, parse_assignment};

@@ -2,7 +2,7 @@
 
 use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
-use crate::tracker::{Params, Tracker, TrackerError};
+use crate::tracker::{Evidence, Params, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -38,6 +38,10 @@ pub struct ScoredFrame {
     pub overlap: f64,
     /// The tracker's score, 0 to 1.
     pub score: f64,
+    /// What the score means.
+    pub status: Status,
+    /// What it is made of.
+    pub evidence: Option<Evidence>,
 }
 
 /// What one seed gave.
@@ -102,6 +106,8 @@ impl SeedRun {
                 center_error: estimate.target.center_distance(annotated),
                 overlap: estimate.target.overlap(annotated),
                 score: f64::from(estimate.score),
+                status: estimate.status,
+                evidence: tracker.evidence(),
             });
         }
         if scored.is_empty() {

@@ -204,13 +204,13 @@ impl Candidates {
         self.samples.truncate(count);
     }
 
-    /// What particle `index` says of itself; `lately` is the running mean of the distance to the first entry.
-    pub fn evidence(&self, index: usize, lately: f64) -> Evidence {
+    /// What particle `index` says of itself; the running mean is that of the distance to the first entry.
+    pub fn evidence(&self, index: usize, mean_first_distance: f64) -> Evidence {
         let distances = &self.distances[index * self.entries()..][..self.entries()];
         Evidence {
-            first: distances[0],
-            lately,
-            nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
+            first_distance: distances[0],
+            mean_first_distance,
+            nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.samples.scores().get(index).copied(),
             scale: self.particles[index].scale,
         }

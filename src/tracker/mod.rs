@@ -66,6 +66,7 @@ mod weights;
 mod workspace;
 
 pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
+pub use confidence::score::{Evidence, PREDICTORS, ScoreModel};
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
 pub use features::gray::patch;

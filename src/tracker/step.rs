@@ -13,8 +13,8 @@ use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
 impl State {
-    /// Finds the target in `frame`, the next one, and learns from it.
-    pub fn step(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> Estimate {
+    /// Finds the target in `frame`, the next one, and learns from it. Returns also what the score is made of.
+    pub fn step(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> (Estimate, Evidence) {
         let number = self.estimate.frame + 1;
         let displacement = self.displacement(frame, workspace);
         let rotation = orientation::rotation(&self.answer, self.orientation);
@@ -50,7 +50,10 @@ impl State {
         // Judge: how likely the box is right, and whether it may be learned from.
         let scale = answer.scale;
         let evidence = Evidence { scale, ..evidence };
-        let is_usual = !is_lost && self.update_gate.judge(evidence.first, number, &self.params);
+        let is_usual = !is_lost
+            && self
+                .update_gate
+                .judge(evidence.first_distance, number, &self.params);
         let (score, status) = self.baseline.judge(&evidence, is_lost, is_usual);
         let passes = is_usual && self.passes(score, number);
 
@@ -59,7 +62,7 @@ impl State {
             number,
             answer,
             rectified: found,
-            distance: evidence.first,
+            distance: evidence.first_distance,
         };
         self.remember(&found, is_lost, workspace);
         if passes {
@@ -73,6 +76,6 @@ impl State {
             score,
             status,
         };
-        self.estimate
+        (self.estimate, evidence)
     }
 }

@@ -1,5 +1,6 @@
 //! The tracker of one session, as the rest of the program sees it.
 
+use crate::tracker::confidence::score::Evidence;
 use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::GrayFrame;
@@ -15,7 +16,8 @@ use crate::tracker::workspace;
 /// An error of any method leaves the tracker as it was.
 #[derive(Debug, Clone)]
 pub struct Tracker {
-    pub(crate) state: State,
+    state: State,
+    evidence: Option<Evidence>,
 }
 
 impl Tracker {
@@ -30,7 +32,10 @@ impl Tracker {
         input::check_target(source, &target)?;
         Ok(workspace::with(|workspace| {
             let state = State::new(frame, target, params, workspace);
-            Self { state }
+            Self {
+                state,
+                evidence: None,
+            }
         }))
     }
 
@@ -40,9 +45,9 @@ impl Tracker {
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
         input::check_frame(self.state.source, frame)?;
-        Ok(workspace::with(|workspace| {
-            self.state.step(frame, workspace)
-        }))
+        let (estimate, evidence) = workspace::with(|workspace| self.state.step(frame, workspace));
+        self.evidence = Some(evidence);
+        Ok(estimate)
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
@@ -54,12 +59,19 @@ impl Tracker {
         input::check_frame(self.state.source, frame)?;
         input::check_target(self.state.source, &target)?;
         workspace::with(|workspace| self.state.retarget(frame, target, workspace));
+        self.evidence = None;
         Ok(self.state.estimate)
     }
 
     /// The last answer.
     pub fn estimate(&self) -> Estimate {
         self.state.estimate
+    }
+
+    /// What the score of the last answer is made of, where that was given by [`step`](Self::step). None after
+    /// [`new`](Self::new), [`retarget`](Self::retarget) and [`restore`](Self::restore).
+    pub fn evidence(&self) -> Option<Evidence> {
+        self.evidence
     }
 
     /// The particles of the last frame, in the order in which they were drawn: the box of each, in the pixels of the
@@ -94,6 +106,10 @@ impl Tracker {
     /// # Errors
     /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
     pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
-        snapshot::read(snapshot).map(|state| Self { state })
+        let state = snapshot::read(snapshot)?;
+        Ok(Self {
+            state,
+            evidence: None,
+        })
     }
 }

@@ -131,6 +131,7 @@ pub(super) fn count(number: usize, what: &str) -> String {
 mod tests {
     use super::*;
     use crate::eval::run::SeedRun;
+    use crate::tracker::Status;
 
     fn run(errors: &[f64]) -> SeedRun {
         let frame = |(index, &center_error): (usize, &f64)| ScoredFrame {
@@ -138,6 +139,8 @@ mod tests {
             center_error,
             overlap: 0.0,
             score: 0.0,
+            status: Status::Tracking,
+            evidence: None,
         };
         SeedRun {
             scored: errors.iter().enumerate().map(frame).collect(),

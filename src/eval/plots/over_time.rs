@@ -120,6 +120,7 @@ fn median(sorted: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::eval::run::{ScoredFrame, SeedRun};
+    use crate::tracker::Status;
 
     #[test]
     fn the_spread_is_over_the_seeds_frame_by_frame() {
@@ -130,6 +131,8 @@ mod tests {
                     center_error,
                     overlap: 0.0,
                     score: 0.0,
+                    status: Status::Tracking,
+                    evidence: None,
                 })
                 .to_vec(),
             step_ms: 0.0,

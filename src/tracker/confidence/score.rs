@@ -1,10 +1,9 @@
 //! How sure the tracker is of its answer.
 //!
-//! With a discriminant the score is a logistic function of four things that each say something else: the
+//! With a discriminant the score is a logistic function of four predictors that each say something else: the
 //! discriminant's score (is it the target at all), the distance to the bag's first subspace (does it look as the user
-//! saw it), now and lately, since misses last, and how much larger or smaller than the first box the answer is (does
-//! the box still fit). Its coefficients are fitted, on annotated videos, some of them played backwards or from their
-//! middle, and with the preset `robust`, to whether the box overlaps the target by half or more.
+//! saw it), the running mean of that distance, since misses last, and how much larger or smaller than the first box the
+//! answer is (does the box still fit). It estimates the chance that the box overlaps the target by half or more.
 //!
 //! Without one, as in the preset `paper`, the score is **not calibrated**: an honest order, not a chance. The distance
 //! of the chosen candidate to the nearest entry of the bag is small while the target looks as it did, but what is small
@@ -16,16 +15,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::estimate::Status;
 
-/// The logistic function's constant, and its coefficients of the discriminant's score, of the distance to the first
-/// subspace, of what that has been lately, and of the logarithm of the scale. Rounded: what different videos would
-/// choose differs by more, and their order of frames does not depend on the last digit. The discriminant's is half as large
-/// again as fitted, and the constant less by as much: that orders the frames of the eight videos and of fast clips a little
-/// better, and those of five others as well as before.
-const CONSTANT: f64 = 4.4;
-const OF_DISCRIMINANT: f64 = 4.8;
-const OF_FIRST: f64 = -6.4;
-const OF_LATELY: f64 = -6.4;
-const OF_SCALE: f64 = -2.1;
+/// What the score's predictors are called, in the order of [`Evidence::predictors`].
+pub const PREDICTORS: [&str; 4] = [
+    "discriminant",
+    "first distance",
+    "mean first distance",
+    "|ln scale|",
+];
+
 /// The greatest score of a target that is out of sight: nothing of it is in the box.
 const MAX_LOST: f64 = 0.1;
 
@@ -42,19 +39,66 @@ const RENEWAL: f64 = 0.05;
 /// The least usual distance: a still picture must not make the first flicker a loss.
 const MIN_USUAL: f64 = 1e-3;
 
-/// What the chosen candidate says about itself.
+/// What the score of one frame is made of: the tracker's answer, measured by the tracker itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Evidence {
-    /// Its distance (equation 4) to the first entry of the bag.
-    pub first: f64,
-    /// The running mean of that distance before this frame.
-    pub lately: f64,
-    /// Its distance to the nearest entry.
-    pub nearest: f64,
-    /// The discriminant's score, where there is one.
+pub struct Evidence {
+    /// The discriminant's score of the chosen candidate, about 1 on the target and 0 on its surroundings. None without
+    /// a discriminant.
     pub discriminant: Option<f32>,
-    /// Its scale against the first box.
+    /// The candidate's distance (equation 4) to the first entry of the bag.
+    pub first_distance: f64,
+    /// The running mean of that distance over the frames before this one.
+    pub mean_first_distance: f64,
+    /// The candidate's distance to the nearest entry of the bag.
+    pub nearest_distance: f64,
+    /// The width of the answer's box by that of the first box, above 0.
     pub scale: f64,
+}
+
+impl Evidence {
+    /// The predictors of a [`ScoreModel`], under the names [`PREDICTORS`]. None without a discriminant.
+    pub fn predictors(&self) -> Option<[f64; PREDICTORS.len()]> {
+        let discriminant = f64::from(self.discriminant?);
+        Some([
+            discriminant,
+            self.first_distance,
+            self.mean_first_distance,
+            self.scale.ln().abs(),
+        ])
+    }
+}
+
+/// A logistic model of the score: 1 / (1 + exp(−z)), where z is the intercept and the sum of the predictors, each times
+/// its coefficient.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ScoreModel {
+    /// z where all predictors are 0.
+    pub intercept: f64,
+    /// One for each of [`PREDICTORS`].
+    pub coefficients: [f64; PREDICTORS.len()],
+}
+
+impl ScoreModel {
+    /// The model that the tracker uses. Set by hand near a logistic regression on annotated videos, with more weight on
+    /// the discriminant than the regression gives it. `bagtrack eval DIR... --fit-score` prints the regression, and how
+    /// both order the frames and hold as chances.
+    pub const TRACKER: Self = Self {
+        intercept: 4.4,
+        coefficients: [4.8, -6.4, -6.4, -2.1],
+    };
+
+    /// The chance, in [0, 1], that the box overlaps the target by half or more.
+    pub fn probability(&self, predictors: &[f64; PREDICTORS.len()]) -> f64 {
+        let terms = self.coefficients.iter().zip(predictors);
+        let exponent = terms.fold(self.intercept, |sum, (c, value)| sum + c * value);
+        1.0 / (1.0 + (-exponent).exp())
+    }
+
+    /// The score, in [0, 1]: the chance, but at most 0.1 for a target that is `lost`.
+    pub fn score(&self, predictors: &[f64; PREDICTORS.len()], lost: bool) -> f64 {
+        let chance = self.probability(predictors);
+        if lost { chance.min(MAX_LOST) } else { chance }
+    }
 }
 
 /// What distances have been usual while tracking.
@@ -68,22 +112,18 @@ impl DistanceBaseline {
     /// The score in [0, 1] and the status of an answer; `lost` when the target is out of sight, `trusted` when the
     /// frame may be learned from. The frame counts for those to come if it was tracked.
     pub fn judge(&mut self, evidence: &Evidence, lost: bool, trusted: bool) -> (f32, Status) {
-        let Some(discriminant) = evidence.discriminant else {
-            return self.judge_distance(evidence.nearest);
+        let Some(predictors) = evidence.predictors() else {
+            return self.judge_distance(evidence.nearest_distance);
         };
-        let exponent = CONSTANT
-            + OF_DISCRIMINANT * f64::from(discriminant)
-            + OF_FIRST * evidence.first
-            + OF_LATELY * evidence.lately
-            + OF_SCALE * evidence.scale.ln().abs();
-        let score = 1.0 / (1.0 + (-exponent).exp());
-        if lost {
-            (score.min(MAX_LOST) as f32, Status::Lost)
+        let score = ScoreModel::TRACKER.score(&predictors, lost);
+        let status = if lost {
+            Status::Lost
         } else if score < UNCERTAIN_BELOW || !trusted {
-            (score as f32, Status::Uncertain)
+            Status::Uncertain
         } else {
-            (score as f32, Status::Tracking)
-        }
+            Status::Tracking
+        };
+        (score as f32, status)
     }
 
     fn judge_distance(&mut self, distance: f64) -> (f32, Status) {
@@ -137,11 +177,11 @@ mod tests {
     #[test]
     fn the_evidence_of_a_discriminant_orders_scores_and_a_loss_is_never_likely() {
         let mut usual = DistanceBaseline::default();
-        let mut judge = |discriminant, first, scale, lost, trusted| {
+        let mut judge = |discriminant, first_distance, scale, lost, trusted| {
             let evidence = Evidence {
-                first,
-                lately: 0.2,
-                nearest: 0.0,
+                first_distance,
+                mean_first_distance: 0.2,
+                nearest_distance: 0.0,
                 discriminant: Some(discriminant),
                 scale,
             };

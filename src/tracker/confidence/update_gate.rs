@@ -66,7 +66,7 @@ impl UpdateGate {
             return score < params.lost_threshold;
         }
         score < params.lost_threshold + FOUND_MARGIN
-            || !self.recognizes(evidence.first, spread, params)
+            || !self.recognizes(evidence.first_distance, spread, params)
     }
 
     /// Whether `distance` from the first subspace is not far beyond what is usual.
