@@ -10,12 +10,13 @@ const MAX_SWEEPS: usize = 16;
 const NEGLIGIBLE: f64 = 1e-16;
 
 /// Where eigenvalues alone are asked for, so is one whose square is below this share of the product of the two diagonal
-/// elements. That moves the two by 1e-6 of themselves at most, and only where they are nearly the same; never their sum.
+/// elements. That moves the two by 1e-6 of themselves at most, and only where they are nearly the same; never their
+/// sum.
 const NEGLIGIBLE_SQUARED: f64 = 1e-12;
 
-/// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle counts.
-/// Its diagonal ends as the eigenvalues, in no order, and `vectors` with the eigenvector of the `j`-th diagonal element in
-/// its `j`-th row. Without room for `vectors` there are none, and the eigenvalues have six digits.
+/// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle
+/// counts. Its diagonal ends as the eigenvalues, in no order, and `vectors` with the eigenvector of the `j`-th diagonal
+/// element in its `j`-th row. Without room for `vectors` there are none, and the eigenvalues have six digits.
 #[inline(always)]
 fn diagonalize(matrix: &mut [f64], vectors: &mut [f64], dim: usize) {
     let mut floor = 0.0;

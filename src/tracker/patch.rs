@@ -13,8 +13,8 @@ const MOST_CELLS: usize = 64;
 /// Cuts the patches of many areas out of one frame; keeps its buffer.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PatchCutter {
-    /// What is between two rows of pixels, at the height of a row of cells. Pixels are brought together along y once for
-    /// all cells of a row: half of the work of four pixels a cell.
+    /// What is between two rows of pixels, at the height of a row of cells. Pixels are brought together along y once
+    /// for all cells of a row: half of the work of four pixels a cell.
     between: Vec<f32>,
 }
 

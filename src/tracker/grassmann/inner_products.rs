@@ -162,8 +162,8 @@ impl InnerProducts {
     }
 }
 
-/// Writes vectors of length `len` to as many rows, in double precision, and their squared lengths to `squares`; compiled
-/// for the instructions that this machine has.
+/// Writes vectors of length `len` to as many rows, in double precision, and their squared lengths to `squares`;
+/// compiled for the instructions that this machine has.
 struct Widen<'a> {
     vectors: &'a [f32],
     len: usize,

@@ -1,8 +1,8 @@
 //! (D) The printed comparison (section III-D): how far each candidate's affine subspace is from each entry of the bag.
 //!
-//! A candidate is a feature vector v of D gray values in \[0, 1\]. With the P previous patches H it makes the D × (P + 1)
-//! matrix V = [v, H] (equation 2). V is never decomposed. With the eigenpairs (S², W) of its Gram matrix VᵀV, which has
-//! P + 1 rows, the candidate's basis is U = V W S⁻¹, so all that the distances need is made of inner products:
+//! A candidate is a feature vector v of D gray values in \[0, 1\]. With the P previous patches H it makes V = [v, H],
+//! a D × (P + 1) matrix (equation 2). V is never decomposed. With the eigenpairs (S², W) of its Gram matrix VᵀV, which
+//! has P + 1 rows, the candidate's basis is U = V W S⁻¹, so all that the distances need is made of inner products:
 //!
 //! | step | what it makes | equation | file |
 //! |---|---|---|---|
@@ -17,12 +17,13 @@
 //! Nothing has a unit: gray values are shares of white.
 //!
 //! What can go wrong:
-//! - *Precision.* The singular values of V count down to [`RANK_TOLERANCE`](super::RANK_TOLERANCE) = 1e-5 of the largest,
-//!   which is 1e-10 in the eigenvalues of VᵀV. Single precision has seven digits, so everything here is in double.
-//! - *Rank.* V may have fewer than n directions (a black patch has none). U has as many columns as V has directions; of two
-//!   bases the smaller number of columns is the n of equation 8; with no column at all the origins alone decide.
-//! - *Sizes.* Matrices here have fixed sizes, so that a frame allocates nothing: [`Evaluation`] picks them by P and n, and
-//!   what is beyond P + 1 and n is zero.
+//! - *Precision.* The singular values of V count down to [`RANK_TOLERANCE`](super::RANK_TOLERANCE) = 1e-5 of the
+//!   largest, which is 1e-10 in the eigenvalues of VᵀV. Single precision has seven digits, so everything here is in
+//!   double.
+//! - *Rank.* V may have fewer than n directions (a black patch has none). U has as many columns as V has directions; of
+//!   two bases the smaller number of columns is the n of equation 8; with no column at all the origins alone decide.
+//! - *Sizes.* Matrices here have fixed sizes, so that a frame allocates nothing: [`Evaluation`] picks them by P and n,
+//!   and what is beyond P + 1 and n is zero.
 
 mod candidate;
 mod distance;
