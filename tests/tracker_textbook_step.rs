@@ -1,5 +1,5 @@
-//! The printed `step` over time: each frame's weights and answer against the textbook version, which keeps a history and
-//! a bag of its own, and the next particles against the weights.
+//! The printed `step` over time: each frame's weights and answer against the textbook version, which keeps a history
+//! and a bag of its own, and the next particles against the weights.
 
 mod textbook;
 mod tracker_scene;

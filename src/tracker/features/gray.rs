@@ -3,6 +3,8 @@
 //! The area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
 //! gray values in [0, 1] (section III-B). Outside the frame the nearest edge pixel counts.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::params::table::Params;
@@ -13,8 +15,8 @@ const MOST_CELLS: usize = 64;
 /// Cuts the patches of many areas out of one frame; keeps its buffer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GrayPatches {
-    /// What is between two rows of pixels, at the height of a row of cells. Pixels are brought together along y once for
-    /// all cells of a row: half of the work of four pixels a cell.
+    /// What is between two rows of pixels, at the height of a row of cells. Pixels are brought together along y once
+    /// for all cells of a row: half of the work of four pixels a cell.
     between: Vec<f32>,
 }
 
@@ -28,6 +30,15 @@ struct Cell {
     share: f32,
 }
 
+/// All cuts of a frame, compiled for this machine's instructions.
+struct Cuts<'a, A> {
+    between: &'a mut [f32],
+    image: &'a GrayFrame,
+    areas: A,
+    params: &'a Params,
+    out: &'a mut [f32],
+}
+
 impl GrayPatches {
     /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each.
     pub fn cut(
@@ -39,36 +50,57 @@ impl GrayPatches {
     ) {
         // Room for any area at once, so that a larger one allocates nothing.
         self.between.resize(image.width() as usize, 0.0);
-        for (area, patch) in areas.zip(out.chunks_exact_mut(params.feature_len())) {
-            self.cut_one(image, &area, params, patch);
-        }
+        Arch::new().dispatch(Cuts {
+            between: &mut self.between,
+            image,
+            areas,
+            params,
+            out,
+        });
     }
+}
 
-    fn cut_one(&mut self, image: &GrayFrame, area: &Rect, params: &Params, patch: &mut [f32]) {
-        let columns = params.patch_width as usize;
-        let across = cells(area.x, area.width, params.patch_width, image.width());
-        let down = cells(area.y, area.height, params.patch_height, image.height());
-        let (left, right) = (across[0].first, across[columns - 1].second);
-        let row = |y: usize| &image.pixels()[y * image.width() as usize..][left..=right];
-        for (target, cell) in patch.chunks_exact_mut(columns).zip(&down) {
-            let pixels = row(cell.first).iter().zip(row(cell.second));
-            for (between, (&upper, &lower)) in self.between.iter_mut().zip(pixels) {
-                *between = interpolate(upper.into(), lower.into(), cell.share);
-            }
-            for (value, cell) in target.iter_mut().zip(&across) {
-                let (first, second) = (cell.first - left, cell.second - left);
-                let gray = interpolate(self.between[first], self.between[second], cell.share);
-                *value = (gray / 255.0).min(1.0);
-            }
+impl<A: Iterator<Item = Rect>> WithSimd for Cuts<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let patches = self.out.chunks_exact_mut(self.params.feature_len());
+        for (area, patch) in self.areas.zip(patches) {
+            cut(self.image, &area, self.params, self.between, patch);
         }
     }
 }
 
+/// Writes the feature vector of one area to `patch`.
+#[inline(always)]
+fn cut(image: &GrayFrame, area: &Rect, params: &Params, between: &mut [f32], patch: &mut [f32]) {
+    let columns = params.patch_width as usize;
+    let across = cells(area.x, area.width, params.patch_width, image.width());
+    let down = cells(area.y, area.height, params.patch_height, image.height());
+    let (left, right) = (across[0].first, across[columns - 1].second);
+    let row = |y: usize| &image.pixels()[y * image.width() as usize..][left..=right];
+    let between = &mut between[..=right - left];
+    for (target, cell) in patch.chunks_exact_mut(columns).zip(&down) {
+        let pixels = row(cell.first).iter().zip(row(cell.second));
+        for (between, (&upper, &lower)) in between.iter_mut().zip(pixels) {
+            *between = interpolate(upper.into(), lower.into(), cell.share);
+        }
+        for (value, cell) in target.iter_mut().zip(&across) {
+            let (first, second) = (between[cell.first - left], between[cell.second - left]);
+            let gray = interpolate(first, second, cell.share) * (1.0 / 255.0);
+            *value = gray.min(1.0);
+        }
+    }
+}
+
+#[inline(always)]
 fn interpolate(first: f32, second: f32, share: f32) -> f32 {
     first + (second - first) * share
 }
 
 /// `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
+#[inline(always)]
 fn cells(start: f64, extent: f64, count: u32, pixels: u32) -> [Cell; MOST_CELLS] {
     let mut cells = [Cell::default(); MOST_CELLS];
     let last = f64::from(pixels - 1);

@@ -1,6 +1,7 @@
 //! All inner products of a frame, in double precision, as one matrix product.
 
 use nalgebra::{SMatrix, SVector};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::linalg::gemm;
@@ -9,6 +10,9 @@ use crate::tracker::params::table::Params;
 /// Values in a cache line. Vectors begin at one, and lie an extra one apart: 1024 values (8 KB) after another vector, a
 /// vector would share its places in the first cache. Together this is worth 40 % of the product's time.
 const LINE: usize = 8;
+
+/// Candidates that are multiplied together: more would not stay in the second cache beside the bag.
+const BATCH: usize = 12;
 
 /// The inner products of [H, v₁, …, v_N] with [μ₁, F₁, …, μ_K, F_K, H].
 #[derive(Debug, Clone, Default)]
@@ -25,7 +29,7 @@ pub(crate) struct InnerProducts {
     entries: usize,
     /// N.
     candidates: usize,
-    /// The bag, H (zero where there are fewer previous patches than P), the candidates.
+    /// The bag, H (zero where there are fewer previous patches than P), some of the candidates.
     vectors: Vec<f64>,
     /// Where the first of them begins.
     first: usize,
@@ -54,7 +58,7 @@ impl InnerProducts {
     pub fn set_bag<'a>(&mut self, bag: impl ExactSizeIterator<Item = &'a AffineSubspace>) {
         if bag.len() != self.entries {
             self.entries = bag.len();
-            let values = (self.columns() + self.candidates) * self.stride;
+            let values = (self.columns() + BATCH) * self.stride;
             self.first = gemm::align(&mut self.vectors, values);
             self.vectors.resize(self.first + values, 0.0);
             let rows = self.patches + self.candidates;
@@ -83,33 +87,34 @@ impl InnerProducts {
             (1..=self.patches).contains(&history.len()),
             "1 to P previous patches"
         );
-        let bag = self.first + self.entries * self.per_entry * self.stride;
-        let (len, patches, count) = (self.len, self.patches, candidates.len() / self.len);
-        let mut rows = self.vectors[bag..].chunks_exact_mut(self.stride);
-        for (index, row) in rows.by_ref().take(patches).enumerate() {
+        let (stride, columns) = (self.stride, self.columns());
+        let (all, batch) = self.vectors[self.first..].split_at_mut(columns * stride);
+        let bag = self.entries * self.per_entry;
+        for (index, row) in all[bag * stride..].chunks_exact_mut(stride).enumerate() {
             match history.get(index) {
                 Some(vector) => {
-                    assert_eq!(vector.len(), len, "a patch of D values");
+                    assert_eq!(vector.len(), self.len, "a patch of D values");
                     widen(vector, row);
                 }
                 None => row.fill(0.0),
             }
         }
-        for (vector, row) in candidates.chunks_exact(len).zip(rows) {
-            widen(vector, row);
-        }
+        let (of_history, of_candidates) = self.products.split_at_mut(self.patches * columns);
+        let history = &all[bag * stride..];
+        gemm::inner_products(history, all, stride, columns, of_history);
         self.squares.clear();
-        let squares = candidates.chunks_exact(len).map(square);
-        self.squares.extend(squares);
-        let columns = self.columns();
-        let rows = patches + count;
-        gemm::inner_products(
-            &self.vectors[bag..][..rows * self.stride],
-            &self.vectors[self.first..][..columns * self.stride],
-            self.stride,
-            columns,
-            &mut self.products,
-        );
+        let products = of_candidates.chunks_mut(BATCH * columns);
+        for (candidates, products) in candidates.chunks(BATCH * self.len).zip(products) {
+            let count = candidates.len() / self.len;
+            let rows = &mut batch[..count * stride];
+            Arch::new().dispatch(Widen {
+                vectors: candidates,
+                len: self.len,
+                rows,
+                squares: &mut self.squares,
+            });
+            gemm::inner_products(rows, all, stride, columns, products);
+        }
     }
 
     /// The products of column `row` of V = [v, H] of a candidate.
@@ -158,14 +163,33 @@ impl InnerProducts {
     }
 }
 
-/// Writes a vector to the beginning of a row, in double precision.
+/// Writes vectors of length `len` to as many rows, in double precision, and their squared lengths to `squares`;
+/// compiled for the instructions that this machine has.
+struct Widen<'a> {
+    vectors: &'a [f32],
+    len: usize,
+    rows: &'a mut [f64],
+    squares: &'a mut Vec<f64>,
+}
+
+impl WithSimd for Widen<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let stride = self.rows.len() / (self.vectors.len() / self.len);
+        let rows = self.rows.chunks_exact_mut(stride);
+        for (vector, row) in self.vectors.chunks_exact(self.len).zip(rows) {
+            widen(vector, row);
+            self.squares.push(subspace::dot(vector, vector));
+        }
+    }
+}
+
+/// Writes a vector to the beginning of a row.
+#[inline(always)]
 fn widen(vector: &[f32], row: &mut [f64]) {
     for (out, &value) in row.iter_mut().zip(vector) {
         *out = f64::from(value);
     }
-}
-
-/// ‖v‖².
-fn square(vector: &[f32]) -> f64 {
-    subspace::dot(vector, vector)
 }

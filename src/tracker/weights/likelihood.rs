@@ -52,8 +52,8 @@ impl Likelihoods {
     /// from them `weights`, one for each particle.
     ///
     /// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential
-    /// of that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the
-    /// sum the first `pinned.0` entries count `pinned.1` times.
+    /// of that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In
+    /// the sum the first `pinned.0` entries count `pinned.1` times.
     pub fn weigh(
         &mut self,
         distances: &[f64],
