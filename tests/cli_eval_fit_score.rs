@@ -6,7 +6,7 @@ use command::{bagtrack, clip, fails, folder, succeeds, text};
 use serde_json::Value;
 use std::path::Path;
 
-/// Two clips of which every third frame is annotated elsewhere: 16 hits and 7 misses of a tracker that holds the target.
+/// Two clips of which every third frame is annotated elsewhere: 16 hits and 7 misses where the target is held.
 fn clips(parent: &Path) -> [String; 2] {
     ["one", "two"].map(|name| {
         let seed = if name == "one" { "1" } else { "2" };

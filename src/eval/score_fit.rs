@@ -2,8 +2,8 @@
 //!
 //! It minimises the mean over the sequences of their mean logistic losses, so that each sequence has the same weight
 //! however long it is, plus half the [`RIDGE`] times the sum of the squared coefficients, the intercept's among them.
-//! The ridge keeps the coefficients finite where a threshold separates all hits from all misses. The minimum is found by
-//! iteratively reweighted least squares (Newton's method; McCullagh and Nelder, *Generalized Linear Models*, 2.5); a
+//! The ridge keeps the coefficients finite where a threshold separates all hits from all misses. The minimum is found
+//! by iteratively reweighted least squares (Newton's method; McCullagh and Nelder, *Generalized Linear Models*, 2.5); a
 //! step that does not lower the loss is halved.
 
 use crate::tracker::{PREDICTORS, ScoreModel};

@@ -80,7 +80,7 @@ impl ScoreReport {
     fn lines(&self) -> String {
         let playback = self.playback.map(|playback| format!("{playback}\n"));
         format!(
-            "{}score against overlap >= 0.5: {} frames, {} of them hits; fitted to the {} in which the target is not lost\n",
+            "{}score against overlap >= 0.5: {} frames, {} of them hits; fitted to the {} with the target not lost\n",
             playback.unwrap_or_default(),
             self.frames,
             self.hits,
