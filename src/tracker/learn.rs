@@ -226,12 +226,9 @@ impl State {
             }
         };
         self.look_at_scales(frame, &center, workspace);
-        let change = self
-            .scale_filter
-            .find(&mut workspace.learning.scale)
-            .believed();
+        let maximum = self.scale_filter.find(&mut workspace.learning.scale);
         self.bounds.clamp(Particle {
-            scale: center.scale * change.exp(),
+            scale: center.scale * maximum.gated_change().exp(),
             ..found
         })
     }

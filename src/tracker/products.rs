@@ -48,11 +48,9 @@ pub(crate) struct Products {
     candidate_vectors: Vec<f32>,
     /// The differences d of one tile.
     tile: Vec<f32>,
-    tile_first: usize,
     /// Q (P slots, zero where there is no direction), h + the sum of H, the means of the bag's entries, their first basis
     /// vectors, their second and so on: one vector a column.
     right: Vec<f32>,
-    right_first: usize,
     /// For each vector of `right` its products with d of all candidates.
     out: Vec<Singles>,
     /// For each slot Qᵀv of all candidates.
@@ -83,8 +81,8 @@ impl Products {
         self.candidate_vectors
             .resize(self.candidates * self.len, 0.0);
         let tile = MAX_ROWS * self.stride;
-        self.tile_first = gemm::align(&mut self.tile, tile);
-        self.tile.resize(self.tile_first + tile, 0.0);
+        self.tile.clear();
+        self.tile.resize(tile, 0.0);
         let scratch = [0.0; ABREAST];
         self.coordinates.clear();
         self.coordinates.resize(self.groups * self.slots, scratch);
@@ -116,8 +114,8 @@ impl Products {
         if count != self.entries {
             self.entries = count;
             let values = self.columns() * stride;
-            self.right_first = gemm::align(&mut self.right, values);
-            self.right.resize(self.right_first + values, 0.0);
+            self.right.clear();
+            self.right.resize(values, 0.0);
             self.out.clear();
             self.out
                 .resize(self.columns() * self.groups, [0.0; ABREAST]);
@@ -125,7 +123,7 @@ impl Products {
                 .resize(self.slots * count * self.basis_dim, 0.0);
             self.shared_means.resize(count, 0.0);
         }
-        let right = &mut self.right[self.right_first + (self.slots + 1) * stride..];
+        let right = &mut self.right[(self.slots + 1) * stride..];
         for (k, entry) in entries.enumerate() {
             let vectors = entry.mean.chunks_exact(len).chain(entry.basis());
             for (column, vector) in vectors.enumerate() {
@@ -140,7 +138,7 @@ impl Products {
     /// Computes all products of the candidates with `history`, the previous patches, and the bag.
     #[inline(always)]
     pub fn compute<S: Simd>(&mut self, simd: S, history: &[&[f32]]) {
-        let right = &mut self.right[self.right_first..];
+        let right = &mut self.right;
         let (shared, bag) = right.split_at_mut((self.slots + 1) * self.stride);
         self.history.take(history, shared, self.stride);
         let means = bag.chunks_exact(self.stride);
@@ -159,7 +157,7 @@ impl Products {
     #[inline(always)]
     fn multiply_directions<S: Simd>(&mut self, simd: S) {
         let bases = (self.slots + 1 + self.entries) * self.stride;
-        let right = &self.right[self.right_first..];
+        let right = &self.right;
         let directions = &right[..self.slots * self.stride];
         let columns = self.entries * self.basis_dim;
         let out = &mut self.of_directions;
@@ -172,19 +170,19 @@ impl Products {
         let lanes = self.groups * ABREAST;
         for first in (0..self.candidates).step_by(A) {
             let count = A.min(self.candidates - first);
-            let tile = &mut self.tile[self.tile_first..];
+            let tile = &mut self.tile;
             let squares = self.squares.as_flattened_mut();
             for (row, index) in tile.chunks_exact_mut(stride).zip(first..first + count) {
                 let vector = &self.candidate_vectors[index * len..][..len];
                 squares[index] = subtract(vector, newest, &mut row[..len]);
             }
-            let tile = &self.tile[self.tile_first..];
+            let tile = &self.tile;
             let mut rows_a = [&tile[..0]; A];
             for (p, row) in rows_a.iter_mut().enumerate() {
                 // A tile at the end has the last vector more than once.
                 *row = &tile[p.min(count - 1) * stride..][..stride];
             }
-            let right = &self.right[self.right_first..];
+            let right = &self.right;
             let out = self.out.as_flattened_mut();
             for j in (0..columns).step_by(B) {
                 let mut rows_b = [&right[..0]; B];
@@ -233,7 +231,7 @@ impl Products {
     #[inline(always)]
     fn resolve(&mut self, index: usize, row: usize) -> f64 {
         let (stride, lanes) = (self.stride, self.groups * ABREAST);
-        let tile = &self.tile[self.tile_first + row * stride..];
+        let tile = &self.tile[row * stride..];
         for (rest, value) in self.rest.iter_mut().zip(tile) {
             *rest = f64::from(*value);
         }
@@ -243,7 +241,7 @@ impl Products {
             coordinates[slot * lanes + index] = *reference;
             out[slot * lanes + index] = 0.0;
         }
-        let mut vectors = self.right[self.right_first..].chunks_exact(stride);
+        let mut vectors = self.right.chunks_exact(stride);
         // Twice, since Q is rounded.
         for _ in 0..2 {
             let directions = vectors.clone().take(self.slots);

@@ -18,7 +18,6 @@ use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::learn;
-use crate::tracker::linalg::gemm;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::orientation;
@@ -65,8 +64,7 @@ pub(crate) struct Workspace {
     pub sums: Vec<f64>,
     /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
     vectors: Vec<f32>,
-    /// Where the first of them begins, and how long each is.
-    first: usize,
+    /// D.
     len: usize,
     /// Their squared lengths.
     squares: Vec<f32>,
@@ -118,7 +116,8 @@ impl Workspace {
         let params = &state.params;
         let most = most + orientation::tried(params);
         self.len = params.feature_len();
-        self.first = gemm::reserve_aligned(&mut self.vectors, most * self.len);
+        let values = self.vectors.len().max(most * self.len);
+        self.vectors.resize(values, 0.0);
         let entries = params.bag_size as usize;
         clear_and_reserve(&mut self.particles, most);
         clear_and_reserve(&mut self.squares, most);
@@ -160,7 +159,7 @@ impl Workspace {
 
     /// The feature vectors of all particles; where candidates stand alone, with the background's mean taken off.
     pub fn vectors(&self) -> &[f32] {
-        &self.vectors[self.first..][..self.squares.len() * self.len]
+        &self.vectors[..self.squares.len() * self.len]
     }
 
     /// Looks at the particles from `first` on, and computes their distances and scores.
@@ -238,7 +237,7 @@ impl Workspace {
 
     /// Where the vectors of so many particles are.
     fn places(&self, particles: &Range<usize>) -> Range<usize> {
-        self.first + particles.start * self.len..self.first + particles.end * self.len
+        particles.start * self.len..particles.end * self.len
     }
 
     /// Compares the vectors of a batch, and the history, whitened.

@@ -12,8 +12,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::span::MIN_REMAINDER;
 use crate::tracker::linalg::acos::{LANES, squared_angles};
+use crate::tracker::linalg::combinations;
 use crate::tracker::linalg::gemm;
-use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
 
@@ -25,9 +25,6 @@ const GROUP: usize = 32;
 pub(crate) struct PointDistance {
     /// The samples; for each entry of the bag its mean, then its basis vectors; what the discriminant asks for.
     vectors: Vec<f32>,
-    /// Where the first of them begins, and how many values they have.
-    first: usize,
-    len: usize,
     /// The looks of an entry.
     templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
@@ -110,10 +107,9 @@ impl PointDistance {
         let entries = state.bag.entries();
         self.entries
             .extend(entries.iter().map(|entry| entry.combination().0.size()));
-        self.len = (self.samples + self.templates() + query_products.len()) * len;
-        self.first = gemm::reserve_aligned(&mut self.vectors, self.len);
-        let vectors = &mut self.vectors[self.first..][..self.len];
-        let (samples, mut rest) = vectors.split_at_mut(self.samples * len);
+        let count = self.samples + self.templates() + query_products.len();
+        self.vectors.resize(count * len, 0.0);
+        let (samples, mut rest) = self.vectors.split_at_mut(self.samples * len);
         background.write_samples(samples);
         self.background_coordinates.clear();
         for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
@@ -164,15 +160,14 @@ impl PointDistance {
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, candidates: &[f32], len: usize, stride: usize) {
         let (samples, templates) = (self.samples, self.templates());
-        let vectors = &self.vectors[self.first..][..self.len];
         // What is in the places between the products is of no account.
         let products = &mut self.products;
-        products.resize(self.len / len * stride, 0.0);
-        gemm::multiply(simd, vectors, candidates, len, stride, products);
+        products.resize(self.vectors.len() / len * stride, 0.0);
+        gemm::multiply(simd, &self.vectors, candidates, len, stride, products);
         let (of_samples, rest) = products.split_at_mut(samples * stride);
         let background_coordinates = &mut self.candidate_coordinates;
         background_coordinates.resize(samples * stride, 0.0);
-        vector_ops::become_triangular(
+        combinations::assign_triangular(
             simd,
             background_coordinates,
             &self.inverse,
@@ -180,7 +175,7 @@ impl PointDistance {
             stride,
         );
         let of_templates = &mut rest[..templates * stride];
-        vector_ops::combine(
+        combinations::combine(
             simd,
             of_templates,
             -1.0,
@@ -268,6 +263,7 @@ mod tests {
     use crate::tracker::appearance::bag;
     use crate::tracker::image::frame::GrayFrame;
     use crate::tracker::image::rect::Rect;
+    use crate::tracker::linalg::vector_ops;
     use crate::tracker::params::presets::Preset;
     use crate::tracker::params::table::Features;
     use crate::tracker::tracker::Tracker;

@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use crate::tracker::linalg::combinations;
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::vector_ops;
 
@@ -52,7 +53,7 @@ impl Whitening {
             }
         }
         whitening.directions = vec![0.0; whitening.gains.len() * len];
-        vector_ops::add_combinations(&mut whitening.directions, 1.0, &coefficients, samples, len);
+        combinations::add_combinations(&mut whitening.directions, 1.0, &coefficients, samples, len);
         whitening
     }
 
@@ -78,7 +79,7 @@ impl Whitening {
                     *product *= gain;
                 }
             }
-            vector_ops::add_combinations(vectors, -1.0, scratch, &self.directions, len);
+            combinations::add_combinations(vectors, -1.0, scratch, &self.directions, len);
         }
         if unit_length {
             vectors

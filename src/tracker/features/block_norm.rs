@@ -5,9 +5,6 @@
 
 use pulp::Simd;
 
-use crate::tracker::linalg::gemm::Element;
-use crate::tracker::linalg::reduce;
-
 /// Cells of a row that are worked on together.
 const GROUP: usize = 8;
 
@@ -60,19 +57,8 @@ impl BlockNorm {
         energies: [S::f32s; N],
     ) {
         let out = &mut self.values[row * self.columns + first..][..N];
-        if reduce::can_sum::<S, f32>(simd) {
-            let groups = energies.as_chunks::<{ reduce::GROUP_SIZE }>();
-            let out = out.as_chunks_mut::<{ reduce::GROUP_SIZE }>();
-            for (energies, out) in groups.0.iter().zip(out.0) {
-                *out = f32::sum_each(simd, *energies);
-            }
-            for (energies, out) in groups.1.iter().zip(out.1) {
-                *out = simd.reduce_sum_f32s(*energies);
-            }
-        } else {
-            for (energies, out) in energies.iter().zip(out) {
-                *out = simd.reduce_sum_f32s(*energies);
-            }
+        for (out, energy) in out.iter_mut().zip(energies) {
+            *out = simd.reduce_sum_f32s(energy);
         }
     }
 

@@ -32,9 +32,9 @@ impl WithSimd for ApplyToAll<'_> {
 impl Centering<'_> {
     /// Takes the mean off a vector and appends its squared length.
     #[inline(always)]
-    pub fn apply<S: Simd>(&mut self, simd: S, vector: &mut [f32]) {
+    pub fn apply<S: Simd>(&mut self, _: S, vector: &mut [f32]) {
         vector_ops::add(vector, -1.0, self.mean);
-        self.squares.push(vector_ops::product(simd, vector, vector));
+        self.squares.push(vector_ops::dot(vector, vector));
     }
 
     /// The same for several vectors of length `len`.
