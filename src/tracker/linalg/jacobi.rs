@@ -1,7 +1,8 @@
 //! Eigenvalues and eigenvectors of a small symmetric matrix, by cyclic Jacobi rotations: the method with the smallest relative
 //! errors on positive semidefinite matrices, and one that always ends.
 //!
-//! FIGURES
+//! Own code: nalgebra's decomposition allocates on each call, which a step must not. It takes 1.6 times as long for 3 rows,
+//! 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a microsecond.
 
 /// Cyclic Jacobi needs four to six sweeps at these sizes; the bound ends it on NaN.
 const MAX_SWEEPS: usize = 16;
