@@ -1,6 +1,5 @@
 //! The synthetic clip: its ground truth is where the card really is, and what is promised to happen happens.
 
-use bagtrack::eval::measures::overlap;
 use bagtrack::ingest::{Limits, decode};
 use bagtrack::sample::{Clip, Settings};
 use bagtrack::tracker::Rect;
@@ -58,7 +57,7 @@ fn the_ground_truth_is_where_the_card_is_drawn() {
             // A frame with the card elsewhere shows the wall here.
             let elsewhere = PLAIN
                 .into_iter()
-                .find(|&other| overlap(&grown(card), &clip.target(other)) == 0.0);
+                .find(|&other| grown(card).overlap(&clip.target(other)) == 0.0);
             let Some(other) = elsewhere else { continue };
             let seen = bounds(&clip.draw(index), &clip.draw(other), clip.target(other));
             for (seen, truth) in seen.into_iter().zip(truth) {

@@ -2,7 +2,7 @@
 
 mod pictures;
 
-use bagtrack::ingest::{Limits, decode, plain_size};
+use bagtrack::ingest::{Limits, decode};
 use bagtrack::tracker::GrayFrame;
 use image::{DynamicImage, ImageFormat};
 use jpeg_encoder::ColorType;
@@ -118,41 +118,6 @@ fn cmyk_jpegs_give_luma_too() {
         }
         assert!(decoded >= 9, "{kind:?}: only {decoded} forms were decoded");
     }
-}
-
-#[test]
-fn the_head_of_a_plain_jpeg_tells_its_size_and_no_other_head_does() {
-    let picture = color(SIZE.0, SIZE.1);
-    let (mut plain, mut others) = (0, 0);
-    for (name, form) in jpeg_forms() {
-        let bytes = jpeg(&picture, form, Some(6));
-        let starts = |pair: &[u8]| pair == [0xFF, 0xDA];
-        let scans = bytes.windows(2).filter(|pair| starts(pair)).count();
-        if scans > 1 || bytes.len() > (SIZE.0 * SIZE.1) as usize {
-            assert_eq!(plain_size(&bytes), None, "{name}");
-            others += 1;
-            continue;
-        }
-        // As stored: this one is to be turned.
-        assert_eq!(plain_size(&bytes), Some(SIZE), "{name}");
-        plain += 1;
-        // The head is enough, and none of it may be missing.
-        let scan = bytes.windows(2).position(starts).expect("it has a scan");
-        assert_eq!(plain_size(&bytes[..scan + 14]), Some(SIZE), "{name}");
-        for end in 0..scan + 2 {
-            assert_eq!(plain_size(&bytes[..end]), None, "{name}, {end} bytes");
-        }
-    }
-    assert!(plain >= 4 && others >= 4, "{plain} and {others}");
-    for format in [ImageFormat::Png, ImageFormat::WebP] {
-        assert_eq!(plain_size(&encode(&picture.clone().into(), format)), None);
-    }
-    // More bytes than pixels say that the size says little.
-    let mut long = jpeg(&picture, BASELINE, None);
-    long.resize((SIZE.0 * SIZE.1) as usize, 0);
-    assert_eq!(plain_size(&long), Some(SIZE));
-    long.push(0);
-    assert_eq!(plain_size(&long), None);
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The clips in which the target goes out of sight: nothing of it is seen when the clip says so, and something when not.
+//! The clips in which the target goes out of sight: nothing of it is seen when the clip says so, and something when
+//! not.
 
 use bagtrack::eval::Sequence;
 use bagtrack::sample::{Clip, Format, Scene, Settings};

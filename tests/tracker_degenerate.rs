@@ -126,7 +126,6 @@ fn walks_and_scales_without_bound_are_held() {
             motion_std_y: 320.0,
             motion_std_scale: 1.0,
             displacement_std: 0.0,
-            scale_change_std: 0.0,
             ..params
         };
         for answer in run(&frames, tracker_scene::target(0), params) {

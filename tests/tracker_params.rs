@@ -22,19 +22,15 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
     let mut shares = shares.iter().copied();
     let mut share = || shares.next().expect("as many shares as parameters");
     let mut count = |from: u32, to: u32| from + (share() * f64::from(to - from)).round() as u32;
-    let bag_size = count(1, 6);
     let counts = Params {
         particles: count(1, 21),
         patch_width: count(4, 8),
         patch_height: count(4, 8),
         basis_dim: count(1, 6),
         history: count(1, 10),
-        bag_size,
+        bag_size: count(1, 6),
         update_every: count(1, 4),
         background_samples: count(0, 24),
-        background_every: count(1, 4),
-        refined_modes: count(1, 50),
-        pinned: count(0, bag_size - 1),
         ..tracker_scene::robust(seed)
     };
     let on = |bit: u8| switches & 1 << bit != 0;
@@ -46,8 +42,6 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
     };
     let magnitudes = Params {
         sigma: magnitude(0.0001, 100.0),
-        background_ridge: magnitude(0.001, 1000.0),
-        discriminant_damping: magnitude(0.001, 1000.0),
         ..counts
     };
     Params {
@@ -56,21 +50,13 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         motion_std_y: 320.0 * share(),
         motion_std_scale: share(),
         context: 0.5 + 2.5 * share(),
-        gray_weight: 3.0 * share(),
-        refined_share: 0.9 * share(),
-        refined_std: 320.0 * share(),
-        refined_std_scale: share(),
         displacement_std: 1000.0 * share(),
-        scale_change_std: 10.0 * share(),
         scale_learning_rate: if on(3) { share() } else { 0.0 },
         dense_maxima: seed as u32 % 17,
-        dense_radius: 4.0 * share(),
         static_penalty: if on(5) { 100.0 * share() } else { 0.0 },
-        averaging_radius: 100.0 * share(),
-        prune_margin: if on(3) { 0.0 } else { 1000.0 * share().powi(3) },
         rotation_step: if on(5) { 30.0 * share() } else { 0.0 },
         augmentation_angle: if on(4) { 90.0 * share() } else { 0.0 },
-        pinned_weight: 100.0 * share(),
+        pinned_weight: if on(1) { 100.0 * share() } else { 0.0 },
         update_min_score: share(),
         update_distance_ratio: 100.0 * (seed % 3) as f64 / 2.0,
         discriminant_weight: 100.0 * (seed % 5) as f64 / 4.0,
@@ -79,7 +65,6 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         } else {
             Features::Gradients
         },
-        unit_length: on(1),
         single_vector_candidate: on(2),
         search: if on(3) {
             Search::Resampled

@@ -25,11 +25,10 @@ fn session(steps: usize, params: Params) -> Tracker {
     tracker
 }
 
-/// The same with the mends, all of which learn in every second frame.
-fn mended(steps: usize) -> Tracker {
+/// The same with the extensions.
+fn extended(steps: usize) -> Tracker {
     let params = Params {
         background_samples: 5,
-        background_every: 2,
         ..robust(11)
     };
     session(steps, params)
@@ -96,7 +95,7 @@ fn a_restored_tracker_goes_on_bit_for_bit() {
 
 #[test]
 fn damage_of_any_byte_and_every_cut_is_found() {
-    for tracker in [session(5, params(11)), mended(5)] {
+    for tracker in [session(5, params(11)), extended(5)] {
         let bytes = tracker.snapshot();
         for at in 0..bytes.len() {
             let mut damaged = bytes.clone();
@@ -169,7 +168,7 @@ proptest! {
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         early in any::<bool>(),
     ) {
-        for tracker in [session(5, params(11)), mended(5)] {
+        for tracker in [session(5, params(11)), extended(5)] {
             let mut body = body(&tracker);
             for (index, value) in &changes {
                 // The parameters, sizes and numbers come first; the vectors would drown them.
@@ -185,7 +184,7 @@ proptest! {
         changes in proptest::collection::vec((any::<prop::sample::Index>(), 0..HOSTILE.len()), 1..6),
         late in any::<bool>(),
     ) {
-        let mut body = body(&mended(5));
+        let mut body = body(&extended(5));
         for (index, which) in changes {
             // What the camera and the running means say comes last.
             let first = if late { body.len() - 1200 } else { 0 };

@@ -1,5 +1,5 @@
-//! Timing on a machine that others use too: things that are compared take turns, the median counts, and time is that of the
-//! thread on its processor, without that in which others had it.
+//! Timing on a machine that others use too: things that are compared take turns, the median counts, and time is that
+//! of the thread on its processor, without that in which others had it.
 
 use rustix::time::{ClockId, Timespec, clock_gettime};
 
@@ -12,8 +12,8 @@ pub fn medians(rounds: usize, actions: Vec<Action<'_>>) -> Vec<f64> {
 }
 
 /// The same for actions of which every `period`-th call has more to do: `rounds` times `period` calls, in turns; gives
-/// for each action the mean, over the calls of a period, of their medians. So rare work counts, and other work on the machine
-/// does not.
+/// for each action the mean, over the calls of a period, of their medians. So rare work counts, and other work on the
+/// machine does not.
 pub fn cycles(rounds: usize, period: usize, mut actions: Vec<Action<'_>>) -> Vec<f64> {
     let mut times = vec![vec![Vec::with_capacity(rounds); period]; actions.len()];
     for call in 0..rounds * period {

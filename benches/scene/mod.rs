@@ -45,7 +45,8 @@ pub fn luma(t: usize, zoom: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Gray values of a picture of any size without the target: as much detail for each pixel in a large one as in a small one.
+/// Gray values of a picture of any size without the target: as much detail for each pixel in a large one as in a small
+/// one.
 pub fn wall(width: usize, height: usize) -> Vec<u8> {
     (0..width * height)
         .map(|i| texture(i % width, i / width, 1))

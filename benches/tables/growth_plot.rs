@@ -1,8 +1,9 @@
-//! The figure of the growth table: a panel for each row, logarithmic on both axes, with what is expected as a dashed line.
+//! The figure of the growth table: a panel for each row, logarithmic on both axes, with what is expected as a dashed
+//! line.
 
 use plotters::prelude::*;
 
-use crate::growth::Row;
+use crate::growth_row::Row;
 use crate::style::{self, Drawn, FONT, INK, MARGIN, TITLE};
 
 const PANEL: (u32, u32) = (330, 260);

@@ -8,17 +8,20 @@ use pulp::{Arch, Simd};
 
 use crate::clock;
 
-#[allow(dead_code)] // Each file also has what only the tracker calls.
+// Each file also has what only the tracker calls, and its tests.
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/acos.rs"]
 mod acos;
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/combinations.rs"]
 mod combinations;
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/exp.rs"]
 mod exp;
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/gemm.rs"]
 mod gemm;
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/jacobi.rs"]
 mod jacobi;
 

@@ -14,6 +14,7 @@ mod decode;
 mod fit;
 mod growth;
 mod growth_plot;
+mod growth_row;
 mod kernels;
 mod memory;
 mod ratios;

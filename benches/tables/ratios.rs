@@ -112,8 +112,8 @@ pub fn print() {
     line("the textbook version of the same", textbook, note);
 }
 
-/// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and how that compares. By itself: so many
-/// particles would empty the others' caches.
+/// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and how that compares. By itself:
+/// so many particles would empty the others' caches.
 fn out_of_sight(held: f64) -> (f64, String) {
     let settings = Settings {
         scene: Scene::Leaves,

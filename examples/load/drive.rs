@@ -87,8 +87,8 @@ impl Driver {
 pub struct Clients(Vec<ClientSession>);
 
 impl Clients {
-    /// Sends `frames` frames over all sessions and adds what comes of it to `done`. With a `rate`, that many frames fall due
-    /// a second; otherwise each session sends its next when the last is answered. Stops after `limit`.
+    /// Sends `frames` frames over all sessions and adds what comes of it to `done`. With a `rate`, that many frames
+    /// fall due a second; otherwise each session sends its next when the last is answered. Stops after `limit`.
     pub async fn run(
         &mut self,
         frames: u32,

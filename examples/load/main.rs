@@ -1,13 +1,13 @@
 //! A load generator: `cargo build --release && cargo run --release --example load -- --help`.
 //!
 //! It starts a server of its own on a free loopback port and prints, from one run:
-//! - the processor time of decoding and tracking a frame in this process, one thread: of one session over and over, all of
-//!   whose data stays in the caches, and of as many sessions as are measured, in turns;
+//! - the processor time of decoding and tracking a frame in this process, one thread: of one session over and over,
+//!   all of whose data stays in the caches, and of as many sessions as are measured, in turns;
 //! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
 //! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
 //!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
-//! - the processor time of the server process for a frame against that of decoding and tracking. A machine that others use is
-//!   now fast and now slow, so a measurement has parts, and the two are measured in turns.
+//! - the processor time of the server process for a frame against that of decoding and tracking. A machine that others
+//!   use is now fast and now slow, so a measurement has parts, and the two are measured in turns.
 //!
 //! With `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
 //!

@@ -20,8 +20,8 @@ const CLIENTS: usize = 16;
 
 /// Opens `sessions` sessions, sends each enough frames to fill its bag, and prints the table.
 ///
-/// The bag takes an entry from every frame (`update_every` = 1), not from every fifth: it is as large when it is full, a fifth
-/// of the frames fill it.
+/// The bag takes an entry from every frame (`update_every` = 1), not from every fifth: it is as large when it is full,
+/// a fifth of the frames fill it.
 pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u32) -> Outcome<()> {
     let params = preset.params();
     let fill = Arc::new(Fill {

@@ -41,11 +41,12 @@ pub struct Args {
     /// What the tracker is without each of its mends: the means over the sequences, a row each.
     #[arg(long)]
     ablate: bool,
-    /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the preset
-    /// as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
+    /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the
+    /// preset as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
     #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
     sweep: Option<PathBuf>,
-    /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these names.
+    /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these
+    /// names.
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }

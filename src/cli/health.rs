@@ -1,5 +1,5 @@
-//! `bagtrack health`: asks a running service whether it is healthy. Made for container health checks, where
-//! there is no other client.
+//! `bagtrack health`: asks a running service whether it is healthy, for health checks in containers without another
+//! client.
 
 use http::Uri;
 use std::error::Error;

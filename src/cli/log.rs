@@ -1,114 +1,118 @@
-//! Where the log goes: to standard error, in large pieces.
+//! Where the log of `serve` goes: to standard error, by a thread of its own.
 //!
-//! A line for each request, each with a system call of its own, is a good part of what a small request costs. So lines are
-//! gathered, and a thread writes what there is ten times a second. What could go wrong: lines that are lost with the process;
-//! so warnings and errors are written at once, with all lines before them, and the rest at the end.
+//! What can go wrong: whoever reads standard error stalls. Nothing that logs ever waits for it: up to [`MAX_LINES`]
+//! lines are kept, further ones are dropped and counted, and the log tells how many as soon as it is read again.
 
-use std::io::{self, Write};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread;
+use std::backtrace::{Backtrace, BacktraceStatus};
+use std::io::{self, BufWriter, IsTerminal};
+use std::panic::PanicHookInfo;
 use std::time::Duration;
-use tracing::{Level, Metadata};
-use tracing_subscriber::fmt::MakeWriter;
+use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
+use tracing_subscriber::EnvFilter;
 
-/// How long a line waits at most.
-const DELAY: Duration = Duration::from_millis(100);
-/// From so many bytes on, whoever logs writes them.
-const MOST: usize = 256 << 10;
+/// Lines that wait to be written. A line has some hundred bytes.
+const MAX_LINES: usize = 4096;
+/// Bytes that are written at once.
+const BUFFER_BYTES: usize = 64 << 10;
+/// How often dropped lines are told.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// The lines that wait to be written. Clones share them.
-#[derive(Debug, Clone, Default)]
-pub struct Log(Arc<Shared>);
+/// How to log.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub enum LogFormat {
+    /// One readable line an event.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
 
-#[derive(Debug, Default)]
-struct Shared {
-    lines: Mutex<Vec<u8>>,
-    some: Condvar,
+/// The log. Lines that wait are written when it is dropped, if that takes no longer than a second.
+#[derive(Debug)]
+pub struct Log {
+    _writer: WorkerGuard,
+    dropped: DroppedLines,
+}
+
+/// Tells how many lines were dropped.
+#[derive(Debug, Clone)]
+pub struct DroppedLines {
+    counter: ErrorCounter,
+    told: usize,
 }
 
 impl Log {
-    /// Starts the thread that writes.
+    /// Sends all events that `filter` lets through, and all panics, to standard error.
     ///
     /// # Errors
-    /// The system gives no thread.
-    pub fn start() -> io::Result<Self> {
-        let log = Self::default();
-        let writer = log.clone();
-        thread::Builder::new()
-            .name("bagtrack-log".to_owned())
-            .spawn(move || {
-                loop {
-                    writer.wait();
-                    thread::sleep(DELAY);
-                    writer.flush();
-                }
-            })?;
-        Ok(log)
+    /// The filter cannot be read.
+    pub fn start(filter: &str, format: LogFormat) -> Result<Self, String> {
+        let filter = EnvFilter::try_new(filter)
+            .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
+        let stderr = BufWriter::with_capacity(BUFFER_BYTES, io::stderr());
+        let (lines, writer) = NonBlockingBuilder::default()
+            .buffered_lines_limit(MAX_LINES)
+            .lossy(true)
+            .thread_name("bagtrack-log")
+            .finish(stderr);
+        let counter = lines.error_counter();
+        let log = tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_ansi(io::stderr().is_terminal())
+            .with_writer(lines);
+        match format {
+            LogFormat::Text => log.init(),
+            LogFormat::Json => log.json().init(),
+        }
+        // The default hook writes to standard error itself, and would wait for its reader.
+        std::panic::set_hook(Box::new(log_panic));
+        Ok(Self {
+            _writer: writer,
+            dropped: DroppedLines { counter, told: 0 },
+        })
     }
 
-    /// Writes what there is.
-    pub fn flush(&self) {
-        write(&mut self.lines());
-    }
-
-    fn wait(&self) {
-        let lines = self
-            .0
-            .some
-            .wait_while(self.lines(), |lines| lines.is_empty());
-        drop(lines.unwrap_or_else(PoisonError::into_inner));
-    }
-
-    fn lines(&self) -> MutexGuard<'_, Vec<u8>> {
-        self.0.lines.lock().unwrap_or_else(PoisonError::into_inner)
+    /// What tells how many lines were dropped.
+    pub fn dropped(&self) -> DroppedLines {
+        self.dropped.clone()
     }
 }
 
-/// Nobody can be told where the log itself cannot be written.
-fn write(lines: &mut Vec<u8>) {
-    let _ = io::stderr().write_all(lines);
-    lines.clear();
-}
-
-impl<'a> MakeWriter<'a> for Log {
-    type Writer = Line<'a>;
-
-    fn make_writer(&'a self) -> Line<'a> {
-        Line {
-            log: self,
-            urgent: true,
+impl DroppedLines {
+    /// Logs how many lines were dropped, if that is more than at the last time. Where this line is dropped too, the
+    /// next one tells it.
+    pub fn report(&mut self) {
+        let total = self.counter.dropped_lines();
+        if total > self.told {
+            let dropped = total - self.told;
+            tracing::warn!(
+                dropped,
+                total,
+                "log lines were dropped: they were not read in time"
+            );
+            self.told = total;
         }
     }
 
-    fn make_writer_for(&'a self, metadata: &Metadata<'_>) -> Line<'a> {
-        Line {
-            log: self,
-            urgent: *metadata.level() <= Level::WARN,
+    /// Reports for ever, from time to time.
+    pub async fn report_regularly(mut self) {
+        let mut ticks = tokio::time::interval(REPORT_EVERY);
+        loop {
+            ticks.tick().await;
+            self.report();
         }
     }
 }
 
-/// Takes one line.
-#[derive(Debug)]
-pub struct Line<'a> {
-    log: &'a Log,
-    urgent: bool,
-}
-
-impl Write for Line<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut lines = self.log.lines();
-        let first = lines.is_empty();
-        lines.extend_from_slice(bytes);
-        if self.urgent || lines.len() >= MOST {
-            write(&mut lines);
-        } else if first {
-            self.log.0.some.notify_one();
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
+fn log_panic(panic: &PanicHookInfo<'_>) {
+    let place = panic
+        .location()
+        .map(ToString::to_string)
+        .unwrap_or_default();
+    let message = panic.payload_as_str().unwrap_or("a value that is not text");
+    let backtrace = Backtrace::capture();
+    if backtrace.status() == BacktraceStatus::Captured {
+        tracing::error!(place, message, %backtrace, "panicked");
+    } else {
+        tracing::error!(place, message, "panicked");
     }
 }

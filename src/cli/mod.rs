@@ -1,5 +1,7 @@
-//! The commands, one file each. A command returns what went wrong as a printable error; `run` prints it
-//! as one line and exits with 1 (clap exits with 2 on wrong usage).
+//! The commands of the program, one file each.
+//!
+//! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1 after
+//! an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
 mod draw;
 mod eval;

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-/// Makes `dir`, or takes it where it is empty: nothing that somebody keeps is ever written over.
+/// Makes `dir`, or takes it if it is empty. Existing files are never overwritten.
 pub fn new_folder(dir: &Path) -> Result<(), String> {
     fs::create_dir_all(dir).map_err(|error| format!("{}: {error}", dir.display()))?;
     let mut entries = fs::read_dir(dir).map_err(|error| format!("{}: {error}", dir.display()))?;
@@ -17,7 +17,7 @@ pub fn new_folder(dir: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes `text` to standard output. It is no error when the reader has seen enough, as in `bagtrack eval … | head`.
+/// Writes `text` to standard output. A reader that ends early, as in `bagtrack eval … | head`, is not an error.
 pub fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

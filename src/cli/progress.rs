@@ -1,9 +1,9 @@
-//! Progress bars, for people: on standard error, and only where that is a terminal.
+//! Progress bars, on standard error and only where that is a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 
-/// A bar of `length` steps; a hidden one where nobody looks.
+/// A bar of `length` steps; a hidden one where standard error is not a terminal.
 pub fn bar(length: u64, what: &'static str) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();

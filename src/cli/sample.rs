@@ -7,8 +7,8 @@ use std::path::PathBuf;
 /// Flags of `sample`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folder to write: img/0001.jpg and so on, groundtruth_rect.txt (OTB layout, 1-based pixels, 0,0,0,0 while nothing of
-    /// the target is seen), and visible.txt (1 or 0 a line: whether any of it is seen).
+    /// Folder to write: img/0001.jpg and so on, groundtruth_rect.txt (OTB layout, 1-based pixels, 0,0,0,0 while
+    /// nothing of the target is seen), and visible.txt (1 or 0 a line: whether any of it is seen).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// What happens to the target.

@@ -1,10 +1,8 @@
 //! `bagtrack serve`: the HTTP service until SIGTERM or SIGINT.
 
-use super::log::Log;
+use super::log::{Log, LogFormat};
 use bagtrack::http::{Application, Config};
 use std::error::Error;
-use std::io::IsTerminal;
-use tracing_subscriber::EnvFilter;
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -19,50 +17,27 @@ pub struct Args {
     log_format: LogFormat,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum LogFormat {
-    /// One readable line an event.
-    Text,
-    /// One JSON object a line.
-    Json,
-}
-
 /// Runs `serve`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
-    let log = start_log(&args.log, args.log_format)?;
+    let log = Log::start(&args.log, args.log_format)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(args.config.network_threads())
-        .on_thread_park(bagtrack::sessions::rested)
         .enable_all()
         .build()?;
-    // Work that did not end in time does not hold up the exit: its threads end with the process.
-    let served = runtime.block_on(serve(args.config));
-    log.flush();
-    served
+    // Work that does not end in time does not delay the exit: its threads end with the process.
+    runtime.block_on(serve(args.config, &log))
 }
 
-async fn serve(config: Config) -> Result<(), Box<dyn Error>> {
+async fn serve(config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     let application = Application::bind(config).await?;
     let shutdown = shutdown_signal()?;
     tracing::info!("listening on http://{}", application.local_addr()?);
+    let reports = tokio::spawn(log.dropped().report_regularly());
     let ended = application.serve(shutdown).await;
+    reports.abort();
+    log.dropped().report();
     tracing::info!(ended, "bye");
     Ok(())
-}
-
-fn start_log(filter: &str, format: LogFormat) -> Result<Log, Box<dyn Error>> {
-    let filter = EnvFilter::try_new(filter)
-        .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
-    let lines = Log::start()?;
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(lines.clone());
-    match format {
-        LogFormat::Text => log.init(),
-        LogFormat::Json => log.json().init(),
-    }
-    Ok(lines)
 }
 
 #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! The ablation as data: what the tracker is without each of its mends, one row each.
+//! The ablation as data: what the tracker is without each of its extensions, one row each.
 //!
 //! A row that sets nothing that the evaluated preset has not set already is not run again: it has the figures of the
 //! first row.
@@ -10,7 +10,7 @@ type Row = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// The rows after that of the preset itself.
 const ROWS: &[Row] = &[
-    ("paper: every mend off", &[("preset", "paper")]),
+    ("paper: every extension off", &[("preset", "paper")]),
     ("α = 0: bases alone", &[("alpha", "0")]),
     ("α = 0.5", &[("alpha", "0.5")]),
     ("α = 1: means alone", &[("alpha", "1")]),
@@ -22,38 +22,31 @@ const ROWS: &[Row] = &[
             ("patch_height", "32"),
         ],
     ),
-    ("no gray values beside gradients", &[("gray_weight", "0")]),
     ("the box alone, no rim", &[("context", "1")]),
-    ("vectors of any length", &[("unit_length", "false")]),
     (
         "candidates with their history",
         &[("single_vector_candidate", "false")],
     ),
     ("no background metric", &[("background_samples", "0")]),
     ("resampled particles", &[("search", "resampled")]),
-    ("one stage", &[("refined_share", "0")]),
     ("no prior on the displacement", &[("displacement_std", "0")]),
+    ("no scale filter", &[("scale_learning_rate", "0")]),
+    ("no dense search", &[("dense_maxima", "0")]),
+    ("no augmented first image", &[("augmentation_angle", "0")]),
+    ("no in-plane rotation", &[("rotation_step", "0")]),
     (
-        "no prior on the change of scale",
-        &[("scale_change_std", "0")],
+        "the first subspace weighs as any other",
+        &[("pinned_weight", "1")],
     ),
-    ("no prior on the scale", &[("scale_std", "0")]),
-    ("no filter for the scale", &[("scale_learning_rate", "0")]),
-    ("no look at every place", &[("dense_maxima", "0")]),
-    ("no place left out", &[("prune_margin", "0")]),
-    ("no poses of the first look", &[("augmentation_angle", "0")]),
-    ("always upright", &[("rotation_step", "0")]),
-    ("a pinned subspace as any other", &[("pinned_weight", "1")]),
-    ("nothing has to arrive", &[("static_penalty", "0")]),
-    ("never out of sight", &[("lost_threshold", "0")]),
-    ("no camera shift", &[("global_motion", "false")]),
-    ("arg max, not averaged", &[("averaging_radius", "0")]),
-    ("no pinned subspace", &[("pinned", "0")]),
-    ("learns from every frame", &[("update_distance_ratio", "0")]),
     (
-        "learns what it hardly believes",
-        &[("update_min_score", "0")],
+        "the first subspace leaves the bag",
+        &[("pinned_weight", "0")],
     ),
+    ("no change test", &[("static_penalty", "0")]),
+    ("no global motion", &[("global_motion", "false")]),
+    ("never lost", &[("lost_threshold", "0")]),
+    ("updates at any distance", &[("update_distance_ratio", "0")]),
+    ("updates at any score", &[("update_min_score", "0")]),
     ("no discriminant", &[("discriminant_weight", "0")]),
 ];
 

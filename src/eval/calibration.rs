@@ -1,47 +1,37 @@
 //! How well the score tells hits from misses, and how well it is a chance.
 //!
 //! An *outcome* is one scored frame of one run: the score that the tracker gave with its box, and whether the box was
-//! a *hit*, that is, overlapped the annotated one by at least [`HIT_OVERLAP`]. Frames without an annotation and the
-//! first frame, whose box is given, are no outcomes. All outcomes count alike: the figures are over the pooled frames
-//! of all videos and seeds, so a long video weighs more than a short one.
+//! a *hit*, that is, overlapped the annotated one by at least [`HIT_OVERLAP`](super::HIT_OVERLAP). Frames without an
+//! annotation and the first frame, whose box is given, are no outcomes. All outcomes count alike: the figures are over
+//! the pooled frames of all videos and seeds, so a long video weighs more than a short one.
 //!
 //! - [`roc_auc`], the *area under the ROC curve*: the chance that a hit taken at random has a higher score than a miss
 //!   taken at random, where equal scores count half (the Mann-Whitney statistic). 0.5 is a score that says nothing,
 //!   1 one that separates the two. It sees only the order of the scores.
-//! - [`calibration_error`], the *expected calibration error*: the outcomes are sorted into [`BINS`] bins of equal width,
-//!   [0, 0.1), [0.1, 0.2) … [0.9, 1]; in each the mean score is held against the share of hits, and the absolute
-//!   differences are averaged, each bin weighted by its number of outcomes. 0 is a score that is the chance it claims.
-//! - [`calibration_error_leave_one_out`], the same *leaving one video out*: for each video in turn an
-//!   [isotonic regression](Isotonic) of hit on score is fitted to the outcomes of all the *other* videos (all seeds); its
-//!   value at each score of the left-out video takes the score's place; then the calibration error is that of all
-//!   videos' outcomes pooled, with those chances as scores. It tells what a map from score to chance that is learnt
-//!   from some videos is worth on one that it has never seen; the score as it is served takes no part in it but by
-//!   its order. A video's own seeds are never split between fitting and judging.
+//! - [`calibration_error`], the *expected calibration error*: the outcomes are sorted into [`BINS`] bins of equal
+//!   width, [0, 0.1), [0.1, 0.2) … [0.9, 1]; in each the mean score is held against the share of hits, and the
+//!   absolute differences are averaged, each bin weighted by its number of outcomes. 0 is a score that is the chance
+//!   it claims.
+//! - [`calibration_error_leave_one_out`], the same *leaving one video out*: for each video in turn an [isotonic
+//!   regression](Isotonic) of hit on score is fitted to the outcomes of all the *other* videos (all seeds); its value
+//!   at each score of the left-out video takes the score's place; then the calibration error is that of all videos'
+//!   outcomes pooled, with those chances as scores. It tells what a map from score to chance that is learnt from some
+//!   videos is worth on one that it has never seen; the score as it is served takes no part in it but by its order. A
+//!   video's own seeds are never split between fitting and judging.
 //!
 //! What could go wrong: calibration alone is no proof of a good score. A constant that is the share of hits is
 //! calibrated, and within a bin a video that is claimed too high makes up for one that is claimed too low; so the
-//! figures are to be read together with the area under the ROC curve. With hits only or misses only there is no ROC curve, and with one video none to learn from.
-//! Those figures are None then, never a number that means nothing.
+//! figures are to be read together with the area under the ROC curve. With hits only or misses only there is no ROC
+//! curve, and with one video none to learn from. Those figures are None then, never a number that means nothing.
 
 use super::isotonic::Isotonic;
-
-/// The least overlap (intersection over union) of a hit.
-pub const HIT_OVERLAP: f64 = 0.5;
+use super::outcome::Outcome;
 
 /// Number of bins of the calibration error.
 pub const BINS: usize = 10;
 
-/// One outcome.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
-    /// The chance of a hit that was claimed, 0 to 1.
-    pub score: f64,
-    /// Whether it was one.
-    pub hit: bool,
-}
-
 /// The area under the ROC curve, 0 to 1; None without both hits and misses.
-pub fn roc_auc(outcomes: &[Judged]) -> Option<f64> {
+pub fn roc_auc(outcomes: &[Outcome]) -> Option<f64> {
     let mut sorted = outcomes.to_vec();
     sorted.sort_by(|a, b| a.score.total_cmp(&b.score));
     let (mut misses_below, mut won) = (0.0, 0.0);
@@ -56,7 +46,7 @@ pub fn roc_auc(outcomes: &[Judged]) -> Option<f64> {
 }
 
 /// The expected calibration error, 0 to 1; None without outcomes.
-pub fn calibration_error(outcomes: &[Judged]) -> Option<f64> {
+pub fn calibration_error(outcomes: &[Outcome]) -> Option<f64> {
     // Sums of score and of hits: their difference in a bin is the bin's difference of means times its count.
     let mut bins = [(0.0, 0.0); BINS];
     for outcome in outcomes {
@@ -73,17 +63,17 @@ pub fn calibration_error(outcomes: &[Judged]) -> Option<f64> {
 
 /// The expected calibration error of chances learnt from the other videos, 0 to 1; `videos` are the outcomes video by
 /// video. None with fewer than two videos.
-pub fn calibration_error_leave_one_out(videos: &[Vec<Judged>]) -> Option<f64> {
+pub fn calibration_error_leave_one_out(videos: &[Vec<Outcome>]) -> Option<f64> {
     let mut learnt = Vec::new();
     for (left_out, outcomes) in videos.iter().enumerate() {
-        let others: Vec<Judged> = videos
+        let others: Vec<Outcome> = videos
             .iter()
             .enumerate()
             .filter(|(index, _)| *index != left_out)
             .flat_map(|(_, outcomes)| outcomes.iter().copied())
             .collect();
         let fit = Isotonic::fit(&others)?;
-        learnt.extend(outcomes.iter().map(|outcome| Judged {
+        learnt.extend(outcomes.iter().map(|outcome| Outcome {
             score: fit.chance(outcome.score),
             ..*outcome
         }));
@@ -95,10 +85,10 @@ pub fn calibration_error_leave_one_out(videos: &[Vec<Judged>]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Judged> {
+    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Outcome> {
         pairs
             .iter()
-            .map(|&(score, hit)| Judged {
+            .map(|&(score, hit)| Outcome {
                 score,
                 hit: hit == 1,
             })

@@ -15,8 +15,8 @@ fn folder(dir: &Path) -> PathBuf {
     }
 }
 
-/// The JPEG, PNG and WebP files in `img/` under `dir` (OTB layout), or in `dir` itself where there is no such folder, by
-/// name; numbers in names are compared as numbers.
+/// The JPEG, PNG and WebP files in `img/` under `dir` (OTB layout), or in `dir` itself where there is no such folder,
+/// by name; numbers in names are compared as numbers.
 ///
 /// # Errors
 /// The folder cannot be read, or holds no frames.

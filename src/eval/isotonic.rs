@@ -1,7 +1,7 @@
 //! Isotonic regression: the non-decreasing function of the score that fits yes-or-no outcomes best in least squares,
 //! found by pooling adjacent violators (Ayer et al. 1955; used for calibration by Zadrozny and Elkan 2002).
 
-use super::calibration::Judged;
+use super::outcome::Outcome;
 
 /// A run of scores that share one rate of hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Isotonic {
 impl Isotonic {
     /// Fits the outcomes; None where there are none. Equal scores are pooled before anything else, so the order of
     /// the outcomes does not count.
-    pub fn fit(outcomes: &[Judged]) -> Option<Self> {
+    pub fn fit(outcomes: &[Outcome]) -> Option<Self> {
         let mut sorted = outcomes.to_vec();
         sorted.sort_by(|a, b| a.score.total_cmp(&b.score));
         let mut blocks: Vec<Block> = Vec::new();
@@ -71,10 +71,10 @@ impl Isotonic {
 mod tests {
     use super::*;
 
-    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Judged> {
+    fn outcomes(pairs: &[(f64, u8)]) -> Vec<Outcome> {
         pairs
             .iter()
-            .map(|&(score, hit)| Judged {
+            .map(|&(score, hit)| Outcome {
                 score,
                 hit: hit == 1,
             })

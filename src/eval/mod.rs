@@ -1,10 +1,13 @@
 //! Annotated sequences, error measures, runs over several seeds, and what they show.
 //!
-//! A [`Sequence`] is a folder in the OTB layout, played [one way or another](Playback); [`run`] tracks through it once for each seed;
-//! [`Report`] holds the figures as a table or as JSON, and says how good the [score](calibration) is.
-//! [`Comparison`] sets [variants](Variant) side by side, of which the [`ablation`] is a fixed list, and [`plots`] draws
-//! them. What could go wrong: frames and annotations that do not belong together would give figures that mean nothing;
-//! so a sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, by a message that
+//! In: a [`Sequence`], which is a folder in the OTB layout, in the order that [`Playback`] says. [`run`] tracks through
+//! it once for each seed.
+//!
+//! Out: a [`Report`] with the figures as a table or as JSON, among them how good the [score](calibration) is. A
+//! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants. [`plots`] draws them.
+//!
+//! What can go wrong: with frames and annotations that do not belong together the figures would mean nothing. So a
+//! sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, with a message that
 //! names the folder.
 
 pub mod ablation;
@@ -14,6 +17,7 @@ mod figures;
 pub mod frames;
 mod isotonic;
 pub mod measures;
+mod outcome;
 mod playback;
 pub mod plots;
 mod report;
@@ -26,6 +30,7 @@ mod variant;
 pub use comparison::Comparison;
 pub use figures::{Figures, Named, ScoreFigures, SeedMean};
 pub use isotonic::Isotonic;
+pub use outcome::{HIT_OVERLAP, Outcome};
 pub use playback::Playback;
 pub use report::Report;
 pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};

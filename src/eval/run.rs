@@ -1,7 +1,6 @@
 //! Runs: one sequence, several seeds.
 
-use super::calibration::{HIT_OVERLAP, Judged};
-use super::measures;
+use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
 use crate::tracker::{Params, Tracker, TrackerError};
 use std::num::NonZeroUsize;
@@ -65,10 +64,10 @@ pub struct SequenceRuns {
 
 impl SequenceRuns {
     /// Scores and hits of all frames of all seeds.
-    pub fn outcomes(&self) -> Vec<Judged> {
+    pub fn outcomes(&self) -> Vec<Outcome> {
         let scored = self.seeds.iter().flat_map(|seed| &seed.scored);
         scored
-            .map(|frame| Judged {
+            .map(|frame| Outcome {
                 score: frame.score,
                 hit: frame.overlap >= HIT_OVERLAP,
             })
@@ -100,8 +99,8 @@ impl SeedRun {
             };
             scored.push(ScoredFrame {
                 index,
-                center_error: measures::center_error(&estimate.target, annotated),
-                overlap: measures::overlap(&estimate.target, annotated),
+                center_error: estimate.target.center_distance(annotated),
+                overlap: estimate.target.overlap(annotated),
                 score: f64::from(estimate.score),
             });
         }

@@ -1,35 +1,11 @@
-//! Boxes and answers as they are sent and received.
+//! Answers as they are sent.
 
-use crate::tracker::{Estimate, Rect, Status};
+use super::target_box::TargetBox;
+use crate::tracker::{Estimate, Status};
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
-/// A box in the pixels of the uploaded frame; the origin is the frame's top-left corner. It may reach over
-/// the edge.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, utoipa::ToSchema)]
-#[schema(as = Box, example = json!({"x": 10.0, "y": 20.0, "width": 30.0, "height": 40.0}))]
-pub struct TargetBox {
-    /// Left edge.
-    x: f64,
-    /// Top edge.
-    y: f64,
-    /// Width, above 0.
-    width: f64,
-    /// Height, above 0.
-    height: f64,
-}
-
-impl From<Rect> for TargetBox {
-    fn from(rect: Rect) -> Self {
-        Self {
-            x: rect.x,
-            y: rect.y,
-            width: rect.width,
-            height: rect.height,
-        }
-    }
-}
-
-/// Whether the tracker believes its own box.
+/// How sure the tracker is of its box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Status)]
@@ -81,14 +57,27 @@ impl From<Estimate> for Answer {
 /// The answers to several frames, in the order of the frames.
 #[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
 pub struct Answers {
-    /// One answer a frame.
+    /// One answer for each frame.
     answers: Vec<Answer>,
 }
 
-impl From<&[Estimate]> for Answers {
+/// One answer for one frame; a list of answers for several.
+#[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
+#[serde(untagged)]
+pub enum FrameAnswers {
+    /// The answer to the only frame.
+    One(Answer),
+    /// The answers to several frames.
+    Several(Answers),
+}
+
+impl From<&[Estimate]> for FrameAnswers {
     fn from(estimates: &[Estimate]) -> Self {
-        Self {
-            answers: estimates.iter().copied().map(Answer::from).collect(),
+        match *estimates {
+            [one] => Self::One(one.into()),
+            _ => Self::Several(Answers {
+                answers: estimates.iter().copied().map(Answer::from).collect(),
+            }),
         }
     }
 }
@@ -107,5 +96,13 @@ pub struct ImageSize {
 impl From<(u32, u32)> for ImageSize {
     fn from((width, height): (u32, u32)) -> Self {
         Self { width, height }
+    }
+}
+
+/// Marks an answer that was given before.
+pub fn replayed_header(replayed: bool, response: Response) -> Response {
+    match replayed {
+        true => ([("replayed", "true")], response).into_response(),
+        false => response,
     }
 }

@@ -1,205 +1,184 @@
-//! Every setting of the service, with its flag, its variable and its range.
+//! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
+//! environment variable, which only the program reads.
 
 use crate::ingest;
-use clap::Parser;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Config {
     /// Address to listen on; port 0 picks a free one.
-    #[arg(long, env = "BAGTRACK_LISTEN", default_value = "127.0.0.1:8080")]
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen))]
     pub listen: SocketAddr,
     /// Frames decoded and tracked at the same time [default: the number of cores].
-    #[arg(long, env = "BAGTRACK_WORKERS")]
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_WORKERS"))]
     pub workers: Option<usize>,
     /// Requests with a frame that are inside at the same time, the ones at work included.
-    #[arg(long, env = "BAGTRACK_QUEUE", default_value_t = 256)]
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_QUEUE", default_value_t = Config::default().queue))]
     pub queue: usize,
     /// Most sessions alive.
-    #[arg(long, env = "BAGTRACK_MAX_SESSIONS", default_value_t = 1024)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_SESSIONS",
+        default_value_t = Config::default().max_sessions
+    ))]
     pub max_sessions: usize,
     /// Requests at one session at the same time, the one at work included.
-    #[arg(long, env = "BAGTRACK_SESSION_QUEUE", default_value_t = 8)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SESSION_QUEUE",
+        default_value_t = Config::default().session_queue
+    ))]
     pub session_queue: usize,
     /// A session that is not used for this long expires.
-    #[arg(long, env = "BAGTRACK_SESSION_IDLE", default_value = "10m", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SESSION_IDLE",
+        default_value = shown(Config::default().session_idle),
+        value_parser = humantime::parse_duration
+    ))]
     pub session_idle: Duration,
     /// Most bytes of a request body.
-    #[arg(long, env = "BAGTRACK_MAX_BODY_BYTES", default_value_t = 32 << 20)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_BODY_BYTES",
+        default_value_t = Config::default().max_body_bytes
+    ))]
     pub max_body_bytes: usize,
     /// Most bytes of all request bodies together; one of unknown length counts as the largest.
-    #[arg(long, env = "BAGTRACK_MAX_UPLOAD_BYTES", default_value_t = 512 << 20)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_UPLOAD_BYTES",
+        default_value_t = Config::default().max_upload_bytes
+    ))]
     pub max_upload_bytes: usize,
     /// Most frames of one post.
-    #[arg(long, env = "BAGTRACK_MAX_FRAMES", default_value_t = 64)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_FRAMES",
+        default_value_t = Config::default().max_frames
+    ))]
     pub max_frames: usize,
     /// Most bytes of one encoded frame.
-    #[arg(long, env = "BAGTRACK_MAX_FRAME_BYTES", default_value_t = ingest::Limits::default().max_bytes)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_FRAME_BYTES",
+        default_value_t = Config::default().max_frame_bytes
+    ))]
     pub max_frame_bytes: usize,
     /// Longest side of a frame in pixels.
-    #[arg(long, env = "BAGTRACK_MAX_FRAME_SIDE", default_value_t = ingest::Limits::default().max_side)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_FRAME_SIDE",
+        default_value_t = Config::default().max_frame_side
+    ))]
     pub max_frame_side: u32,
     /// Most pixels of a frame.
-    #[arg(long, env = "BAGTRACK_MAX_FRAME_PIXELS", default_value_t = ingest::Limits::default().max_pixels)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_FRAME_PIXELS",
+        default_value_t = Config::default().max_frame_pixels
+    ))]
     pub max_frame_pixels: u64,
     /// Most memory in bytes that decoding one frame may take.
-    #[arg(long, env = "BAGTRACK_MAX_FRAME_MEMORY", default_value_t = ingest::Limits::default().max_memory)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_FRAME_MEMORY",
+        default_value_t = Config::default().max_frame_memory
+    ))]
     pub max_frame_memory: u64,
     /// Most connections open at the same time.
-    #[arg(long, env = "BAGTRACK_MAX_CONNECTIONS", default_value_t = 4096)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_CONNECTIONS",
+        default_value_t = Config::default().max_connections
+    ))]
     pub max_connections: usize,
     /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
     /// commas; `*` for all.
-    #[arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')
+    )]
     pub cors_origins: Vec<String>,
     /// Time for a client to send its request head; a connection that is idle for longer is closed too.
-    #[arg(long, env = "BAGTRACK_HEADER_TIMEOUT", default_value = "30s", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_HEADER_TIMEOUT",
+        default_value = shown(Config::default().header_timeout),
+        value_parser = humantime::parse_duration
+    ))]
     pub header_timeout: Duration,
     /// Time for a client to send its request body.
-    #[arg(long, env = "BAGTRACK_BODY_TIMEOUT", default_value = "30s", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_BODY_TIMEOUT",
+        default_value = shown(Config::default().body_timeout),
+        value_parser = humantime::parse_duration
+    ))]
     pub body_timeout: Duration,
     /// Time for a request to wait for its session and a worker and to be worked on.
-    #[arg(long, env = "BAGTRACK_WORK_TIMEOUT", default_value = "30s", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_WORK_TIMEOUT",
+        default_value = shown(Config::default().work_timeout),
+        value_parser = humantime::parse_duration
+    ))]
     pub work_timeout: Duration,
     /// On SIGTERM, /readyz answers 503 for this long before connections are refused, so that a load
     /// balancer notices.
-    #[arg(long, env = "BAGTRACK_SHUTDOWN_DELAY", default_value = "0s", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SHUTDOWN_DELAY",
+        default_value = shown(Config::default().shutdown_delay),
+        value_parser = humantime::parse_duration
+    ))]
     pub shutdown_delay: Duration,
     /// Time for open requests to end on shutdown.
-    #[arg(long, env = "BAGTRACK_SHUTDOWN_TIMEOUT", default_value = "20s", value_parser = humantime::parse_duration)]
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SHUTDOWN_TIMEOUT",
+        default_value = shown(Config::default().shutdown_timeout),
+        value_parser = humantime::parse_duration
+    ))]
     pub shutdown_timeout: Duration,
 }
 
-/// A setting out of its range.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("--{flag} (BAGTRACK_{variable}) must be {expected}")]
-pub struct ConfigError {
-    flag: &'static str,
-    variable: String,
-    expected: &'static str,
-}
-
-#[derive(Parser)]
-struct Defaults {
-    #[command(flatten)]
-    config: Config,
+/// A duration as flags have it.
+#[cfg(feature = "cli")]
+fn shown(duration: Duration) -> String {
+    humantime::format_duration(duration).to_string()
 }
 
 impl Default for Config {
+    /// The settings that hold where no other is given. Neither flags nor the environment are read.
     fn default() -> Self {
-        Defaults::parse_from(["bagtrack"]).config
+        let limits = ingest::Limits::default();
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            workers: None,
+            queue: 256,
+            max_sessions: 1024,
+            session_queue: 8,
+            session_idle: Duration::from_secs(600),
+            max_body_bytes: 32 << 20,
+            max_upload_bytes: 512 << 20,
+            max_frames: 64,
+            max_frame_bytes: limits.max_bytes,
+            max_frame_side: limits.max_side,
+            max_frame_pixels: limits.max_pixels,
+            max_frame_memory: limits.max_memory,
+            max_connections: 4096,
+            cors_origins: Vec::new(),
+            header_timeout: Duration::from_secs(30),
+            body_timeout: Duration::from_secs(30),
+            work_timeout: Duration::from_secs(30),
+            shutdown_delay: Duration::ZERO,
+            shutdown_timeout: Duration::from_secs(20),
+        }
     }
 }
 
 impl Config {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// The first setting that is out of its range, by its flag and variable.
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        // The queue, the connections and the sessions' places are semaphores, which have this limit.
-        let semaphore = 1..=tokio::sync::Semaphore::MAX_PERMITS;
-        let moment = Duration::from_millis(1)..=Duration::from_secs(365 * 24 * 3600);
-        let uploads = self.max_body_bytes..=(4 << 40);
-        let is_origin = |text: &String| {
-            let host = text.split_once("://").map_or("", |(_, host)| host);
-            let plain = host
-                .bytes()
-                .all(|byte| byte.is_ascii_graphic() && byte != b'/');
-            text == "*" || (!host.is_empty() && plain)
-        };
-        let positive = "at least 1";
-        let duration = "between 1ms and 1 year";
-        let checks = [
-            (
-                "workers",
-                self.workers.is_none_or(|n| semaphore.contains(&n)),
-                positive,
-            ),
-            ("queue", semaphore.contains(&self.queue), positive),
-            ("max-sessions", self.max_sessions >= 1, positive),
-            (
-                "session-queue",
-                semaphore.contains(&self.session_queue),
-                positive,
-            ),
-            (
-                "session-idle",
-                moment.contains(&self.session_idle),
-                duration,
-            ),
-            ("max-body-bytes", self.max_body_bytes >= 1, positive),
-            (
-                "max-upload-bytes",
-                uploads.contains(&self.max_upload_bytes),
-                "at least max-body-bytes, at most 4 TiB",
-            ),
-            ("max-frames", self.max_frames >= 1, positive),
-            ("max-frame-bytes", self.max_frame_bytes >= 1, positive),
-            ("max-frame-side", self.max_frame_side >= 1, positive),
-            ("max-frame-pixels", self.max_frame_pixels >= 1, positive),
-            ("max-frame-memory", self.max_frame_memory >= 1, positive),
-            (
-                "max-connections",
-                semaphore.contains(&self.max_connections),
-                positive,
-            ),
-            (
-                "cors-origins",
-                self.cors_origins.iter().all(is_origin),
-                "origins like https://example.org, or *",
-            ),
-            (
-                "header-timeout",
-                moment.contains(&self.header_timeout),
-                duration,
-            ),
-            (
-                "body-timeout",
-                moment.contains(&self.body_timeout),
-                duration,
-            ),
-            (
-                "work-timeout",
-                moment.contains(&self.work_timeout),
-                duration,
-            ),
-            (
-                "shutdown-delay",
-                self.shutdown_delay <= *moment.end(),
-                "at most 1 year",
-            ),
-            (
-                "shutdown-timeout",
-                self.shutdown_timeout <= *moment.end(),
-                "at most 1 year",
-            ),
-        ];
-        match checks.into_iter().find(|(_, holds, _)| !holds) {
-            None => Ok(()),
-            Some((flag, _, expected)) => Err(ConfigError {
-                flag,
-                variable: flag.to_uppercase().replace('-', "_"),
-                expected,
-            }),
-        }
-    }
-
     /// The number of workers, with its default.
     pub fn worker_count(&self) -> usize {
         self.workers.unwrap_or_else(cores)
     }
 
-    /// The number of threads that serve connections. Reading and answering a request takes a tenth of the time that its
-    /// frame takes a worker; and with fewer threads there are fewer to wake for it.
+    /// The number of threads that serve connections. Reading and answering a request takes them about a tenth of the
+    /// time that its frame takes a worker, and fewer threads are woken less often.
     pub fn network_threads(&self) -> usize {
         self.worker_count().div_ceil(8).clamp(1, cores())
     }
 
-    /// What a frame may cost.
+    /// The limits of one frame.
     pub fn frame_limits(&self) -> ingest::Limits {
         ingest::Limits {
             max_bytes: self.max_frame_bytes,
@@ -218,21 +197,33 @@ fn cores() -> usize {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_defaults_are_valid() {
-        assert_eq!(Config::default().validate(), Ok(()));
-    }
+    /// Set for the process that [`the_defaults_do_not_come_from_the_environment`] starts.
+    const CHILD: &str = "BAGTRACK_TEST_CHILD";
 
     #[test]
-    fn a_setting_out_of_range_is_named() {
-        let config = Config {
-            max_frames: 0,
-            ..Config::default()
-        };
-        let message = config.validate().unwrap_err().to_string();
-        assert_eq!(
-            message,
-            "--max-frames (BAGTRACK_MAX_FRAMES) must be at least 1"
+    fn the_defaults_do_not_come_from_the_environment() {
+        if std::env::var_os(CHILD).is_some() {
+            let defaults = Config::default();
+            assert_eq!((defaults.queue, defaults.workers), (256, None));
+            println!("the defaults are as they should be");
+            return;
+        }
+        // Another process, since the environment of this one cannot be changed while other tests run.
+        let tests = std::env::current_exe().unwrap();
+        let mut command = std::process::Command::new(tests);
+        command.args([
+            "the_defaults_do_not_come_from_the_environment",
+            "--nocapture",
+        ]);
+        command.env(CHILD, "1");
+        command.env("BAGTRACK_WORKERS", "3");
+        command.env("BAGTRACK_QUEUE", "no number");
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{output:?}");
+        assert!(
+            said.contains("the defaults are as they should be"),
+            "{said}"
         );
     }
 }

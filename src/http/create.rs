@@ -1,27 +1,78 @@
 //! `POST /sessions`: a first frame and a box, or a snapshot, open a session.
 
-use super::answer::{ImageSize, TargetBox};
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
+use super::advance;
+use super::answer::ImageSize;
+use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
-use super::upload::{Form, Received, Upload};
+use super::target_box::TargetBox;
+use super::upload::overrides::{ParamOverrides, PresetName};
+use super::upload::settings::{FrameCount, Settings, WholeNumber};
+use super::upload::texts::Texts;
+use super::upload::uploaded::Upload;
 use super::work;
-use crate::sessions::{Fingerprint, SNAPSHOT_MAGIC, Session, State as SessionState};
-use crate::tracker::{Params, Tracker};
+use crate::sessions::{Fingerprint, QueuePermit, SNAPSHOT_MAGIC, Session, SessionState};
+use crate::tracker::{Params, Preset, Tracker};
 use axum::Json;
-use axum::extract::{Request, State};
+use axum::extract::{FromRequest, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-const FORM: Form = Form {
-    settings: &["box", "preset", "seed", "params"],
-    numbered: false,
-    several: false,
-};
+/// The settings of a new session.
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct CreateSettings {
+    /// The target's box: `x,y,width,height`, or a JSON object with these names. May be in the query or in the body.
+    #[param(value_type = String, required = false, example = "10,20,30,40")]
+    #[schema(nullable = false)]
+    r#box: Option<TargetBox>,
+    /// `robust` (the default) or `paper`.
+    #[param(nullable = false)]
+    #[schema(nullable = false)]
+    preset: Option<PresetName>,
+    /// Seed of all random draws; a random one when left out.
+    #[param(value_type = u64, required = false)]
+    #[schema(value_type = Option<u64>, nullable = false)]
+    seed: Option<WholeNumber>,
+    /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
+    /// together; see the call.
+    #[param(value_type = String, required = false, example = "{\"seed\": 7}")]
+    #[schema(nullable = false)]
+    params: Option<ParamOverrides>,
+}
+
+impl Settings for CreateSettings {
+    const FRAMES: FrameCount = FrameCount::One;
+    const SCHEMA_PREFIX: &'static str = "Create";
+}
+
+type CreateForm = FormBody<CreateSettings>;
+type CreateJson = JsonBody<CreateSettings>;
+
+/// A request to open a session, with its place in the queue.
+#[derive(Debug)]
+pub struct CreateRequest {
+    queue: QueuePermit,
+    upload: Upload<CreateSettings>,
+}
+
+impl FromRequest<AppState> for CreateRequest {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
+        let texts = Texts::of_query::<CreateSettings>(request.uri())?;
+        state.registry.check_room()?;
+        let queue = state.enter(request.headers())?;
+        let upload = Upload::read(state, &queue, texts, request).await?;
+        Ok(Self { queue, upload })
+    }
+}
 
 /// A new session.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
@@ -36,7 +87,7 @@ pub struct CreatedSession {
     /// The size that all frames of the session have.
     image: ImageSize,
     /// The tracker's parameters, with the seed that was drawn when none was given.
-    #[schema(value_type = Object, example = json!({"seed": 7}))]
+    #[schema(value_type = ParamOverrides)]
     params: Params,
     /// When the session ends if it is not used again (RFC 3339); every request on it moves this on.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
@@ -57,63 +108,6 @@ impl CreatedSession {
     }
 }
 
-/// A named set of the tracker's parameters.
-#[derive(utoipa::ToSchema)]
-#[schema(as = Preset)]
-#[serde(rename_all = "snake_case")]
-#[expect(dead_code, reason = "a schema; the names are read by `upload`")]
-enum PresetName {
-    /// The equations and numbers of the paper.
-    Paper,
-    /// The default: mended where the printed equations lose the object.
-    Robust,
-}
-
-/// A form with one frame and the settings of a new session.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct CreateForm {
-    /// The first frame: a JPEG, PNG or WebP file. Or a session snapshot; then nothing else is given.
-    #[schema(format = Binary, content_media_type = "application/octet-stream")]
-    frame: String,
-    /// `x,y,width,height`, or a JSON object with these names. May be in the query instead.
-    #[schema(example = "10,20,30,40")]
-    #[schema(nullable = false)]
-    r#box: Option<String>,
-    /// `robust` (the default) or `paper`.
-    #[schema(nullable = false)]
-    preset: Option<PresetName>,
-    /// Seed of all random draws; a random one when left out.
-    #[schema(nullable = false)]
-    seed: Option<u64>,
-    /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit together;
-    /// see the call.
-    #[schema(example = "{\"seed\": 7}")]
-    #[schema(nullable = false)]
-    params: Option<String>,
-}
-
-/// One frame as base64 and the settings of a new session.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct CreateJson {
-    /// The first frame as base64 (or a data URL): a JPEG, PNG or WebP file, or a session snapshot.
-    #[schema(content_encoding = "base64")]
-    frame: String,
-    /// The target's box; the text `x,y,width,height` is taken too. May be in the query instead.
-    #[schema(nullable = false)]
-    r#box: Option<TargetBox>,
-    /// `robust` (the default) or `paper`.
-    #[schema(nullable = false)]
-    preset: Option<PresetName>,
-    /// Seed of all random draws; a random one when left out.
-    #[schema(nullable = false)]
-    seed: Option<u64>,
-    /// Parameters that are set otherwise than in the preset. Each has a range, and some have a limit together; see the call.
-    #[schema(value_type = Option<Object>)]
-    params: Option<()>,
-}
-
 struct Problems;
 
 impl utoipa::IntoResponses for Problems {
@@ -126,7 +120,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::InvalidSnapshot,
             Kind::TooManySessions,
         ];
-        openapi::problems(&[openapi::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, own])
     }
 }
 
@@ -135,66 +129,71 @@ impl utoipa::IntoResponses for Problems {
 /// The first frame and the target's box start the tracker. A session snapshot in the place of the frame, with
 /// nothing else, restores that session under a new id; it goes on exactly where it stood.
 ///
-/// Every parameter has a range, and the sizes that multiply have limits together, so that no session is out of proportion in
-/// time or memory. With F numbers in a feature vector (patch_width × patch_height, and ten times that for `gradients`),
-/// these are at most: particles × F, 1,100,000; (bag_size × (basis_dim + 1) + background_samples) × F, 1,000,000;
-/// background_samples × (particles + bag_size × (history + 1)) × F, 110,000,000. And pinned is less than bag_size. A
-/// parameter out of these answers `invalid-parameter`, with the limit in its detail.
+/// Every parameter has a range. Sizes that multiply have limits together, which bound the time and memory of a session.
+/// With F numbers in a feature vector (patch_width × patch_height, and ten times that for `gradients`), at most:
+/// particles × F, 1,100,000; (bag_size × (basis_dim + 1) + background_samples) × F, 1,000,000; background_samples ×
+/// (particles + bag_size × (history + 1)) × F, 110,000,000. And pinned is less than bag_size. A parameter out of these
+/// answers `invalid-parameter`, with the limit in its detail.
 ///
 /// `curl --data-binary @first.jpg 'http://localhost:8080/sessions?box=10,20,30,40'`
 #[utoipa::path(
     post, path = "/sessions", tag = "sessions", operation_id = "createSession",
-    params(
-        ("box" = Option<String>, Query, description = "The target's box, `x,y,width,height`; may be in the body instead.", example = "10,20,30,40"),
-        ("preset" = Option<PresetName>, Query, description = "`robust` when left out."),
-        ("seed" = Option<u64>, Query, description = "Seed of all random draws; a random one when left out."),
-        ("params" = Option<String>, Query, description = "A JSON object of parameters that are set otherwise than in the preset.", example = "{\"seed\": 7}"),
-    ),
+    params(CreateSettings),
     request_body(
         description = "The first frame in one of three forms, or a snapshot.",
         content(
             (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
             (CreateForm = "multipart/form-data"),
-            (CreateJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…", "box": {"x": 10, "y": 20, "width": 30, "height": 40}, "seed": 7})),
+            (
+                CreateJson = "application/json",
+                example = json!({
+                    "frame": "/9j/4AAQSkZJRg…",
+                    "box": {"x": 10, "y": 20, "width": 30, "height": 40},
+                    "seed": 7
+                })
+            ),
             (Vec<u8> = "application/vnd.bagtrack.snapshot"),
         )
     ),
     responses(
-        (status = 201, description = "The session is open", body = CreatedSession, headers(("Location" = String, description = "The session's path"))),
+        (
+            status = 201, description = "The session is open", body = CreatedSession,
+            headers(("Location" = String, description = "The session's path"))
+        ),
         Problems
     )
 )]
-pub async fn create(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
-    let too_many = |_| Problem::too_many_sessions();
-    let has_room = || state.registry.check_room().map_err(too_many);
-    let Received { queue, upload, .. } = FORM.receive(&state, request, has_room).await?;
-    let started = match is_snapshot(&upload) {
+pub async fn create(
+    State(state): State<AppState>,
+    CreateRequest { queue, upload }: CreateRequest,
+) -> Result<Response, Problem> {
+    let is_snapshot = upload.is_snapshot || upload.files[0].starts_with(SNAPSHOT_MAGIC);
+    let opened = match is_snapshot {
         true => restore(&state, queue, upload).await?,
         false => start(&state, queue, upload).await?,
     };
-    let session = state.registry.insert(started).map_err(too_many)?;
+    let session = state.registry.insert(opened)?;
     tracing::info!(session = %session.id(), "opened");
     let location = [(LOCATION, format!("/sessions/{}", session.id()))];
     let created = Json(CreatedSession::of(&state, &session));
     Ok((StatusCode::CREATED, location, created).into_response())
 }
 
-fn is_snapshot(upload: &Upload) -> bool {
-    upload.is_snapshot || upload.frames[0].starts_with(SNAPSHOT_MAGIC)
-}
-
 async fn start(
     state: &AppState,
-    queue: crate::sessions::QueuePermit,
-    upload: Upload,
+    queue: QueuePermit,
+    upload: Upload<CreateSettings>,
 ) -> Result<SessionState, Problem> {
-    let target = upload.fields.target.ok_or_else(Problem::missing_box)?;
-    let params = upload.fields.tracker_params()?;
+    let settings = upload.settings;
+    let target = settings.r#box.ok_or_else(Problem::missing_box)?.into();
+    let preset = settings.preset.map_or_else(Preset::default, Preset::from);
+    let params = settings.params.unwrap_or_default();
+    let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
     let start = move || {
-        let frame = &work::decode(&upload.frames, &limits)?[0];
-        let tracker = Tracker::new(frame, target, params).map_err(Problem::tracker)?;
-        let fingerprint = Fingerprint::of(&upload.frames[0]);
+        let frame = &advance::decode(&upload.files, &limits)?[0];
+        let tracker = Tracker::new(frame, target, params)?;
+        let fingerprint = Fingerprint::of(&upload.files[0]);
         Ok(SessionState::new(tracker, fingerprint, target))
     };
     work::run(state, queue, start).await
@@ -202,14 +201,13 @@ async fn start(
 
 async fn restore(
     state: &AppState,
-    queue: crate::sessions::QueuePermit,
-    upload: Upload,
+    queue: QueuePermit,
+    upload: Upload<CreateSettings>,
 ) -> Result<SessionState, Problem> {
-    if !upload.fields.is_empty() {
+    if upload.settings != CreateSettings::default() {
         let detail = "A snapshot holds the box and the parameters; leave out all settings.";
         return Err(Problem::malformed(detail));
     }
-    let restore =
-        move || SessionState::restore(&upload.frames[0]).map_err(Problem::invalid_snapshot);
+    let restore = move || Ok(SessionState::restore(&upload.files[0])?);
     work::run(state, queue, restore).await
 }

@@ -1,7 +1,7 @@
-//! `/openapi.json`, and `/docs`: Swagger UI out of the binary, so that it works without any other host.
+//! `/openapi.json`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
-use super::openapi;
-use super::problem::Problem;
+use super::api;
+use super::problems::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
@@ -11,11 +11,11 @@ use std::sync::{Arc, LazyLock};
 use utoipa_swagger_ui::Config;
 
 static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| {
-    let document = openapi::document().to_pretty_json();
+    let document = api::document().to_pretty_json();
     document.expect("the document is plain JSON").into()
 });
 
-// The default validator would be another host.
+// The default validator is on another host.
 static SWAGGER: LazyLock<Arc<Config<'static>>> =
     LazyLock::new(|| Arc::new(Config::new(["/openapi.json"]).validator_url("none")));
 

@@ -1,10 +1,9 @@
-//! Takes in the rest of a body that a handler refused.
+//! Reads the rest of a body that a handler refused, and throws it away.
 //!
-//! A server that answers and closes while the client still sends makes the client's system report a broken
-//! connection, and the problem document is lost on the way. So when an error is answered before the body was
-//! read, the rest is read and thrown away, within bounds: at most as many bytes as a body may have, and
-//! until the body's deadline. A client that waits for `100 Continue` sends nothing before it, and is
-//! answered at once.
+//! If a server answers and closes while the client still sends, the client's system reports a broken connection, and the
+//! problem document is lost. So when an error is answered before the body was read, the rest is read, within bounds: at
+//! most as many bytes as a body may have, until the deadline of the body. A client that waits for `100 Continue` has
+//! sent nothing, and is answered at once.
 
 use super::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};
@@ -45,7 +44,7 @@ pub async fn drain_refused(
     response
 }
 
-/// A body that gives its rest back when it is dropped.
+/// A body that sends its rest back when it is dropped.
 struct Returning {
     body: Option<Body>,
     polled: bool,
@@ -55,7 +54,7 @@ struct Returning {
 impl Drop for Returning {
     fn drop(&mut self) {
         if let (Some(body), Some(give_back)) = (self.body.take(), self.give_back.take()) {
-            // Nobody waits when the request itself was dropped.
+            // It cannot be sent when the request itself was dropped.
             let _ = give_back.send((body, self.polled));
         }
     }

@@ -1,58 +1,38 @@
 //! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
 
-use super::answer::{Answer, Answers};
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
-use super::session_path::SessionPath;
+use super::advance::{Answered, NextFrames};
+use super::answer::{FrameAnswers, replayed_header};
+use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
-use super::upload::{Form, Received};
+use super::upload::session_request::SessionRequest;
+use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
-use crate::ingest;
-use crate::sessions::{Fingerprint, Locked, Turn};
-use crate::tracker::{Estimate, GrayFrame, TrackerError};
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Request, State};
+use axum::extract::State;
 use axum::response::{IntoResponse, Response};
-use std::time::Instant;
+use serde::Deserialize;
 
-const FORM: Form = Form {
-    settings: &[],
-    numbered: true,
-    several: true,
-};
-
-/// A form with frames.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct FramesForm {
-    /// A JPEG, PNG or WebP file; the part may come several times.
-    #[schema(format = Binary, content_media_type = "application/octet-stream")]
-    frame: Vec<String>,
+/// The settings of a request with the next frames.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct FramesSettings {
+    /// The number of the (first) frame of this request.
+    #[param(value_type = u64, required = false)]
+    #[schema(value_type = Option<u64>, nullable = false)]
+    frame: Option<WholeNumber>,
 }
 
-/// Frames as base64 (or data URLs): `frame` for one, `frames` for several.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct FramesJson {
-    /// One frame.
-    #[schema(content_encoding = "base64")]
-    #[schema(nullable = false)]
-    frame: Option<String>,
-    /// Several frames, in order.
-    #[schema(nullable = false)]
-    frames: Option<Vec<String>>,
+impl Settings for FramesSettings {
+    const FRAMES: FrameCount = FrameCount::Several;
+    const SCHEMA_PREFIX: &'static str = "Frames";
 }
 
-/// One answer for one frame; a list of answers for several.
-#[derive(utoipa::ToSchema)]
-#[serde(untagged)]
-#[expect(dead_code, reason = "a schema; the two are sent as they are")]
-enum FrameAnswers {
-    One(Answer),
-    Several(Answers),
-}
+type FramesForm = FormBody<FramesSettings>;
+type FramesJson = JsonBody<FramesSettings>;
 
 struct Problems;
 
@@ -66,7 +46,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
         ];
-        openapi::problems(&[openapi::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, own])
     }
 }
 
@@ -84,7 +64,7 @@ impl utoipa::IntoResponses for Problems {
     post, path = "/sessions/{id}/frames", tag = "sessions", operation_id = "postFrames",
     params(
         ("id" = Uuid, Path, description = "The session's id"),
-        ("frame" = Option<u64>, Query, description = "The number of the (first) frame of this request."),
+        FramesSettings,
     ),
     request_body(
         description = "The frame in one of three forms; the second and third take several.",
@@ -95,82 +75,28 @@ impl utoipa::IntoResponses for Problems {
         )
     ),
     responses(
-        (status = 200, description = "Where the target is", body = FrameAnswers, headers(("Replayed" = bool, description = "`true` where these answers were given before"))),
+        (
+            status = 200, description = "Where the target is", body = FrameAnswers,
+            headers(("Replayed" = bool, description = "`true` where these answers were given before"))
+        ),
         Problems
     )
 )]
 pub async fn post(
     State(state): State<AppState>,
-    path: SessionPath,
-    request: Request,
+    request: SessionRequest<FramesSettings>,
 ) -> Result<Response, Problem> {
-    let Received {
-        admitted: place,
-        queue,
-        upload,
-    } = FORM.receive(&state, request, || path.enter(&state)).await?;
-    let number = upload.fields.number;
-    let limits = state.config.frame_limits();
-    let is_brief = work::is_brief(place.session(), &upload.frames);
-    let (estimates, replayed) = work::on_session(&state, place, queue, is_brief, move |locked| {
-        let started = Instant::now();
-        let answered = advance(locked, number, &upload.frames, &limits);
-        locked.session().took(started.elapsed());
-        answered
-    })
-    .await?;
-    let response = match estimates[..] {
-        [one] => Json(Answer::from(one)).into_response(),
-        _ => Json(Answers::from(&estimates[..])).into_response(),
+    let next = NextFrames {
+        number: request.upload.settings.frame.map(|number| number.0),
+        files: request.upload.files,
+        correction: None,
     };
-    Ok(replayed_header(replayed, response))
-}
-
-/// Marks an answer that was given before.
-pub fn replayed_header(replayed: bool, response: Response) -> Response {
-    match replayed {
-        true => ([("replayed", "true")], response).into_response(),
-        false => response,
-    }
-}
-
-/// Refuses a frame whose size is not the session's.
-pub fn check_size(frame: &GrayFrame, (width, height): (u32, u32)) -> Result<(), Problem> {
-    let (got_width, got_height) = frame.source_size();
-    if (got_width, got_height) == (width, height) {
-        return Ok(());
-    }
-    Err(Problem::tracker(TrackerError::FrameSize {
-        width,
-        height,
-        got_width,
-        got_height,
-    }))
-}
-
-/// The answers, and whether they were given before.
-fn advance(
-    locked: &mut Locked,
-    number: Option<u64>,
-    frames: &[Bytes],
-    limits: &ingest::Limits,
-) -> Result<(Vec<Estimate>, bool), Problem> {
-    let fingerprints: Vec<Fingerprint> =
-        frames.iter().map(|frame| Fingerprint::of(frame)).collect();
-    let turn = locked.state().turn(number, &fingerprints, None);
-    if let Turn::Replay(estimates) = turn.map_err(Problem::replay)? {
-        return Ok((estimates, true));
-    }
-    let decoded = work::decode(frames, limits)?;
-    let size = locked.session().source_size();
-    for (index, frame) in decoded.iter().enumerate() {
-        check_size(frame, size).map_err(|problem| problem.of_frame(index, frames.len()))?;
-    }
-    let decoded: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
-    let estimates = locked.state().step(&decoded);
-    decoded
-        .into_iter()
-        .for_each(|(_, frame)| ingest::recycle(frame));
-    let refused = |(index, error)| Problem::tracker(error).of_frame(index, frames.len());
-    Ok((estimates.map_err(refused)?, false))
+    let limits = state.config.frame_limits();
+    let advance = move |locked: &mut _| next.advance(locked, &limits);
+    let Answered {
+        estimates,
+        replayed,
+    } = work::on_session(&state, request.permit, request.queue, advance).await?;
+    let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
+    Ok(replayed_header(replayed, answers))
 }

@@ -1,14 +1,14 @@
-//! `/healthz` and `/readyz`: whether the process runs, and whether it wants requests.
+//! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
+use super::openapi::problem_responses::{self, problem_responses};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
 
-/// The service is well.
+/// The service runs.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 pub struct Health {
     /// Always `ok`.
@@ -23,7 +23,7 @@ struct LiveProblems;
 impl utoipa::IntoResponses for LiveProblems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        openapi::problems(&[openapi::ALWAYS])
+        problem_responses(&[problem_responses::ALWAYS])
     }
 }
 
@@ -32,7 +32,7 @@ struct ReadyProblems;
 impl utoipa::IntoResponses for ReadyProblems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        openapi::problems(&[openapi::ALWAYS, &[Kind::NotReady]])
+        problem_responses(&[problem_responses::ALWAYS, &[Kind::NotReady]])
     }
 }
 

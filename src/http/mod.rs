@@ -1,9 +1,11 @@
-//! The HTTP interface: one file a resource, and around them what every request passes through.
+//! The HTTP interface: one file for each resource, and the layers that every request passes through.
 //!
-//! What could go wrong: clients that send headers or bodies slowly, or too much of them; bytes that are no
-//! image; more work than there are cores; a connection that breaks after a frame was taken. [`Application`]
-//! bounds the first, [`Config`] names every bound, and every error is a problem document whose cause stays in
-//! the log.
+//! In: connections. Out: JSON answers, or problem documents (RFC 9457). A request goes through the layers of the router,
+//! into an extractor that reads its upload, into its handler, which works on a session with a worker thread, and back.
+//!
+//! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
+//! work than there are cores; a connection breaks after a frame was taken. [`Application`] bounds the first, [`Config`]
+//! names every bound, numbered frames can be sent again, and the cause of an error is in the log only.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
@@ -16,10 +18,12 @@
 //! # }
 //! ```
 
+mod advance;
 mod answer;
-mod body;
+mod answer_problems;
+mod api;
 mod config;
-mod context;
+mod config_validation;
 mod create;
 mod docs;
 mod drain;
@@ -27,8 +31,8 @@ mod frames;
 mod health;
 mod openapi;
 mod page;
-mod problem;
-mod problem_kind;
+mod problems;
+mod request_id;
 mod router;
 mod server;
 mod session;
@@ -36,11 +40,13 @@ mod session_path;
 mod snapshot;
 mod state;
 mod target;
+mod target_box;
 mod upload;
 mod work;
 
-pub use config::{Config, ConfigError};
-pub use openapi::document as openapi_document;
-pub use problem_kind::Kind as ProblemKind;
+pub use api::document as openapi_document;
+pub use config::Config;
+pub use config_validation::ConfigError;
+pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

@@ -1,4 +1,4 @@
-//! `/`: what this is, for a person who opens the address in a browser.
+//! `/`: a page for people that says what the service is and how to call it.
 
 use axum::response::Html;
 

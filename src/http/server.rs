@@ -1,10 +1,10 @@
-//! Accepting connections, and ending well.
+//! Accepting connections, and ending.
 //!
-//! `axum::serve` has no time limit for request heads, so that a client that sends half a line holds its
-//! connection for ever; hyper's connection builder has one. Connections are counted, too, and on shutdown
-//! those that are busy get a bounded time to end.
+//! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
+//! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
 
-use super::config::{Config, ConfigError};
+use super::config::Config;
+use super::config_validation::ConfigError;
 use super::router::router;
 use super::state::AppState;
 use crate::sessions::Clock;
@@ -78,15 +78,15 @@ impl Application {
         self.listener.local_addr()
     }
 
-    /// Serves these routes too, behind the same limits and with the same errors.
+    /// Serves these routes too, behind the same layers.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
     }
 
-    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once; after the configured delay no
-    /// connection is accepted any more, and open requests get the configured time to end. Gives whether they all
-    /// did; those that did not are cut off.
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once. After the configured delay no connection is
+    /// accepted any more, and open requests get the configured time to end; then they are cut off. Returns whether all
+    /// of them ended in time.
     pub async fn serve(self, shutdown: impl Future<Output = ()>) -> bool {
         let Self {
             listener,
@@ -106,7 +106,7 @@ impl Application {
                 () = shutdown => {
                     tracing::info!("shutting down");
                     state.drain();
-                    // New connections are still served, so that they can be told.
+                    // New connections are still served: a load balancer asks for /readyz on them.
                     let _ = timeout(config.shutdown_delay, accepting).await;
                 }
             }

@@ -1,12 +1,13 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
 use super::answer::{Answer, ImageSize};
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
+use super::openapi::problem_responses::{self, problem_responses};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use super::upload;
+use super::upload::overrides::ParamOverrides;
+use super::upload::texts::refuse_query;
 use crate::tracker::Params;
 use axum::Json;
 use axum::extract::State;
@@ -14,7 +15,7 @@ use axum::http::{StatusCode, Uri};
 use serde::Serialize;
 use uuid::Uuid;
 
-/// Where a session stands.
+/// The state of a session.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 pub struct SessionView {
     /// The session's id.
@@ -27,7 +28,7 @@ pub struct SessionView {
     /// The size that all frames of the session have.
     image: ImageSize,
     /// The tracker's parameters.
-    #[schema(value_type = Object, example = json!({"seed": 7}))]
+    #[schema(value_type = ParamOverrides)]
     params: Params,
     /// When the session ends if it is not used again (RFC 3339); this request counts as use.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
@@ -40,7 +41,7 @@ impl utoipa::IntoResponses for Problems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[Kind::MalformedRequest, Kind::SessionNotFound];
-        openapi::problems(&[openapi::ALWAYS, own])
+        problem_responses(&[problem_responses::ALWAYS, own])
     }
 }
 
@@ -57,7 +58,7 @@ pub async fn get(
     path: SessionPath,
     uri: Uri,
 ) -> Result<Json<SessionView>, Problem> {
-    upload::NOTHING.query(&uri)?;
+    refuse_query(&uri)?;
     let session = path.find(&state)?;
     let latest = session.latest();
     Ok(Json(SessionView {
@@ -83,7 +84,7 @@ pub async fn delete(
     path: SessionPath,
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
-    upload::NOTHING.query(&uri)?;
+    refuse_query(&uri)?;
     let session = path.find(&state)?;
     match state.registry.remove(session.id()) {
         true => {

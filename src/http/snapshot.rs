@@ -1,12 +1,13 @@
-//! `GET /sessions/{id}/snapshot`: a session as bytes, to be carried elsewhere.
+//! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
+use super::openapi::problem_responses::{self, problem_responses};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use super::upload;
+use super::upload::texts::refuse_query;
 use super::work;
+use crate::sessions::LockedSession;
 use axum::extract::State;
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
@@ -27,7 +28,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::QueueFull,
             Kind::WorkTimeout,
         ];
-        openapi::problems(&[openapi::ALWAYS, own])
+        problem_responses(&[problem_responses::ALWAYS, own])
     }
 }
 
@@ -36,12 +37,16 @@ impl utoipa::IntoResponses for Problems {
 /// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version, to
 /// go on from there under a new id; this session lives on.
 ///
-/// `curl -o s.snapshot http://localhost:8080/sessions/$ID/snapshot && curl --data-binary @s.snapshot http://other:8080/sessions`
+/// `curl -o s.snapshot http://localhost:8080/sessions/$ID/snapshot &&
+/// curl --data-binary @s.snapshot http://other:8080/sessions`
 #[utoipa::path(
     get, path = "/sessions/{id}/snapshot", tag = "sessions", operation_id = "getSnapshot",
     params(("id" = Uuid, Path, description = "The session's id")),
     responses(
-        (status = 200, description = "The session as bytes", body = Vec<u8>, content_type = "application/vnd.bagtrack.snapshot"),
+        (
+            status = 200, description = "The session as bytes", body = Vec<u8>,
+            content_type = "application/vnd.bagtrack.snapshot"
+        ),
         Problems
     )
 )]
@@ -50,14 +55,11 @@ pub async fn get(
     path: SessionPath,
     uri: Uri,
 ) -> Result<Response, Problem> {
-    upload::NOTHING.query(&uri)?;
+    refuse_query(&uri)?;
     let session = path.find(&state)?;
-    let queue = state
-        .admission
-        .enter(0)
-        .map_err(|_| Problem::queue_full())?;
-    let place = session.enter().map_err(|_| Problem::session_busy())?;
-    let take = |locked: &mut crate::sessions::Locked| Ok(locked.state().snapshot());
-    let bytes = work::on_session(&state, place, queue, false, take).await?;
+    let queue = state.admission.enter(0)?;
+    let permit = session.enter()?;
+    let take = |locked: &mut LockedSession| Ok(locked.state().snapshot());
+    let bytes = work::on_session(&state, permit, queue, take).await?;
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], bytes).into_response())
 }

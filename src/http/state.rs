@@ -1,7 +1,7 @@
 //! What all handlers share.
 
 use super::config::Config;
-use super::problem::Problem;
+use super::problems::problem::Problem;
 use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
 use axum::http::HeaderMap;
 use axum::http::header::CONTENT_LENGTH;
@@ -19,7 +19,7 @@ pub struct Shared {
     pub config: Config,
     /// The live sessions.
     pub registry: Registry,
-    /// Who may work.
+    /// Which requests may work.
     pub admission: Admission,
     /// Set from the moment that the service was asked to end.
     draining: AtomicBool,
@@ -33,6 +33,7 @@ impl std::ops::Deref for AppState {
 }
 
 impl AppState {
+    /// The state of a service with these settings and this clock.
     pub fn new(config: Config, clock: Clock) -> Self {
         Self(Arc::new(Shared {
             registry: Registry::new(
@@ -47,26 +48,28 @@ impl AppState {
         }))
     }
 
-    /// From now on `/readyz` answers 503.
+    /// Makes `/readyz` answer 503 from now on.
     pub fn drain(&self) {
         self.draining.store(true, Ordering::Release);
     }
 
+    /// Whether the service was asked to end.
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Acquire)
     }
 
-    /// Takes a place in the queue for a request, with room for its body.
+    /// Takes a place in the queue for a request, and the bytes of its body from the byte budget.
+    ///
+    /// # Errors
+    /// The queue is full or the byte budget is used up.
     pub fn enter(&self, headers: &HeaderMap) -> Result<QueuePermit, Problem> {
-        let most = self.config.max_body_bytes;
+        let max = self.config.max_body_bytes;
         let length = headers
             .get(CONTENT_LENGTH)
             .and_then(|length| length.to_str().ok());
         let length = length.and_then(|length| length.parse::<usize>().ok());
-        let room = length.map_or(most, |length| length.min(most));
-        self.admission
-            .enter(room)
-            .map_err(|_| Problem::queue_full())
+        let bytes = length.map_or(max, |length| length.min(max));
+        Ok(self.admission.enter(bytes)?)
     }
 
     /// When the session expires, in RFC 3339.

@@ -1,52 +1,43 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
-use super::answer::{Answer, TargetBox};
-use super::frames::{check_size, replayed_header};
-use super::openapi;
-use super::problem::Problem;
-use super::problem_kind::Kind;
-use super::session_path::SessionPath;
+use super::advance::{Answered, NextFrames};
+use super::answer::{Answer, replayed_header};
+use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
-use super::upload::{Form, Received};
+use super::target_box::TargetBox;
+use super::upload::session_request::SessionRequest;
+use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
-use crate::ingest;
-use crate::sessions::{Fingerprint, Locked, Turn};
-use crate::tracker::{Estimate, Rect};
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Request, State};
+use axum::extract::State;
 use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
 
-const FORM: Form = Form {
-    settings: &["box"],
-    numbered: true,
-    several: false,
-};
-
-/// A form with a frame and the corrected box.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct TargetForm {
-    /// The next frame: a JPEG, PNG or WebP file.
-    #[schema(format = Binary, content_media_type = "application/octet-stream")]
-    frame: String,
-    /// `x,y,width,height`, or a JSON object with these names. May be in the query instead.
-    #[schema(example = "10,20,30,40")]
-    #[schema(nullable = false)]
-    r#box: Option<String>,
-}
-
-/// A frame as base64 (or a data URL) and the corrected box.
-#[derive(utoipa::ToSchema)]
-#[expect(dead_code, reason = "a schema; the fields are read by `upload`")]
-struct TargetJson {
-    /// The next frame.
-    #[schema(content_encoding = "base64")]
-    frame: String,
-    /// The corrected box; the text `x,y,width,height` is taken too. May be in the query instead.
+/// The settings of a correction.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct TargetSettings {
+    /// The corrected box: `x,y,width,height`, or a JSON object with these names. May be in the query or in the body.
+    #[param(value_type = String, required = false, example = "10,20,30,40")]
     #[schema(nullable = false)]
     r#box: Option<TargetBox>,
+    /// The number of this frame; see `POST /sessions/{id}/frames`.
+    #[param(value_type = u64, required = false)]
+    #[schema(value_type = Option<u64>, nullable = false)]
+    frame: Option<WholeNumber>,
 }
+
+impl Settings for TargetSettings {
+    const FRAMES: FrameCount = FrameCount::One;
+    const SCHEMA_PREFIX: &'static str = "Target";
+}
+
+type TargetForm = FormBody<TargetSettings>;
+type TargetJson = JsonBody<TargetSettings>;
 
 struct Problems;
 
@@ -62,7 +53,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::InvalidBox,
             Kind::SessionBusy,
         ];
-        openapi::problems(&[openapi::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, own])
     }
 }
 
@@ -77,58 +68,47 @@ impl utoipa::IntoResponses for Problems {
     put, path = "/sessions/{id}/target", tag = "sessions", operation_id = "putTarget",
     params(
         ("id" = Uuid, Path, description = "The session's id"),
-        ("box" = Option<String>, Query, description = "The corrected box, `x,y,width,height`; may be in the body instead.", example = "10,20,30,40"),
-        ("frame" = Option<u64>, Query, description = "The number of this frame; see `POST /sessions/{id}/frames`."),
+        TargetSettings,
     ),
     request_body(
         description = "The frame in one of three forms.",
         content(
             (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
             (TargetForm = "multipart/form-data"),
-            (TargetJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…", "box": {"x": 12, "y": 22, "width": 30, "height": 40}})),
+            (
+                TargetJson = "application/json",
+                example = json!({
+                    "frame": "/9j/4AAQSkZJRg…",
+                    "box": {"x": 12, "y": 22, "width": 30, "height": 40}
+                })
+            ),
         )
     ),
     responses(
-        (status = 200, description = "The correction is taken", body = Answer, headers(("Replayed" = bool, description = "`true` where this answer was given before"))),
+        (
+            status = 200, description = "The correction is taken", body = Answer,
+            headers(("Replayed" = bool, description = "`true` where this answer was given before"))
+        ),
         Problems
     )
 )]
 pub async fn put(
     State(state): State<AppState>,
-    path: SessionPath,
-    request: Request,
+    request: SessionRequest<TargetSettings>,
 ) -> Result<Response, Problem> {
-    let Received {
-        admitted: place,
-        queue,
-        upload,
-    } = FORM.receive(&state, request, || path.enter(&state)).await?;
-    let target = upload.fields.target.ok_or_else(Problem::missing_box)?;
-    let number = upload.fields.number;
+    let settings = request.upload.settings;
+    let target = settings.r#box.ok_or_else(Problem::missing_box)?;
+    let next = NextFrames {
+        number: settings.frame.map(|number| number.0),
+        files: request.upload.files,
+        correction: Some(target.into()),
+    };
     let limits = state.config.frame_limits();
-    let (estimate, replayed) = work::on_session(&state, place, queue, false, move |locked| {
-        correct(locked, number, &upload.frames, target, &limits)
-    })
-    .await?;
-    let answer = Json(Answer::from(estimate)).into_response();
+    let correct = move |locked: &mut _| next.advance(locked, &limits);
+    let Answered {
+        estimates,
+        replayed,
+    } = work::on_session(&state, request.permit, request.queue, correct).await?;
+    let answer = Json(Answer::from(estimates[0])).into_response();
     Ok(replayed_header(replayed, answer))
-}
-
-/// The answer, and whether it was given before.
-fn correct(
-    locked: &mut Locked,
-    number: Option<u64>,
-    frames: &[Bytes],
-    target: Rect,
-    limits: &ingest::Limits,
-) -> Result<(Estimate, bool), Problem> {
-    let fingerprint = Fingerprint::of(&frames[0]);
-    let turn = locked.state().turn(number, &[fingerprint], Some(target));
-    if let Turn::Replay(estimates) = turn.map_err(Problem::replay)? {
-        return Ok((estimates[0], true));
-    }
-    let frame = &work::decode(frames, limits)?[0];
-    check_size(frame, locked.session().source_size())?;
-    let estimate = locked.state().retarget(fingerprint, frame, target);
-    Ok((estimate.map_err(Problem::tracker)?, false))
 }

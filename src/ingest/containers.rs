@@ -1,5 +1,5 @@
-//! The chunk structure of PNG and WebP, read before decoding: is the file whole? A missing end would otherwise
-//! go unnoticed, or be allocated for by the length that a chunk claims.
+//! The chunk structure of PNG and WebP, read before decoding: whether the file is whole. The decoders would not notice
+//! a missing end, or would allocate as many bytes as a chunk claims.
 
 const CUT_SHORT: &str = "it is cut short";
 

@@ -1,11 +1,13 @@
 //! JPEG, decoded strictly and straight to luma.
 
+use super::error::IngestError;
 use super::jpeg_markers::Markers;
+use super::limits::{Limits, MAX_JPEG_SCANS};
 use super::luma::luma_of_rgb8;
 use super::orientation;
-use super::picture::{Picture, Room};
+use super::scratch::Scratch;
 use super::sniff::Format;
-use super::{IngestError, Limits};
+use super::stored_luma::StoredLuma;
 use std::borrow::Cow;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -13,14 +15,12 @@ use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 
-/// More scans than any encoder writes: each one walks the whole picture again.
-pub(super) const MAX_SCANS: usize = 64;
-
-pub(super) fn decode<'room>(
+/// The luma of a JPEG: at full size or, with libjpeg-turbo, reduced.
+pub(super) fn decode<'scratch>(
     bytes: &[u8],
     limits: &Limits,
-    room: &'room mut Room,
-) -> Result<Picture<'room>, IngestError> {
+    scratch: &'scratch mut Scratch,
+) -> Result<StoredLuma<'scratch>, IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
     let markers = Markers::read(bytes).map_err(damaged)?;
     limits.check_size(markers.width, markers.height)?;
@@ -30,39 +30,39 @@ pub(super) fn decode<'room>(
     let source = (markers.width, markers.height);
     let orientation = orientation::of_exif(markers.exif(bytes));
     #[cfg(feature = "turbo")]
-    if let Some(size) = super::turbo::decode(bytes, &markers, limits, &mut room.pixels) {
-        return Ok(Picture {
-            luma: Cow::Borrowed(&room.pixels[..size.0 as usize * size.1 as usize]),
+    if let Some(size) = super::turbo::decode(bytes, &markers, limits, &mut scratch.pixels) {
+        return Ok(StoredLuma {
+            luma: Cow::Borrowed(&scratch.pixels[..size.0 as usize * size.1 as usize]),
             size,
             source,
             orientation,
         });
     }
-    Ok(Picture {
-        luma: decode_whole(bytes, &markers, limits, room)?,
+    Ok(StoredLuma {
+        luma: decode_whole(bytes, &markers, limits, scratch)?,
         size: source,
         source,
         orientation,
     })
 }
 
-/// The luma in full size, with zune-jpeg.
-fn decode_whole<'room>(
+/// The luma at full size, with zune-jpeg.
+fn decode_whole<'scratch>(
     bytes: &[u8],
     markers: &Markers,
     limits: &Limits,
-    room: &'room mut Room,
-) -> Result<Cow<'room, [u8]>, IngestError> {
+    scratch: &'scratch mut Scratch,
+) -> Result<Cow<'scratch, [u8]>, IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
-    // Most of the decoder's texts come in quotes.
+    // Most of the decoder's messages come in quotes.
     let reason = |error: DecodeErrors| damaged(error.to_string().trim_matches('"'));
-    let guarded = &mut room.file;
+    let guarded = &mut scratch.file;
     markers.with_guarded_end(bytes, guarded);
     let options = DecoderOptions::new_fast()
         .set_strict_mode(true)
         .set_max_width(limits.max_side as usize)
         .set_max_height(limits.max_side as usize)
-        .jpeg_set_max_scans(MAX_SCANS)
+        .jpeg_set_max_scans(MAX_JPEG_SCANS)
         .jpeg_set_out_colorspace(ColorSpace::Luma);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&guarded[..]), options);
     decoder.decode_headers().map_err(reason)?;
@@ -86,13 +86,13 @@ fn decode_whole<'room>(
     let bytes = decoder
         .output_buffer_size()
         .ok_or_else(|| damaged("its size is unknown"))?;
-    // The decoder may leave values out of a damaged file: they must not be those of the frame before.
-    room.pixels.clear();
-    room.pixels.resize(bytes, 0);
-    decoder.decode_into(&mut room.pixels).map_err(reason)?;
+    // The decoder may leave pixels of a damaged file unwritten. They must not show the frame before.
+    scratch.pixels.clear();
+    scratch.pixels.resize(bytes, 0);
+    decoder.decode_into(&mut scratch.pixels).map_err(reason)?;
     Ok(match output {
-        ColorSpace::Luma => Cow::Borrowed(&room.pixels[..]),
-        ColorSpace::YCbCr => room.pixels.iter().copied().step_by(3).collect(),
-        _ => Cow::Owned(luma_of_rgb8(&room.pixels)),
+        ColorSpace::Luma => Cow::Borrowed(&scratch.pixels[..]),
+        ColorSpace::YCbCr => scratch.pixels.iter().copied().step_by(3).collect(),
+        _ => Cow::Owned(luma_of_rgb8(&scratch.pixels)),
     })
 }

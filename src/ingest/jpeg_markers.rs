@@ -1,5 +1,5 @@
-//! The marker structure of a JPEG (ITU-T T.81, annex B), read before decoding: is the file whole, and what will
-//! decoding it cost? The decoder by itself does not say when only the end of the last scan is missing.
+//! The marker structure of a JPEG (ITU-T T.81, annex B), read before decoding: whether the file is whole, and what
+//! decoding it costs. The decoder does not notice when only the end of the last scan is missing.
 
 use memchr::memchr;
 use std::ops::Range;
@@ -13,7 +13,7 @@ const GUARD_BYTES: usize = 8;
 /// What an APP1 segment with an EXIF block begins with.
 const EXIF: &[u8] = b"Exif\0\0";
 
-/// What the markers tell.
+/// What the markers say about the image.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Markers {
     pub(super) width: u32,
@@ -86,7 +86,7 @@ impl Markers {
         })
     }
 
-    /// Why the decoder would give a wrong picture, without an error, for this valid but rare layout.
+    /// Why the decoder would give a wrong image, without an error, for this valid but rare layout.
     pub(super) fn unsupported(&self, is_cmyk: bool) -> Option<&'static str> {
         let largest = self.largest_sampling();
         if self.components[0] != largest || (is_cmyk && largest != (1, 1)) {
@@ -101,8 +101,8 @@ impl Markers {
         None
     }
 
-    /// Whether this is what nearly all files are: baseline, extended or progressive with Huffman codes, gray or of three
-    /// channels, in a layout that the default decoder takes.
+    /// Whether this is what nearly all files are: baseline, extended or progressive with Huffman codes, one or three
+    /// channels, in a layout that zune-jpeg takes.
     #[cfg(feature = "turbo")]
     pub(super) fn is_usual(&self) -> bool {
         self.process <= 2
@@ -120,7 +120,7 @@ impl Markers {
         self.process == 2
     }
 
-    /// Whether the decoder is right when it leaves colour out: not where colour has half the rows but all columns.
+    /// Whether the decoder can leave colour out. It goes wrong where colour has half the rows but all columns.
     pub(super) fn can_skip_color(&self) -> bool {
         matches!(self.largest_sampling(), (_, 1) | (2, 2))
     }
@@ -130,10 +130,11 @@ impl Markers {
         bytes.get(self.exif.clone()?)
     }
 
-    /// Puts into `guarded` the image with one-bits before its end marker. The decoder reads zero-bits for ever once it has met the
-    /// end marker, and makes gray blocks of them; a run of one-bits is the one code that no Huffman table has
-    /// (T.81, annex C), so where blocks are missing it has to say so. A whole image is done before them; but not one whose
-    /// channels come one after the other with restarts, where the decoder reads past the end of the last.
+    /// Copies the image to `guarded`, with one-bits before its end marker. After the end marker the decoder reads
+    /// zero-bits without end, and makes gray blocks of them. A run of one-bits is a code that no Huffman table has
+    /// (T.81, annex C), so where blocks are missing the decoder must report an error. A whole image is decoded before
+    /// it gets there. The exception are images whose channels come one after the other with restarts: there the decoder
+    /// reads past the end of the last channel.
     pub(super) fn with_guarded_end(&self, bytes: &[u8], guarded: &mut Vec<u8>) {
         let guard_bytes = if self.is_progressive() || self.scans == 1 {
             GUARD_BYTES
@@ -167,8 +168,8 @@ impl Markers {
         output + row_buffers + blocks * 64 * 2
     }
 
-    /// Whether there are fewer bits of picture than any encoder needs: at least one for each 8 x 8 block of the
-    /// component with the most blocks, its DC code. A few hundred bytes that claim forty million pixels end here.
+    /// Whether there are fewer bits than any encoder needs: at least one, the DC code, for each 8 x 8 block of the
+    /// component with the most blocks. This refuses a few hundred bytes that claim forty million pixels.
     pub(super) fn is_implausibly_small(&self) -> bool {
         let (h_max, v_max) = self.largest_sampling();
         let blocks = self
@@ -226,7 +227,7 @@ impl FrameHeader {
 }
 
 /// The next marker's code, at or after `at`, and where its segment begins. Fill bytes are skipped.
-pub(super) fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
+fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
     loop {
         at += memchr(0xFF, bytes.get(at..)?)?;
         at += bytes[at..].iter().position(|&byte| byte != 0xFF)?;

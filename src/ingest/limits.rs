@@ -1,8 +1,11 @@
-//! What an upload may cost, checked against what its header claims, before anything is allocated for it.
+//! What one frame may cost. Checked against what its header claims, before anything is allocated for it.
 
-use super::IngestError;
+use super::error::IngestError;
 
-/// What an upload may cost.
+/// More scans than any JPEG encoder writes. Each scan costs a pass over the whole image.
+pub(super) const MAX_JPEG_SCANS: usize = 64;
+
+/// What one frame may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Most bytes of one encoded frame.

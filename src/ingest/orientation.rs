@@ -1,4 +1,4 @@
-//! The EXIF orientation: phones store the sensor's rows and note how the picture is to be turned.
+//! The EXIF orientation: phones store the rows of the sensor, and a note how the image is to be turned.
 
 use image::metadata::Orientation;
 use image::{DynamicImage, GrayImage};
@@ -20,7 +20,7 @@ pub(super) fn swaps_sides(orientation: Orientation) -> bool {
     )
 }
 
-/// Turns and mirrors the picture of this `size` upright; `size` becomes that of the upright one.
+/// Turns and mirrors the image of this `size` upright. `size` becomes that of the upright image.
 pub(super) fn apply(luma: Vec<u8>, size: &mut (u32, u32), orientation: Orientation) -> Vec<u8> {
     let stored = GrayImage::from_raw(size.0, size.1, luma).expect("a decoder gives every pixel");
     let mut image = DynamicImage::ImageLuma8(stored);

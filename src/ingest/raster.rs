@@ -1,10 +1,11 @@
 //! PNG and WebP, through the `image` crate.
 
 use super::containers::{check_png_whole, check_webp_whole};
+use super::error::IngestError;
+use super::limits::Limits;
 use super::luma::luma_of;
-use super::picture::Picture;
 use super::sniff::Format;
-use super::{IngestError, Limits};
+use super::stored_luma::StoredLuma;
 use image::codecs::png::PngDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
@@ -12,7 +13,10 @@ use image::{DynamicImage, ImageDecoder, ImageError};
 use std::borrow::Cow;
 use std::io::Cursor;
 
-pub(super) fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Picture<'static>, IngestError> {
+pub(super) fn decode_png(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<StoredLuma<'static>, IngestError> {
     check_png_whole(bytes).map_err(|reason| Format::Png.damaged(reason))?;
     // Also bounds compressed side chunks (text, colour profiles), which are read with the header.
     let mut decoder_limits = image::Limits::no_limits();
@@ -22,11 +26,14 @@ pub(super) fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Picture<'stati
     decode(decoder, Format::Png, 0, limits)
 }
 
-pub(super) fn decode_webp(bytes: &[u8], limits: &Limits) -> Result<Picture<'static>, IngestError> {
+pub(super) fn decode_webp(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<StoredLuma<'static>, IngestError> {
     check_webp_whole(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
-    // Its planes, or its RGBA copy where the picture has no alpha.
+    // The decoder needs its planes, or an RGBA copy where the image has no alpha.
     decode(decoder, Format::WebP, 4, limits)
 }
 
@@ -35,17 +42,17 @@ fn decode(
     format: Format,
     working_bytes_per_pixel: u64,
     limits: &Limits,
-) -> Result<Picture<'static>, IngestError> {
+) -> Result<StoredLuma<'static>, IngestError> {
     let (width, height) = decoder.dimensions();
     limits.check_size(width, height)?;
-    // The decoded picture, what the decoder needs beside it, and the luma.
+    // The decoded image, what the decoder needs beside it, and the luma.
     let pixels = u64::from(width) * u64::from(height);
     limits.check_memory(decoder.total_bytes() + (working_bytes_per_pixel + 1) * pixels)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let image = DynamicImage::from_decoder(decoder).map_err(|error| typed(format, error))?;
     let luma = luma_of(image);
     let size = luma.dimensions();
-    Ok(Picture {
+    Ok(StoredLuma {
         luma: Cow::Owned(luma.into_raw()),
         size,
         source: size,

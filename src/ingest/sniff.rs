@@ -1,6 +1,6 @@
 //! The type of an image, by its first bytes.
 
-use super::IngestError;
+use super::error::IngestError;
 
 /// The image types that are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

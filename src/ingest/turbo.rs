@@ -1,15 +1,14 @@
 //! JPEG with libjpeg-turbo: luma alone, reduced by its inverse DCT.
 //!
-//! What could go wrong: it makes gray blocks of missing data and calls that a warning. So it decides nothing: what it
-//! warns of, and what the default decoder would refuse, is left to that one.
+//! What can go wrong: it turns missing data into gray blocks, with a warning only. So this is a fast path: on any
+//! warning, and for every layout that zune-jpeg refuses, zune-jpeg decides.
 
-use super::Limits;
-use super::jpeg::MAX_SCANS;
 use super::jpeg_markers::Markers;
+use super::limits::{Limits, MAX_JPEG_SCANS};
 use crate::tracker::working_size;
 use turbojpeg::{Decompressor, Image, PixelFormat, ScalingFactor};
 
-/// The reductions for which it has vector instructions, and none at all.
+/// The reductions for which it has vector instructions; the last one is none.
 const REDUCTIONS: [ScalingFactor; 4] = [
     ScalingFactor::ONE_EIGHTH,
     ScalingFactor::ONE_QUARTER,
@@ -17,8 +16,8 @@ const REDUCTIONS: [ScalingFactor; 4] = [
     ScalingFactor::ONE,
 ];
 
-/// Decodes to the smallest picture that is not smaller than the working image. Gives its width and height; its values
-/// begin `pixels`. None where the default decoder is to decide.
+/// Decodes to the smallest size that is not smaller than the working image. Returns its width and height; its luma is
+/// at the start of `pixels`. None where zune-jpeg is to decide.
 pub(super) fn decode(
     bytes: &[u8],
     markers: &Markers,
@@ -29,7 +28,7 @@ pub(super) fn decode(
     if !markers.is_usual() || limits.check_memory(memory).is_err() {
         return None;
     }
-    // A new one each time: tables of one file would be there for the next that lacks its own.
+    // A new one each time: it would lend the tables of one file to the next one that has none.
     let mut decompressor = new_decompressor()?;
     let (width, height) = (markers.width as usize, markers.height as usize);
     let reduction = reduction(markers.width, markers.height);
@@ -57,12 +56,12 @@ pub(super) fn decode(
 
 fn new_decompressor() -> Option<Decompressor> {
     let mut decompressor = Decompressor::new().ok()?;
-    decompressor.set_scan_limit(MAX_SCANS as u32).ok()?;
+    decompressor.set_scan_limit(MAX_JPEG_SCANS as u32).ok()?;
     Some(decompressor)
 }
 
-/// The strongest reduction of a picture of this size that leaves the working image and divides both sides: otherwise the
-/// last column would stand for fewer pixels than the others, and boxes would be off by as many.
+/// The strongest reduction that leaves at least the working size and divides both sides. With another one the last
+/// column would stand for fewer pixels than the others, and boxes would be off.
 fn reduction(width: u32, height: u32) -> ScalingFactor {
     let (working_width, working_height) = working_size(width, height);
     let fits = |side: u32, working: u32, factor: &ScalingFactor| {
@@ -72,7 +71,7 @@ fn reduction(width: u32, height: u32) -> ScalingFactor {
     let strongest = REDUCTIONS
         .into_iter()
         .find(|factor| fits(width, working_width, factor) && fits(height, working_height, factor));
-    strongest.expect("a picture is not smaller than its working image")
+    strongest.expect("an image is not smaller than its working size")
 }
 
 #[cfg(test)]
@@ -86,7 +85,7 @@ mod tests {
         let mut bytes = Vec::new();
         let encoder = Encoder::new(&mut bytes, 80);
         let encoded = encoder.encode(&rgb, width, height, ColorType::Rgb);
-        encoded.expect("a picture of this size");
+        encoded.expect("an image of this size");
         bytes
     }
 
@@ -96,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_reduced_to_no_less_than_the_working_image() {
+    fn images_are_reduced_to_no_less_than_the_working_image() {
         for (size, expected) in [
             ((320, 240), (320, 240)),
             ((638, 480), (638, 480)),
@@ -125,6 +124,7 @@ mod tests {
         }
         assert_eq!(reduced(&whole, &mut pixels), Some((160, 128)));
     }
+
     /// Where the first segment of this marker begins, and where it ends.
     fn segment(bytes: &[u8], marker: u8) -> std::ops::Range<usize> {
         let pair = bytes.windows(2).position(|pair| pair == [0xFF, marker]);

@@ -1,30 +1,28 @@
-//! Who may work: a queue before the workers.
+//! Which requests may work: a queue before the workers.
 //!
-//! A request first takes a place in the queue (refused at once when it is full) and the room for its body,
-//! since bodies are what requests in the queue cost; then it waits for a worker. Both permits move into the blocking work itself: a request that times out or whose client
-//! goes away does not stop work that has begun, so its permits stay taken until that work has ended, and
-//! the number of threads at work is never more than the number of workers. Brief work may be done by the thread that
-//! asks for it, in place of a worker and with its permit.
+//! A request first takes a place in the queue and a share of the bytes that all bodies may have together; it is
+//! refused at once when either is used up. Then it waits for a worker. All its permits move into the work itself. A
+//! request that times out or whose client goes away does not stop work that has begun, so its permits stay taken until
+//! that work has ended, and never more threads work than there are workers.
 
-use super::here;
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-/// Bytes that one permit of the room for bodies stands for.
-const UNIT: usize = 1024;
+/// Bytes that one permit of the byte budget stands for.
+const BYTES_PER_PERMIT: usize = 1024;
 
-/// The queue or the room for bodies is full; try again later.
+/// The queue is full or the byte budget is used up; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the queue is full")]
 pub struct QueueFull;
 
-/// The work panicked, or there was no thread for it. The panic itself has been printed by the panic hook.
+/// The work panicked, or there was no thread for it. The panic hook has already reported a panic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WorkLost {
-    /// What the panic said, where it was a text.
+    /// What the panic said, where it was text.
     #[error("the work panicked: {0}")]
     Panicked(String),
     /// The system gave no thread.
@@ -36,7 +34,7 @@ impl WorkLost {
     fn of(panic: &(dyn Any + Send)) -> Self {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        Self::Panicked(text.unwrap_or("something that is no text").to_owned())
+        Self::Panicked(text.unwrap_or("a value that is not text").to_owned())
     }
 }
 
@@ -52,64 +50,39 @@ pub struct Admission {
     queue: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
     workers: Arc<Semaphore>,
-    /// How many workers there are.
-    most: usize,
     threads: Arc<Workers>,
 }
 
 impl Admission {
-    /// At most `queue` requests are inside at a time with at most `body_bytes` bytes of bodies, at most `workers`
-    /// of them at work.
+    /// At most `queue` requests at a time, with at most `body_bytes` bytes of bodies together; at most `workers` of
+    /// them at work.
     pub fn new(queue: usize, body_bytes: usize, workers: usize) -> Self {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
-            bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(UNIT))),
+            bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(BYTES_PER_PERMIT))),
             workers: Arc::new(Semaphore::new(workers)),
-            most: workers,
             threads: Arc::new(Workers::new(workers)),
         }
     }
 
-    /// Takes a place in the queue, with room for a body of `body_bytes`.
+    /// Takes a place in the queue, and `body_bytes` of the byte budget.
     ///
     /// # Errors
-    /// All places or the room are taken.
+    /// All places or all bytes are taken.
     pub fn enter(&self, body_bytes: usize) -> Result<QueuePermit, QueueFull> {
-        let units = u32::try_from(body_bytes.div_ceil(UNIT)).map_err(|_| QueueFull)?;
+        let units = u32::try_from(body_bytes.div_ceil(BYTES_PER_PERMIT)).map_err(|_| QueueFull)?;
         let place = self.queue.clone().try_acquire_owned();
-        let room = self.bodies.clone().try_acquire_many_owned(units);
-        match (place, room) {
-            (Ok(place), Ok(room)) => Ok(QueuePermit {
-                _permits: Arc::new([place, room]),
+        let bytes = self.bodies.clone().try_acquire_many_owned(units);
+        match (place, bytes) {
+            (Ok(place), Ok(bytes)) => Ok(QueuePermit {
+                _permits: Arc::new([place, bytes]),
             }),
             _ => Err(QueueFull),
         }
     }
 
-    /// Like [`Self::run`], for work that takes a few milliseconds at most: where no worker is busy, and this thread [takes
-    /// such work](super::rested), it is done here and now.
-    ///
-    /// # Errors
-    /// The work panicked, or there was no thread for it.
-    pub async fn run_brief<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
-    where
-        T: Send + 'static,
-        F: FnOnce() -> T + Send + 'static,
-    {
-        let all_are_free = self.free_workers() == self.most;
-        match self.workers.clone().try_acquire_owned() {
-            Ok(worker) if all_are_free && here::takes_work() => {
-                let outcome = catch_unwind(AssertUnwindSafe(work));
-                drop((queue, worker));
-                outcome.map_err(|panic| WorkLost::of(panic.as_ref()))
-            }
-            Ok(worker) => self.hand_over((queue, worker), work).await,
-            Err(_) => self.run(queue, work).await,
-        }
-    }
-
-    /// Waits for a worker, in order of arrival, and runs `work` on its thread. Dropping the future
-    /// before a worker is free cancels the work; afterwards it runs to its end, holding its permits.
+    /// Waits for a worker, in order of arrival, and runs `work` on its thread. If the future is dropped before a worker
+    /// is free, the work is not done; afterwards it runs to its end and keeps its permits.
     ///
     /// # Errors
     /// The work panicked, or there was no thread for it.
@@ -119,26 +92,14 @@ impl Admission {
         F: FnOnce() -> T + Send + 'static,
     {
         let acquired = self.workers.clone().acquire_owned().await;
-        let worker = acquired.expect("the semaphore is never closed");
-        self.hand_over((queue, worker), work).await
-    }
-
-    async fn hand_over<T, F>(
-        &self,
-        permits: (QueuePermit, OwnedSemaphorePermit),
-        work: F,
-    ) -> Result<T, WorkLost>
-    where
-        T: Send + 'static,
-        F: FnOnce() -> T + Send + 'static,
-    {
+        let permits = (queue, acquired.expect("the semaphore is never closed"));
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         self.threads.start(Box::new(move || {
-            // `work` is used up by a panic, so nobody sees what it left half changed.
+            // A panic drops `work`, so no half-changed value is read.
             let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
             drop(permits);
-            // Nobody waits when the client has gone.
+            // It cannot be sent when the client has gone.
             let _ = send.send(outcome);
         }));
         match outcome.await {
@@ -173,13 +134,16 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn bodies_share_their_room() {
-        let admission = Admission::new(9, 5 * UNIT, 1);
-        let large = admission.enter(4 * UNIT).unwrap();
-        assert_eq!(admission.enter(UNIT + 1).unwrap_err(), QueueFull);
-        assert!(admission.enter(UNIT).is_ok());
+    async fn bodies_share_their_byte_budget() {
+        let admission = Admission::new(9, 5 * BYTES_PER_PERMIT, 1);
+        let large = admission.enter(4 * BYTES_PER_PERMIT).unwrap();
+        assert_eq!(
+            admission.enter(BYTES_PER_PERMIT + 1).unwrap_err(),
+            QueueFull
+        );
+        assert!(admission.enter(BYTES_PER_PERMIT).is_ok());
         drop(large);
-        assert!(admission.enter(5 * UNIT).is_ok());
+        assert!(admission.enter(5 * BYTES_PER_PERMIT).is_ok());
     }
 
     #[tokio::test]
@@ -211,29 +175,14 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn brief_work_is_done_here_where_no_worker_is_busy_and_the_thread_takes_it() {
+    async fn work_is_never_done_on_the_thread_that_asks_for_it() {
         let admission = Admission::new(9, 5000, 2);
-        let brief = async || {
-            let queue = admission.enter(0).unwrap();
-            let done = admission.run_brief(queue, || std::thread::current().id());
-            done.await.unwrap()
-        };
         let here = std::thread::current().id();
-        assert_ne!(brief().await, here);
-        here::rested();
-        assert_eq!(brief().await, here);
-        assert_ne!(brief().await, here);
-        here::rested();
-        let busy = admission.workers.clone().acquire_owned().await.unwrap();
-        assert_ne!(brief().await, here);
-        let busy = (
-            busy,
-            admission.workers.clone().acquire_owned().await.unwrap(),
-        );
-        let waiting = tokio::time::timeout(std::time::Duration::ZERO, brief());
-        assert!(waiting.await.is_err());
-        drop(busy);
-        assert_eq!(brief().await, here);
+        for _ in 0..20 {
+            let queue = admission.enter(0).unwrap();
+            let there = admission.run(queue, || std::thread::current().id());
+            assert_ne!(there.await.unwrap(), here);
+        }
         assert_eq!((admission.queue_places(), admission.free_workers()), (9, 2));
     }
 

@@ -1,5 +1,4 @@
-//! The time that sessions expire by. It runs with the monotonic clock and can be moved forward, so that
-//! expiry is tested without waiting.
+//! The time by which sessions expire: the monotonic clock. It can be moved forward, so tests need not wait.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,25 +1,33 @@
-//! The live sessions: a map of them, and everything that keeps them safe from each other.
+//! The live sessions: a map of them, and what keeps them apart.
 //!
-//! What could go wrong: one slow client holding up the others, two requests stepping one tracker at once,
-//! work that outlives the request that asked for it, sessions that nobody ends. So: the map's lock is
-//! never held during work ([`Registry`]); a session has its own lock, taken in order of arrival and by a
-//! bounded number of requests ([`Session`]); work is admitted in two steps and keeps its permits until it
-//! has really ended ([`Admission`]); work on a thread that has others to serve is brief ([`rested`]); idle sessions
-//! expire ([`Clock`]).
+//! In: a [`SessionState`], which is a tracker and the answers to its last request. Out: a [`Session`] in the
+//! [`Registry`], found by its id.
+//!
+//! A request for a session takes these steps: [`Registry::get`] finds it, [`Session::enter`] takes one of its few
+//! permits, [`Admission::enter`] takes a place in the queue before the workers, [`SessionPermit::lock`] waits for the
+//! session in order of arrival, and [`Admission::run`] works with its state on a worker thread.
+//!
+//! What can go wrong, and what is done about it:
+//! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
+//! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
+//! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
+//! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayDecision`].
+//! - A client never ends its session. It expires when it was not used for a while, by a [`Clock`] that tests can move forward.
+//! - A snapshot comes back damaged or forged. It is checked as a whole: see [`SnapshotError`].
 
 mod admission;
 mod clock;
-mod envelope;
-mod here;
 mod registry;
 mod replay;
 mod session;
+mod snapshot;
+mod state;
 mod workers;
 
 pub use admission::{Admission, QueueFull, QueuePermit, WorkLost};
 pub use clock::Clock;
-pub use envelope::{EnvelopeError, MAGIC as SNAPSHOT_MAGIC};
-pub use here::rested;
-pub use registry::{Full, Registry};
-pub use replay::{Answered, Fingerprint, ReplayError, Turn};
-pub use session::{Busy, Closed, Locked, Place, Session, State};
+pub use registry::{Registry, TooManySessions};
+pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
+pub use session::{LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
+pub use snapshot::{MAGIC as SNAPSHOT_MAGIC, SnapshotError};
+pub use state::SessionState;

@@ -1,8 +1,8 @@
-//! The map of live sessions. Its lock is held for a look-up only, never during work: sessions are dropped
-//! after it is released.
+//! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
 use super::clock::Clock;
-use super::session::{Session, State};
+use super::session::Session;
+use super::state::SessionState;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
@@ -10,27 +10,27 @@ use uuid::Uuid;
 
 /// The service holds as many sessions as it may; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("there are {0} sessions, as many as may be")]
-pub struct Full(pub usize);
+#[error("there are {0} sessions, which is the maximum")]
+pub struct TooManySessions(pub usize);
 
 /// The live sessions.
 #[derive(Debug)]
 pub struct Registry {
     sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
     max_sessions: usize,
-    max_places: usize,
+    max_requests: usize,
     idle: Duration,
     clock: Clock,
 }
 
 impl Registry {
-    /// At most `max_sessions`, each with at most `max_places` requests at once, each of which expires when
-    /// it was not used for `idle`.
-    pub fn new(max_sessions: usize, max_places: usize, idle: Duration, clock: Clock) -> Self {
+    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when it
+    /// was not used for `idle`.
+    pub fn new(max_sessions: usize, max_requests: usize, idle: Duration, clock: Clock) -> Self {
         Self {
             sessions: Mutex::default(),
             max_sessions,
-            max_places,
+            max_requests,
             idle,
             clock,
         }
@@ -40,12 +40,12 @@ impl Registry {
     ///
     /// # Errors
     /// There is none.
-    pub fn check_room(&self) -> Result<(), Full> {
+    pub fn check_room(&self) -> Result<(), TooManySessions> {
         if self.len() >= self.max_sessions {
             self.sweep();
         }
         if self.len() >= self.max_sessions {
-            return Err(Full(self.max_sessions));
+            return Err(TooManySessions(self.max_sessions));
         }
         Ok(())
     }
@@ -54,12 +54,12 @@ impl Registry {
     ///
     /// # Errors
     /// There is no room.
-    pub fn insert(&self, state: State) -> Result<Arc<Session>, Full> {
+    pub fn insert(&self, state: SessionState) -> Result<Arc<Session>, TooManySessions> {
         self.check_room()?;
-        let session = Session::new(state, self.max_places, self.clock.clone());
+        let session = Session::new(state, self.max_requests, self.clock.clone());
         let mut sessions = self.map();
         if sessions.len() >= self.max_sessions {
-            return Err(Full(self.max_sessions));
+            return Err(TooManySessions(self.max_sessions));
         }
         sessions.insert(session.id(), session.clone());
         Ok(session)
@@ -67,19 +67,23 @@ impl Registry {
 
     /// The live session of this id. This counts as use.
     pub fn get(&self, id: Uuid) -> Option<Arc<Session>> {
-        let mut sessions = self.map();
-        let session = sessions.get(&id)?.clone();
-        if self.has_ended(&session) {
-            session.close();
+        let ended = {
+            let mut sessions = self.map();
+            let session = sessions.get(&id)?.clone();
+            if !self.has_ended(&session) {
+                session.touch();
+                return Some(session);
+            }
             sessions.remove(&id);
-            return None;
-        }
-        session.touch();
-        Some(session)
+            session
+        };
+        // The lock has been released: this may free the session.
+        ended.close();
+        None
     }
 
-    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not.
-    /// False when there is no such session.
+    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
+    /// there is no such session.
     pub fn remove(&self, id: Uuid) -> bool {
         let removed = self.map().remove(&id);
         let Some(session) = removed else { return false };
@@ -88,7 +92,7 @@ impl Registry {
         live
     }
 
-    /// Removes the sessions that have expired and gives their number.
+    /// Removes the sessions that have expired. Returns their number.
     pub fn sweep(&self) -> usize {
         let mut ended = Vec::new();
         self.map().retain(|_, session| {
@@ -102,7 +106,7 @@ impl Registry {
         ended.len()
     }
 
-    /// Number of sessions in the map, expired ones that nobody has asked for included.
+    /// Number of sessions in the map, those included that have expired since the last sweep.
     pub fn len(&self) -> usize {
         self.map().len()
     }
@@ -133,8 +137,11 @@ mod tests {
     use super::*;
     use crate::sessions::{Admission, Fingerprint};
     use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
+    use std::sync::mpsc;
 
-    fn state() -> State {
+    const IDLE: Duration = Duration::from_secs(600);
+
+    fn state() -> SessionState {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
         let frame = GrayFrame::from_luma(64, 48, luma).unwrap();
         let target = Rect {
@@ -144,13 +151,41 @@ mod tests {
             height: 16.0,
         };
         let tracker = Tracker::new(&frame, target, Preset::Paper.params()).unwrap();
-        State::new(tracker, Fingerprint::of(b"first"), target)
+        SessionState::new(tracker, Fingerprint::of(b"first"), target)
+    }
+
+    /// A session in a new registry, which notes whether the map's lock was free when the session was freed.
+    fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
+        let clock = Clock::default();
+        let registry = Arc::new(Registry::new(9, 9, IDLE, clock.clone()));
+        let session = registry.insert(state()).unwrap();
+        let (freed, was_free) = mpsc::channel();
+        let map = registry.clone();
+        let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
+        *session.on_drop.lock().unwrap() = Some(Box::new(probe));
+        (registry, clock, session.id(), was_free)
+    }
+
+    #[test]
+    fn no_session_is_freed_under_the_lock_of_the_map() {
+        let (registry, clock, id, was_free) = watched();
+        clock.advance(IDLE);
+        assert!(registry.get(id).is_none());
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is looked up");
+
+        let (registry, _, id, was_free) = watched();
+        assert!(registry.remove(id));
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is removed");
+
+        let (registry, clock, _, was_free) = watched();
+        clock.advance(IDLE);
+        assert_eq!(registry.sweep(), 1);
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is swept");
     }
 
     #[tokio::test]
     async fn a_session_whose_work_panicked_has_ended() {
-        let idle = Duration::from_secs(600);
-        let registry = Registry::new(9, 9, idle, Clock::default());
+        let registry = Registry::new(9, 9, IDLE, Clock::default());
         let session = registry.insert(state()).unwrap();
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();

@@ -1,14 +1,14 @@
-//! Frame numbers: which post is the next one, which is an old one sent again.
+//! Frame numbers: which request holds the next frame, and which is an old one that was sent again.
 //!
-//! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it
-//! can simply send again: the same bytes under the same number get the stored answer. The answers of the
-//! last post are kept, so that a post of several frames can be repeated too.
+//! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it can send the
+//! request again: the same bytes under the same number get the stored answer. The answers to the last request are kept,
+//! so a request with several frames can be repeated too.
 
 use crate::tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 
-/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It tells an honest client's frames
-/// apart; a client that forges one fools only its own session.
+/// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It is not a cryptographic one: a client that forges
+/// a collision gets a wrong stored answer for its own session only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint(u128);
 
@@ -30,10 +30,10 @@ pub struct Answered {
     pub estimate: Estimate,
 }
 
-/// What to do with a post.
+/// What to do with a request.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Turn {
-    /// It is the next one: process it.
+pub enum ReplayDecision {
+    /// It holds the next frame: process it.
     Process,
     /// It was answered before: these are the answers.
     Replay(Vec<Estimate>),
@@ -60,27 +60,27 @@ pub enum ReplayError {
     },
 }
 
-/// Judges a post of the frames `posted` that the client numbers from `number` on, given the frames of the
-/// last post in `recent` (at least one). `given` is the box, where the post corrects it.
+/// Decides about a request with the frames `posted`, which the client numbers from `number` on. `recent` are the
+/// answers to the last request, at least one. `given` is the box, where the request corrects it.
 ///
-/// A post is a replay when its last frame is the session's last frame, all of its frames are in the last
-/// post, and their bytes are the same.
+/// A request is a replay if its last frame is the session's last frame, all its frames are in the last request, and
+/// their bytes (and the box) are the same.
 ///
 /// # Errors
 /// See [`ReplayError`].
-pub fn judge(
+pub(super) fn decide(
     recent: &[Answered],
     number: Option<u64>,
     posted: &[Fingerprint],
     given: Option<Rect>,
-) -> Result<Turn, ReplayError> {
+) -> Result<ReplayDecision, ReplayError> {
     let last = recent
         .last()
         .expect("a session has answered its first frame");
     let expected = last.estimate.frame + 1;
     let got = match number {
-        None => return Ok(Turn::Process),
-        Some(number) if number == expected => return Ok(Turn::Process),
+        None => return Ok(ReplayDecision::Process),
+        Some(number) if number == expected => return Ok(ReplayDecision::Process),
         Some(number) => number,
     };
     if got.checked_add(posted.len() as u64) != Some(expected) || posted.len() > recent.len() {
@@ -91,7 +91,7 @@ pub fn judge(
         stored.fingerprint == *posted && (given.is_none() || stored.given == given)
     });
     if same {
-        Ok(Turn::Replay(
+        Ok(ReplayDecision::Replay(
             stored.iter().map(|answered| answered.estimate).collect(),
         ))
     } else {
@@ -132,8 +132,8 @@ mod tests {
         let recent = [answered(7, b"a")];
         for number in [None, Some(8)] {
             assert_eq!(
-                judge(&recent, number, &prints(&[b"a"]), None),
-                Ok(Turn::Process)
+                decide(&recent, number, &prints(&[b"a"]), None),
+                Ok(ReplayDecision::Process)
             );
         }
     }
@@ -141,22 +141,24 @@ mod tests {
     #[test]
     fn a_batch_or_its_tail_is_replayed() {
         let recent = [answered(5, b"a"), answered(6, b"b"), answered(7, b"c")];
-        let frames = |turn| -> Vec<u64> {
-            match turn {
-                Ok(Turn::Replay(answers)) => answers.iter().map(|a: &Estimate| a.frame).collect(),
+        let frames = |decision| -> Vec<u64> {
+            match decision {
+                Ok(ReplayDecision::Replay(answers)) => {
+                    answers.iter().map(|a: &Estimate| a.frame).collect()
+                }
                 other => panic!("{other:?}"),
             }
         };
-        let all = judge(&recent, Some(5), &prints(&[b"a", b"b", b"c"]), None);
+        let all = decide(&recent, Some(5), &prints(&[b"a", b"b", b"c"]), None);
         assert_eq!(frames(all), vec![5, 6, 7]);
-        let tail = judge(&recent, Some(7), &prints(&[b"c"]), None);
+        let tail = decide(&recent, Some(7), &prints(&[b"c"]), None);
         assert_eq!(frames(tail), vec![7]);
     }
 
     #[test]
     fn other_bytes_differ_and_other_numbers_are_out_of_order() {
         let recent = [answered(6, b"b"), answered(7, b"c")];
-        let differs = judge(&recent, Some(7), &prints(&[b"x"]), None);
+        let differs = decide(&recent, Some(7), &prints(&[b"x"]), None);
         assert_eq!(
             differs,
             Err(ReplayError::Differs {
@@ -170,9 +172,9 @@ mod tests {
             (u64::MAX, prints(&[b"c"])),
             (5, prints(&[b"a", b"b", b"c"])),
         ] {
-            let judged = judge(&recent, Some(number), &posted, None);
+            let decided = decide(&recent, Some(number), &posted, None);
             assert_eq!(
-                judged,
+                decided,
                 Err(ReplayError::OutOfOrder {
                     got: number,
                     expected: 8
@@ -185,13 +187,13 @@ mod tests {
     fn a_correction_is_replayed_only_with_the_same_box() {
         let mut corrected = answered(7, b"c");
         corrected.given = Some(corrected.estimate.target);
-        let same = judge(&[corrected], Some(7), &prints(&[b"c"]), corrected.given);
-        assert!(matches!(same, Ok(Turn::Replay(_))));
+        let same = decide(&[corrected], Some(7), &prints(&[b"c"]), corrected.given);
+        assert!(matches!(same, Ok(ReplayDecision::Replay(_))));
         let moved = Rect {
             x: 1.5,
             ..corrected.estimate.target
         };
-        let other = judge(&[corrected], Some(7), &prints(&[b"c"]), Some(moved));
+        let other = decide(&[corrected], Some(7), &prints(&[b"c"]), Some(moved));
         assert_eq!(
             other,
             Err(ReplayError::Differs {

@@ -1,48 +1,48 @@
-//! The threads that decode and track: as many as may work at the same time, each started when there is work for it.
+//! The threads that decode and track. Each is started when there is work for it, up to a maximum.
 //!
-//! A thread keeps a megabyte or more of room from one frame to the next. So work goes to the thread that became idle last, in
-//! whose caches that room still is; a pool that wakes its threads in turn works with cold ones.
+//! A thread keeps a megabyte or more of buffers from one frame to the next. So work goes to the thread that became idle
+//! last: its buffers are most likely still in the caches of its core.
 
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Work that does not panic.
+/// Work. It must not panic.
 type Job = Box<dyn FnOnce() + Send>;
 
-/// The threads. They end when this is dropped, each after the work that it is at.
+/// The threads. When this is dropped each ends after its current job, once no job waits.
 pub(super) struct Workers(Arc<Shared>);
 
 struct Shared {
     state: Mutex<State>,
-    most: usize,
+    max_threads: usize,
 }
 
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Job>,
-    /// Where the idle threads wait; the last one became idle last.
-    idle: Vec<Arc<Seat>>,
+    /// One for each idle thread, in the order in which they became idle.
+    idle: Vec<Arc<ParkingSlot>>,
     threads: usize,
     closed: bool,
 }
 
 impl Workers {
-    /// At most `most` threads, none of them started yet.
-    pub(super) fn new(most: usize) -> Self {
+    /// At most `max_threads` threads; none is started yet.
+    pub(super) fn new(max_threads: usize) -> Self {
         let state = Mutex::default();
-        Self(Arc::new(Shared { state, most }))
+        Self(Arc::new(Shared { state, max_threads }))
     }
 
-    /// Has a thread do `job`: at once where one is idle or can be started, else after the jobs before it. The job is dropped
-    /// where there is no thread, and the system does not give one.
+    /// Runs `job` on a thread: at once if one is idle or can be started, else after the jobs that wait already. Drops
+    /// the job if there is no thread at all and the system gives none.
     pub(super) fn start(&self, job: Job) {
         let mut state = self.0.lock();
-        if let Some(seat) = state.idle.pop() {
+        if let Some(slot) = state.idle.pop() {
             drop(state);
-            return seat.give(Some(job));
+            return slot.give(Some(job));
         }
-        if state.threads < self.0.most {
+        if state.threads < self.0.max_threads {
             let shared = self.0.clone();
             let thread = std::thread::Builder::new().name("bagtrack-worker".to_owned());
             match thread.spawn(move || shared.serve()) {
@@ -62,28 +62,28 @@ impl Drop for Workers {
         state.closed = true;
         let idle = std::mem::take(&mut state.idle);
         drop(state);
-        idle.iter().for_each(|seat| seat.give(None));
+        idle.iter().for_each(|slot| slot.give(None));
     }
 }
 
 impl fmt::Debug for Workers {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let threads = self.0.lock().threads;
-        write!(formatter, "Workers({threads} of {})", self.0.most)
+        write!(formatter, "Workers({threads} of {})", self.0.max_threads)
     }
 }
 
 impl Shared {
-    /// What a thread does.
+    /// The main loop of a thread.
     fn serve(&self) {
-        let seat = Arc::new(Seat::default());
-        while let Some(job) = self.next(&seat) {
+        let slot = Arc::new(ParkingSlot::default());
+        while let Some(job) = self.next(&slot) {
             job();
         }
     }
 
     /// The next job; none when the thread is to end.
-    fn next(&self, seat: &Arc<Seat>) -> Option<Job> {
+    fn next(&self, slot: &Arc<ParkingSlot>) -> Option<Job> {
         let mut state = self.lock();
         if let Some(job) = state.waiting.pop_front() {
             return Some(job);
@@ -91,9 +91,9 @@ impl Shared {
         if state.closed {
             return None;
         }
-        state.idle.push(seat.clone());
+        state.idle.push(slot.clone());
         drop(state);
-        seat.wait()
+        slot.wait()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -102,14 +102,14 @@ impl Shared {
     }
 }
 
-/// Where one idle thread waits for a job, or for none to tell it that there will be no more.
+/// Where one idle thread waits for a job, or for None, which tells it to end.
 #[derive(Default)]
-struct Seat {
+struct ParkingSlot {
     given: Mutex<Option<Option<Job>>>,
     filled: Condvar,
 }
 
-impl Seat {
+impl ParkingSlot {
     fn give(&self, job: Option<Job>) {
         *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(job);
         self.filled.notify_one();

@@ -1,6 +1,6 @@
 //! What the tracker refuses.
 
-use crate::tracker::params::validate::ParamsError;
+use crate::tracker::params::table::ParamsError;
 
 /// Why a tracker could not be made, or a frame could not be taken. The state is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

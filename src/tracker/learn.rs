@@ -1,358 +1,198 @@
-//! (C) What a session starts with, and what it learns from a frame.
+//! (C) What a session learns from a frame.
 //!
-//! The order matters: the background first, since the bag's subspaces are those of vectors as the new metric sees them.
+//! The background comes before the bag: the bag's subspaces are those of vectors under the new metric.
 
-use std::collections::VecDeque;
-
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-
-use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::{self, Background};
-use crate::tracker::appearance::bag::{self, Bag};
-use crate::tracker::classifier::ridge::{self, Discriminant};
-use crate::tracker::confidence::score::DistanceBaseline;
-use crate::tracker::confidence::update_gate::UpdateGate;
-use crate::tracker::estimate::Estimate;
-use crate::tracker::estimate::Status;
+use crate::tracker::appearance::bag::Bag;
+use crate::tracker::classifier::ridge;
+use crate::tracker::confidence::update_gate;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
-use crate::tracker::image::rect::Rect;
-use crate::tracker::motion::change_test::LastSeen;
-use crate::tracker::motion::global_motion::GlobalMotion;
-use crate::tracker::motion::particles::{self, Draws, Particle, StateBounds};
-use crate::tracker::params::table::Params;
-use crate::tracker::scale::dsst::ScaleFilter;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::motion::orientation;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::motion::random::{self, Draws};
 use crate::tracker::scale::pyramid;
 use crate::tracker::state::State;
-use crate::tracker::workspace::{self, Workspace};
+use crate::tracker::workspace::Workspace;
 
-/// Areas around the first box that the discriminant starts from, and how far they are off: a third of them each of
-/// these shares of the box (standard deviations), so that near misses, misses and the surroundings are all known.
-const FIRST_EXAMPLES: usize = 300;
-const FIRST_EXAMPLE_STDS: [f64; 3] = [0.1, 0.3, 0.8];
-/// The same for the logarithm of their scale, as a share of those.
-const FIRST_EXAMPLE_SCALES: f64 = 0.3;
-
-/// Room for learning.
-#[derive(Debug, Default)]
-pub(crate) struct Scratch {
-    areas: Vec<Particle>,
-    features: Vec<f32>,
-    pose: Vec<f32>,
-    pub background: background::Scratch,
-    pub bag: bag::Scratch,
-    fit: ridge::Scratch,
-    scale: pyramid::Scratch,
-}
-
-impl Scratch {
-    /// Makes room for what `most` particles teach.
-    pub fn begin(&mut self, most: usize) {
-        workspace::clear_and_reserve(&mut self.fit.labels, most);
-    }
-}
-
-/// The answer to a frame whose box came from the user.
-fn given(frame: u64, target: Rect) -> Estimate {
-    Estimate {
-        frame,
-        target,
-        score: 1.0,
-        status: Status::Tracking,
-    }
+/// Where the target was found in frame `number`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Found {
+    pub number: u64,
+    /// In the frame.
+    pub answer: Particle,
+    /// In the rectified view.
+    pub rectified: Particle,
+    /// The distance to the bag's first subspace.
+    pub distance: f64,
 }
 
 impl State {
-    /// The state after the first frame, in which `target` (checked) is the box.
-    pub fn new(frame: &GrayFrame, target: Rect, params: Params, workspace: &mut Workspace) -> Self {
-        let source = frame.source_size();
-        let (bounds, answer) = Self::place(source, &target);
-        let global_motion = params.global_motion.then(|| GlobalMotion::new(frame));
-        let mut state = Self {
-            params,
-            source,
-            bounds,
-            estimate: given(0, target),
-            answer,
-            particles: Vec::new(),
-            weights: Vec::new(),
-            history: VecDeque::new(),
-            bag: Bag::default(),
-            background: Background::default(),
-            discriminant: Discriminant::default(),
-            global_motion,
-            scale_filter: ScaleFilter::default(),
-            last_seen: LastSeen::default(),
-            update_gate: UpdateGate::default(),
-            usual: DistanceBaseline::default(),
-            orientation: 0.0,
-            frames_lost: 0,
-        };
-        state.reset_particles(answer);
-        state.init_models(frame, 0, workspace);
-        let Scratch { features, bag, .. } = &mut workspace.learning;
-        state
-            .bag
-            .admit(features, &state.background, &state.params, bag);
-        state.push_history(features);
-        state
+    /// Whether frame `number`, whose answer has `score`, may be learned from. Without a discriminant a score is no
+    /// probability.
+    pub fn passes(&self, score: f32, number: u64) -> bool {
+        !self.discriminant.is_on() || update_gate::passes(f64::from(score), number, &self.params)
     }
 
-    /// Takes `target` (checked) as the box in `frame`, the next one.
-    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect, workspace: &mut Workspace) {
-        let number = self.estimate.frame + 1;
-        let (bounds, answer) = Self::place(self.source, &target);
-        self.bounds = bounds;
-        self.orientation = 0.0;
-        self.frames_lost = 0;
-        self.reset_particles(answer);
-        if let Some(global_motion) = &mut self.global_motion {
-            *global_motion = GlobalMotion::new(frame);
-        }
-        self.init_models(frame, number, workspace);
-        let Scratch { features, bag, .. } = &mut workspace.learning;
-        self.bag.rebuild(&self.background, &self.params, bag);
-        self.history.clear();
-        self.update_gate = UpdateGate::default();
-        self.bag
-            .admit_pinned(features, &self.background, &self.params, bag);
-        self.push_history(features);
-        self.estimate = given(number, target);
-    }
-
-    /// Learns everything that a box given by the user says about the surroundings, and looks at the box.
-    fn init_models(&mut self, frame: &GrayFrame, number: u64, workspace: &mut Workspace) {
-        workspace.arrival.take(frame);
-        self.record_seen(&workspace.arrival);
-        let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
-        let views = FrameViews::of(frame, self, &mut workspace.views);
-        let frame = views.original();
-        workspace.extractor.compute_channels(
-            frame,
-            &[self.answer],
-            everywhere,
-            &self.bounds,
-            &self.params,
-        );
-        let mut draws = particles::generator(self.params.seed, number, Draws::TrainingSamples);
-        let count = self.params.background_samples as usize;
-        self.sample_background(frame, count, &mut draws, workspace);
-        if self.params.discriminant_weight > 0.0 {
-            self.begin_discriminant(frame, &mut draws, workspace);
-        }
-        self.scale_filter.forget();
-        self.learn_scale(frame, workspace);
-        self.look_at_answer(frame, workspace);
-        self.look_at_poses(frame, workspace);
-        views.give_back(&mut workspace.views);
-    }
-
-    /// How far from the answer frame `number` is looked at for the sake of learning, in working pixels.
-    pub fn sampling_radius(&self, number: u64) -> f64 {
-        if Background::wanted(number, &self.params) == 0 {
-            return 0.0;
-        }
-        background::radius(&self.answer, &self.bounds)
-    }
-
-    /// Keeps the particles for the next frame, if those come from them.
-    pub fn keep_particles(&mut self, particles: &[Particle], weights: &[f64]) {
+    /// Keeps what the next frame starts from.
+    pub fn remember(&mut self, found: &Found, is_lost: bool, workspace: &Workspace) {
+        self.answer = found.answer;
         if self.params.stored_particles() > 0 {
-            self.particles.clear();
-            self.particles.extend_from_slice(particles);
-            self.weights.clear();
-            self.weights.extend_from_slice(weights);
+            self.particles.clone_from(&workspace.candidates.particles);
+            self.weights.clone_from(&workspace.candidates.weights);
+        }
+        if is_lost {
+            self.frames_lost = self.frames_lost.saturating_add(1);
+            // A target that comes back is looked for upright.
+            self.orientation = 0.0;
+        } else {
+            self.frames_lost = 0;
+            self.record_seen(workspace);
         }
     }
 
-    /// Learns from frame `number`, in which the target was found at the answer.
-    pub fn learn(&mut self, frame: &GrayFrame, number: u64, workspace: &mut Workspace) {
-        if self.discriminant.is_on() {
-            let mut fit = std::mem::take(&mut workspace.learning.fit);
-            label_all(
-                &workspace.particles,
-                &self.answer,
-                &self.bounds,
-                &mut fit.labels,
-            );
-            self.discriminant.learn(
-                &workspace.examples,
-                workspace.vectors(),
-                &self.params,
-                &mut fit,
-            );
-            workspace.learning.fit = fit;
+    /// Records that the target is at the answer in the frame that the change test has loaded.
+    pub fn record_seen(&mut self, workspace: &Workspace) {
+        if self.params.static_penalty > 0.0 {
+            self.last_seen.record(self.answer, &workspace.change_test);
         }
-        self.learn_scale(frame, workspace);
-        let wanted = Background::wanted(number, &self.params);
-        if wanted > 0 {
-            let mut draws = particles::generator(self.params.seed, number, Draws::TrainingSamples);
-            self.sample_background(frame, wanted, &mut draws, workspace);
+    }
+
+    /// Updates all models from a frame in which the target was found.
+    pub fn learn(&mut self, views: &FrameViews<'_>, found: &Found, workspace: &mut Workspace) {
+        let (image, at) = (views.rectified(), &found.rectified);
+        self.orientation = self.measure_orientation(views.original(), found, workspace);
+        self.learn_discriminant(at, workspace);
+        self.learn_scale(image, at, workspace);
+        let samples = Background::wanted(found.number, &self.params);
+        if samples > 0 {
+            let mut draws = random::generator(self.params.seed, found.number, Draws::Samples);
+            let areas = &mut workspace.learning.areas;
+            background::areas(at, &self.bounds, samples, &mut draws, areas);
+            self.learn_background(image, workspace);
             let bag = &mut workspace.learning.bag;
             self.bag.rebuild(&self.background, &self.params, bag);
         }
-        self.look_at_answer(frame, workspace);
-        let Scratch { features, bag, .. } = &mut workspace.learning;
-        if Bag::admits(number, &self.params) {
+        self.describe_at(image, at, workspace);
+        let learning = &mut workspace.learning;
+        let features = &mut learning.features;
+        if Bag::admits(found.number, &self.params) {
             // V: the answer and the previous frames (equation 2).
             for vector in &self.history {
                 features.extend_from_slice(vector);
             }
+            let bag = &mut learning.bag;
             self.bag
                 .admit(features, &self.background, &self.params, bag);
         }
         self.push_history(features);
     }
 
-    /// `found` with the scale that the filter measures there: against the last answer's, or `found`'s own without one.
+    /// The target's rotation in `original`, in radians: the last one, or moved towards the likelier of two others.
+    fn measure_orientation(
+        &self,
+        original: &GrayFrame,
+        found: &Found,
+        workspace: &mut Workspace,
+    ) -> f64 {
+        let tried = orientation::hypotheses(self.orientation, found.distance, &self.params);
+        let Some(tried) = tried else {
+            return self.orientation;
+        };
+        let (candidates, rotated) = (&mut workspace.candidates, &mut workspace.rotated);
+        let (answer, bounds, params) = (found.answer, &self.bounds, &self.params);
+        let window = self.window(&answer, 0.0);
+        let first = candidates.particles.len();
+        for (angle, _) in tried {
+            let pixels = std::mem::take(&mut rotated.pixels);
+            let rotation = Rotation::about((answer.x, answer.y), angle);
+            let image = rotation.apply(original, &window, pixels);
+            let extractor = &mut rotated.extractor;
+            extractor.compute_channels(&image, &[answer], 0.0, bounds, params);
+            candidates.particles.push(answer);
+            candidates.describe_and_compare(&image, extractor, self);
+            rotated.pixels = image.into_pixels();
+        }
+        let mut weights = tried.map(|(_, log_prior)| log_prior);
+        let sigma = orientation::SIGMA_FACTOR * params.sigma;
+        candidates.weigh_from(first, sigma, params, &mut weights);
+        candidates.truncate(first);
+        orientation::updated(self.orientation, weights, params)
+    }
+
+    /// Fits the discriminant to the frame's particles, labelled by their distance from `at`.
+    fn learn_discriminant(&mut self, at: &Particle, workspace: &mut Workspace) {
+        if self.discriminant.is_on() {
+            let (candidates, fit) = (&workspace.candidates, &mut workspace.learning.fit);
+            ridge::label_all(&candidates.particles, at, &self.bounds, &mut fit.labels);
+            self.discriminant
+                .learn(&candidates.samples, candidates.vectors(), fit);
+        }
+    }
+
+    /// Updates the scale filter with the pyramid around `at`.
+    pub fn learn_scale(&mut self, image: &GrayFrame, at: &Particle, workspace: &mut Workspace) {
+        let rate = self.params.scale_learning_rate;
+        if rate > 0.0 {
+            self.describe_pyramid(image, at, workspace);
+            self.scale_filter
+                .learn(&mut workspace.learning.pyramid, rate);
+        }
+    }
+
+    /// `found` with the scale that the filter measures there, against the last answer's; clamped.
     pub fn measure_scale(
         &self,
-        frame: &GrayFrame,
+        image: &GrayFrame,
         found: Particle,
         workspace: &mut Workspace,
     ) -> Particle {
         if !self.scale_filter.has_learned() {
-            // The mean place of areas of many scales may be too far out for the mean of these.
             return self.bounds.clamp(found);
         }
-        // What was out of sight may have come nearer.
-        let center = if self.frames_lost > 0 {
-            found
-        } else {
-            Particle {
-                scale: self.answer.scale,
-                ..found
-            }
+        // A target that was lost may have come nearer.
+        let scale = match self.frames_lost {
+            0 => self.answer.scale,
+            _ => found.scale,
         };
-        self.look_at_scales(frame, &center, workspace);
-        let maximum = self.scale_filter.find(&mut workspace.learning.scale);
+        let center = Particle { scale, ..found };
+        self.describe_pyramid(image, &center, workspace);
+        let maximum = self.scale_filter.find(&mut workspace.learning.pyramid);
         self.bounds.clamp(Particle {
-            scale: center.scale * maximum.gated_change().exp(),
+            scale: scale * maximum.gated_change().exp(),
             ..found
         })
     }
 
-    fn learn_scale(&mut self, frame: &GrayFrame, workspace: &mut Workspace) {
-        let rate = self.params.scale_learning_rate;
-        if rate > 0.0 {
-            self.look_at_scales(frame, &self.answer, workspace);
-            self.scale_filter.learn(&mut workspace.learning.scale, rate);
-        }
-    }
-
-    /// Puts the pyramid around `center` into the room.
-    fn look_at_scales(&self, frame: &GrayFrame, center: &Particle, workspace: &mut Workspace) {
+    /// The feature vectors of the pyramid around `center`.
+    fn describe_pyramid(&self, image: &GrayFrame, center: &Particle, workspace: &mut Workspace) {
         let pyramid::Scratch {
             areas, features, ..
-        } = &mut workspace.learning.scale;
+        } = &mut workspace.learning.pyramid;
         pyramid::areas(center, areas);
         let params = pyramid::params(&self.params);
         workspace
             .extractor
-            .features(frame, areas, &self.bounds, &params, features);
+            .features(image, areas, &self.bounds, &params, features);
     }
 
-    /// The feature vector of the answer, as the first in the room.
-    fn look_at_answer(&self, frame: &GrayFrame, workspace: &mut Workspace) {
+    /// Replaces samples of the background by those of the areas in the workspace.
+    pub fn learn_background(&mut self, image: &GrayFrame, workspace: &mut Workspace) {
+        let learning = &mut workspace.learning;
+        let (areas, features) = (&learning.areas, &mut learning.features);
+        workspace
+            .extractor
+            .features(image, areas, &self.bounds, &self.params, features);
+        self.background
+            .rebuild(features, &self.params, &mut learning.background);
+    }
+
+    /// The feature vector of what is at `at`, as the only one in the workspace.
+    pub fn describe_at(&self, image: &GrayFrame, at: &Particle, workspace: &mut Workspace) {
         let features = &mut workspace.learning.features;
-        let answer = [self.answer];
         workspace
             .extractor
-            .features(frame, &answer, &self.bounds, &self.params, features);
-    }
-
-    /// Appends the feature vectors of the answer in other poses. The view is of the last of these then.
-    fn look_at_poses(&self, frame: &GrayFrame, workspace: &mut Workspace) {
-        let (answer, params) = ([self.answer], &self.params);
-        let Scratch { features, pose, .. } = &mut workspace.learning;
-        for angle in augmentation::angles(params) {
-            let rotated = augmentation::rotated(frame, &self.answer, angle);
-            workspace
-                .extractor
-                .compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
-            workspace
-                .extractor
-                .features(&rotated, &answer, &self.bounds, params, pose);
-            features.extend_from_slice(pose);
-        }
-    }
-
-    fn sample_background(
-        &mut self,
-        frame: &GrayFrame,
-        count: usize,
-        draws: &mut ChaCha8Rng,
-        workspace: &mut Workspace,
-    ) {
-        if count == 0 {
-            return;
-        }
-        let Scratch {
-            areas,
-            features,
-            background,
-            ..
-        } = &mut workspace.learning;
-        background::areas(&self.answer, &self.bounds, count, draws, areas);
-        workspace
-            .extractor
-            .features(frame, areas, &self.bounds, &self.params, features);
-        self.background.rebuild(features, &self.params, background);
-    }
-
-    fn begin_discriminant(
-        &mut self,
-        frame: &GrayFrame,
-        draws: &mut ChaCha8Rng,
-        workspace: &mut Workspace,
-    ) {
-        if !self.discriminant.is_on() {
-            let mut origin = self.background.mean().to_vec();
-            origin.resize(self.params.feature_len(), 0.0);
-            self.discriminant = Discriminant::new(origin);
-        }
-        let Scratch {
-            areas,
-            features,
-            fit,
-            ..
-        } = &mut workspace.learning;
-        first_examples(&self.answer, &self.bounds, draws, areas);
-        workspace
-            .extractor
-            .features(frame, areas, &self.bounds, &self.params, features);
-        workspace
-            .examples
-            .begin(&self.discriminant, &[], areas.len());
-        workspace.examples.score_vectors(features);
-        label_all(areas, &self.answer, &self.bounds, &mut fit.labels);
-        self.discriminant
-            .begin(&workspace.examples, features, &self.params, fit);
-    }
-}
-
-fn label_all(particles: &[Particle], target: &Particle, bounds: &StateBounds, out: &mut Vec<f32>) {
-    let label = |particle| ridge::label(particle, target, bounds);
-    out.clear();
-    out.extend(particles.iter().map(label));
-}
-
-/// The target itself, and areas around it.
-fn first_examples(
-    target: &Particle,
-    bounds: &StateBounds,
-    draws: &mut ChaCha8Rng,
-    particles: &mut Vec<Particle>,
-) {
-    let mut normal = || -> f64 { StandardNormal.sample(draws) };
-    particles.clear();
-    particles.push(*target);
-    for std in FIRST_EXAMPLE_STDS.iter().cycle().take(FIRST_EXAMPLES) {
-        particles.push(bounds.clamp(Particle {
-            x: target.x + std * bounds.box_width * target.scale * normal(),
-            y: target.y + std * bounds.box_height * target.scale * normal(),
-            scale: target.scale * (FIRST_EXAMPLE_SCALES * std * normal()).exp(),
-        }));
+            .features(image, &[*at], &self.bounds, &self.params, features);
     }
 }

@@ -2,22 +2,21 @@
 //! Harandi), as a pure state machine. No async, no HTTP, no files, no clock.
 //!
 //! [`Tracker::new`] takes the first frame and a box; [`Tracker::step`] takes the next frame and answers where the box
-//! is now. In between stands what the paper calls its four components:
+//! is now. `step` reads in the order of the paper's four components, each of which is a room:
 //!
-//! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale. Each frame draws N from the last ones by
-//!   their weights and moves each by a Gaussian step.
-//! - **(B)** *Affine subspaces* (`patch`, `subspace`, `candidate`): a candidate area becomes a vector v of D gray values
-//!   (`patch` is the only file that knows how). With the patches tracked in the P previous frames it makes the matrix
-//!   V (equation 2); the mean of its columns and its n dominant left singular vectors are the candidate's affine
-//!   subspace (equation 1). V is not centred.
-//! - **(C)** *The bag* (`bag`): up to K affine subspaces that were tracked before, a new one every W frames.
-//! - **(D)** *Distance* (`distance`): α times the squared distance of origins plus 1 - α times the squared Grassmann
-//!   geodesic distance of bases, both brought to \[0, 1\] (equations 4 to 8). *Likelihood* (`likelihood`): exp(-dist / σ),
+//! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale (section III-A).
+//! - **(B)** *Affine subspaces* (`features`, `appearance`): a candidate area becomes a vector v of length D. With the
+//!   patches tracked in the P previous frames it makes the matrix V (equation 2); the mean of its columns and its n
+//!   dominant left singular vectors are the candidate's affine subspace (equation 1). V is not centred.
+//! - **(C)** *The bag* (`appearance`): up to K affine subspaces that were tracked before, a new one every W frames.
+//! - **(D)** *Distance* (`grassmann`): α times the squared distance of origins plus 1 - α times the squared Grassmann
+//!   geodesic distance of bases, both brought to \[0, 1\] (equations 4 to 8). *Likelihood* (`weights`): exp(-dist / σ),
 //!   normalised over the candidates for each entry of the bag, summed over the bag; the greatest sum is the answer,
 //!   and the sums are the weights for the next frame (equations 9 to 12).
 //!
-//! How (B) and (D) are computed from inner products alone, without decomposing V for any candidate, is told in
-//! `products` and `candidate`. [`Evaluation`] is that computation by itself.
+//! The preset `robust` extends them: a classifier of the target against its surroundings (`classifier`), a filter for
+//! the scale (`scale`), a score and an update gate (`confidence`). The other rooms are `image` (frames and boxes),
+//! `params` and `linalg`.
 //!
 //! What the paper leaves open:
 //! - Everything happens in the working image ([`GrayFrame`]), at most [`WORKING_SIDE`] pixels on its longer side; boxes
@@ -41,46 +40,39 @@
 //! ```
 
 mod appearance;
+mod candidates;
 mod classifier;
 mod confidence;
 mod error;
 mod estimate;
 mod features;
+mod grassmann;
+mod hypotheses;
 mod image;
+mod input;
 mod learn;
 mod linalg;
 mod motion;
+mod observe;
 mod params;
 mod scale;
 mod snapshot;
+mod start;
 mod state;
 mod step;
-#[expect(
-    clippy::module_inception,
-    reason = "the type that the scratch is named after"
-)]
+#[expect(clippy::module_inception, reason = "named after its type")]
 mod tracker;
 mod weights;
 mod workspace;
 
-mod abreast;
-mod candidate;
-mod distance;
-mod dominant;
-mod evaluation;
-mod history;
-mod products;
-mod singular;
-
 pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
-pub use evaluation::Evaluation;
 pub use features::gray::patch;
+pub use grassmann::evaluation::Evaluation;
 pub use image::frame::{FrameError, GrayFrame, WORKING_SIDE, working_size};
 pub use image::rect::Rect;
+pub use input::LEAST_BOX_SIDE;
 pub use params::presets::Preset;
-pub use params::table::{Features, Params, Search};
-pub use params::validate::ParamsError;
-pub use state::LEAST_BOX_SIDE;
+pub use params::table::{Features, Parameter, Params, ParamsError, Search};
 pub use tracker::Tracker;

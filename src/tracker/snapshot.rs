@@ -11,15 +11,16 @@
 use crate::tracker::appearance::bag::Bag;
 use crate::tracker::error::TrackerError;
 use crate::tracker::image::frame::working_size;
+use crate::tracker::input;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::Params;
-use crate::tracker::state::{self, State};
+use crate::tracker::state::State;
 use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -72,12 +73,11 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
 fn restore(state: &mut State) {
     workspace::with(|workspace| {
         let learning = &mut workspace.learning;
-        state
-            .background
-            .learn(&state.params, &mut learning.background);
+        let params = &state.params;
+        state.background.learn(params, &mut learning.background);
         state
             .bag
-            .restore(&state.background, &state.params, &mut learning.bag);
+            .rebuild(&state.background, params, &mut learning.bag);
     });
 }
 
@@ -103,14 +103,14 @@ fn check_numbers(state: &State) -> bool {
     }
     let (working_width, working_height) = working_size(width, height);
     let bounds = &state.bounds;
-    let (horizontal, vertical) = State::to_working(state.source);
+    let (horizontal, vertical) = input::to_working(state.source);
     let box_sides = [
         (bounds.box_width, horizontal),
         (bounds.box_height, vertical),
     ];
     // Scaling back and forth may have rounded.
     let could_be_given = |&(side, scale): &(f64, f64)| {
-        side >= 0.99 && side / scale <= 1.01 * state::greatest_box_side(state.source)
+        side >= 0.99 && side / scale <= 1.01 * input::max_box_side(state.source)
     };
     let target = &state.estimate.target;
     let far = 1e2 * f64::from(width.max(height)) + 1e3;
@@ -124,7 +124,7 @@ fn check_numbers(state: &State) -> bool {
         && (0.0..=1.0).contains(&state.estimate.score)
         && state.estimate.frame < FRAMES
         && state
-            .usual
+            .baseline
             .distance
             .is_none_or(|distance| (0.0..=1e6).contains(&distance))
 }
@@ -171,7 +171,7 @@ fn check_extensions(state: &State) -> bool {
             .last_seen
             .is_valid_for((width, height), params.static_penalty > 0.0)
         && orientation::is_valid_for(state.orientation, params)
-        && (0.0..=1e6).contains(&state.update_gate.usual)
+        && (0.0..=1e6).contains(&state.update_gate.mean_distance)
 }
 
 fn check_history(state: &State) -> bool {

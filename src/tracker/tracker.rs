@@ -4,9 +4,10 @@ use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::input;
 use crate::tracker::params::table::Params;
 use crate::tracker::snapshot;
-use crate::tracker::state::{self, State};
+use crate::tracker::state::State;
 use crate::tracker::workspace;
 
 /// Follows one object.
@@ -26,7 +27,7 @@ impl Tracker {
     pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
         params.validate()?;
         let source = frame.source_size();
-        state::check_target(source, &target)?;
+        input::check_target(source, &target)?;
         Ok(workspace::with(|workspace| {
             let state = State::new(frame, target, params, workspace);
             Self { state }
@@ -38,9 +39,9 @@ impl Tracker {
     /// # Errors
     /// A frame whose uploaded size is not that of the session's first frame.
     pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
-        state::check_frame(self.state.source, frame)?;
+        input::check_frame(self.state.source, frame)?;
         Ok(workspace::with(|workspace| {
-            self.state.find(frame, workspace)
+            self.state.step(frame, workspace)
         }))
     }
 
@@ -50,8 +51,8 @@ impl Tracker {
     /// # Errors
     /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
     pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
-        state::check_frame(self.state.source, frame)?;
-        state::check_target(self.state.source, &target)?;
+        input::check_frame(self.state.source, frame)?;
+        input::check_target(self.state.source, &target)?;
         workspace::with(|workspace| self.state.retarget(frame, target, workspace));
         Ok(self.state.estimate)
     }
@@ -59,6 +60,18 @@ impl Tracker {
     /// The last answer.
     pub fn estimate(&self) -> Estimate {
         self.state.estimate
+    }
+
+    /// The particles of the last frame, in the order in which they were drawn: the box of each, in the pixels of the
+    /// uploaded frame, and its weight. Weights are at least 0 and sum to 1; the next particles are drawn by them.
+    ///
+    /// After [`new`](Self::new) and [`retarget`](Self::retarget) all are at the box given, with equal weights. There are
+    /// none with [`Search::Answer`](crate::tracker::Search::Answer): then the next particles are drawn around the answer, and
+    /// the last ones are not kept.
+    pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
+        let state = &self.state;
+        let boxes = state.particles.iter().map(|it| state.target_of(it));
+        boxes.zip(state.weights.iter().copied())
     }
 
     /// The parameters of this tracker.

@@ -30,7 +30,7 @@ fn serve() -> (Child, String) {
             break url.to_owned();
         }
     };
-    // Somebody must go on reading, or the service would wait for it.
+    // What is not read is dropped, and then said so; nobody needs to see that here.
     std::thread::spawn(move || log.for_each(drop));
     (child, url)
 }
@@ -85,7 +85,6 @@ fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
     assert_eq!(messages.last().unwrap(), "bye");
 }
 
-/// Frames that come one by one may be tracked where they are read, several in one post never are.
 #[tokio::test]
 async fn frames_one_by_one_get_the_answers_of_frames_together() {
     let (mut child, url) = serve();
@@ -111,6 +110,68 @@ async fn frames_one_by_one_get_the_answers_of_frames_together() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert_eq!(all["answers"], Value::from(answers));
+}
+
+#[tokio::test]
+async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() {
+    const REQUESTS: u64 = 3000;
+    let mut command = bagtrack();
+    command.args(["serve", "--log-format", "json"]);
+    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    log.read_line(&mut line).unwrap();
+    let started: Value = serde_json::from_str(&line).unwrap();
+    let message = started["fields"]["message"].as_str().unwrap();
+    let url = message.strip_prefix("listening on ").unwrap().to_owned();
+
+    // From here on the pipe is open and nobody reads it. Each of these requests has two lines in the log, together
+    // many times what the pipe and the service keep.
+    let client = reqwest::Client::new();
+    let nowhere = format!("{url}/nowhere");
+    let all = async {
+        for _ in 0..REQUESTS / 10 {
+            let ask = || async { client.get(&nowhere).send().await.unwrap().status() };
+            let statuses = futures_util::future::join_all((0..10).map(|_| ask())).await;
+            assert!(statuses.iter().all(|status| *status == 404), "{statuses:?}");
+        }
+        assert!(
+            client
+                .get(format!("{url}/healthz"))
+                .send()
+                .await
+                .unwrap()
+                .status()
+                .is_success()
+        );
+    };
+    let answered = tokio::time::timeout(std::time::Duration::from_secs(60), all).await;
+    if answered.is_err() {
+        child.kill().unwrap();
+        panic!("requests wait for the log");
+    }
+
+    let reader = std::thread::spawn(move || {
+        let lines = log
+            .lines()
+            .map(|line| serde_json::from_str(&line.unwrap()).unwrap());
+        lines.collect::<Vec<Value>>()
+    });
+    let ended = Command::new("kill").arg(child.id().to_string()).status();
+    assert!(ended.unwrap().success());
+    assert!(child.wait().unwrap().success());
+    let lines = reader.join().unwrap();
+    let dropped = lines
+        .iter()
+        .filter_map(|line| line["fields"]["total"].as_u64());
+    let dropped = dropped.max().expect("it says that lines were dropped");
+    let of_requests = lines
+        .iter()
+        .filter(|line| line["span"]["path"] == "/nowhere");
+    let written = of_requests.count() as u64;
+    assert!(written > 1000 && dropped > 0, "{written} and {dropped}");
+    assert!(written + dropped >= 2 * REQUESTS, "{written} and {dropped}");
 }
 
 #[test]

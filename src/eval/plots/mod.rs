@@ -1,5 +1,5 @@
-//! Figures, drawn as SVG: the precision plot and the success plot of the benchmark (Wu, Lim and Yang 2013), with a curve
-//! for each evaluated variant, and the centre error over time, one figure a sequence.
+//! Figures, drawn as SVG: the precision plot and the success plot of the benchmark (Wu, Lim and Yang 2013), with a
+//! curve for each evaluated variant, and the centre error over time, one figure a sequence.
 //!
 //! Text is set by whoever shows the picture, in its own sans-serif font: no font is read here, and labels stand where
 //! their width does not matter. What could go wrong: names that are no file names; so everything that is not a

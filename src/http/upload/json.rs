@@ -1,7 +1,8 @@
-//! JSON uploads: frames as base64, settings as values.
+//! JSON uploads: `frame` and `frames` are base64, all other fields are settings.
 
-use super::{Form, Upload};
-use crate::http::problem::Problem;
+use super::fields::Fields;
+use super::settings::{FrameCount, Settings};
+use crate::http::problems::problem::Problem;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use bytes::Bytes;
@@ -16,11 +17,11 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Most fields of an object; there are not nearly as many names.
+/// Most fields of an object; no route takes nearly as many.
 const MAX_FIELDS: usize = 32;
 
-/// The fields of a JSON object, in order. What is in them is not parsed, and an object with more fields than names
-/// is refused early: parsed JSON can take many times the room of its text.
+/// The fields of a JSON object, in order. Their values are not parsed, and an object with very many fields is refused
+/// early: parsed JSON can take many times the memory of its text.
 struct Object<'a>(Vec<(Cow<'a, str>, &'a RawValue)>);
 
 impl<'de: 'a, 'a> Deserialize<'de> for Object<'a> {
@@ -50,41 +51,35 @@ impl<'de> Visitor<'de> for ObjectVisitor {
     }
 }
 
-/// Reads a JSON body with at most `most` frames.
-pub fn read(form: &Form, most: usize, body: &[u8], upload: &mut Upload) -> Result<(), Problem> {
-    let Object(fields) = serde_json::from_slice(body)
+/// Adds the fields of a JSON body to `fields`: at most `max_files` files.
+pub(super) fn read<S: Settings>(
+    body: &[u8],
+    max_files: usize,
+    fields: &mut Fields,
+) -> Result<(), Problem> {
+    let Object(members) = serde_json::from_slice(body)
         .map_err(|error| Problem::malformed(format!("The body is not a JSON object: {error}.")))?;
-    for (name, value) in fields {
+    for (name, value) in members {
         match &*name {
             _ if value.get() == "null" => {}
-            "frame" => upload.frames.push(frame(text(&name, value)?)?),
-            "frames" if form.several => {
-                for text in frames(value, most)? {
-                    upload.frames.push(frame(text)?);
+            "frame" => fields.files.push(frame(text(&name, value)?)?),
+            "frames" if S::FRAMES == FrameCount::Several => {
+                for text in frames(value, max_files)? {
+                    fields.files.push(frame(text)?);
                 }
             }
-            setting if form.settings.contains(&setting) => {
-                let value = match value.get().starts_with('"') {
-                    true => text(&name, value)?,
-                    false => Cow::Borrowed(value.get()),
-                };
-                upload.fields.set(setting, &value)?;
-            }
-            unknown => {
-                let several = form.several.then_some("frames");
-                let frames = std::iter::once("frame").chain(several);
-                return Err(form.unknown("field", unknown, frames));
-            }
+            _ if value.get().starts_with('"') => fields.texts.add(&name, &text(&name, value)?)?,
+            _ => fields.texts.add(&name, value.get())?,
         }
     }
     Ok(())
 }
 
-fn frames(value: &RawValue, most: usize) -> Result<Vec<Cow<'_, str>>, Problem> {
+fn frames(value: &RawValue, max_files: usize) -> Result<Vec<Cow<'_, str>>, Problem> {
     // Two quotes a string: base64 has none of its own.
     let quotes = value.get().bytes().filter(|byte| *byte == b'"').count();
-    if quotes > 2 * most {
-        return Err(Problem::too_many_frames(most));
+    if quotes > 2 * max_files {
+        return Err(Problem::too_many_frames(max_files));
     }
     serde_json::from_str(value.get())
         .map_err(|_| Problem::malformed("`frames` must be an array of base64 strings."))

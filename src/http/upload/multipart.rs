@@ -1,36 +1,32 @@
-//! Multipart uploads: `frame` parts, and settings as text parts.
+//! Multipart uploads: `frame` parts are files, all others are settings.
 
-use super::{Form, Upload};
-use crate::http::body;
-use crate::http::problem::Problem;
+use super::body;
+use super::fields::Fields;
+use crate::http::problems::problem::Problem;
 use axum::extract::multipart::MultipartError;
 use axum::extract::{FromRequest, Multipart, Request};
 
-/// Reads a multipart body of at most `limit` bytes (which the router sets as the limit of all bodies) with at most
-/// `most` frames.
-pub async fn read(
-    form: &Form,
-    limit: usize,
-    most: usize,
+/// Adds the parts of a multipart body to `fields`: at most `max_files` files. The router limits all bodies to
+/// `max_bytes` bytes.
+pub(super) async fn read(
     request: Request,
-    upload: &mut Upload,
+    max_bytes: usize,
+    max_files: usize,
+    fields: &mut Fields,
 ) -> Result<(), Problem> {
-    let failed = |error: MultipartError| body::problem(&error, limit);
+    let failed = |error: MultipartError| body::problem(&error, max_bytes);
     let mut multipart = Multipart::from_request(request, &()).await.map_err(|_| {
         Problem::malformed("The content type has no valid `boundary`; let the HTTP client set it.")
     })?;
-    while let Some(field) = multipart.next_field().await.map_err(failed)? {
-        let name = field.name().unwrap_or("").to_owned();
-        if name == "frame" {
-            if upload.frames.len() >= most {
-                return Err(Problem::too_many_frames(most));
-            }
-            upload.frames.push(field.bytes().await.map_err(failed)?);
-        } else if form.settings.contains(&name.as_str()) {
-            let text = field.text().await.map_err(failed)?;
-            upload.fields.set(&name, &text)?;
+    while let Some(part) = multipart.next_field().await.map_err(failed)? {
+        let name = part.name().unwrap_or("").to_owned();
+        if name != "frame" {
+            let text = part.text().await.map_err(failed)?;
+            fields.texts.add(&name, &text)?;
+        } else if fields.files.len() < max_files {
+            fields.files.push(part.bytes().await.map_err(failed)?);
         } else {
-            return Err(form.unknown("part", &name, ["frame"]));
+            return Err(Problem::too_many_frames(max_files));
         }
     }
     Ok(())

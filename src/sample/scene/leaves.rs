@@ -6,8 +6,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Frames for which nothing of the card is seen, an odd number.
 const AWAY: f64 = 25.0;
-/// Frames from its start to the left to where it stays in the end, if the clip is long enough: at most 4 pixels a frame to
-/// the side, at 320 x 240.
+/// Frames from its start to the left to where it stays in the end, if the clip is long enough: at most 4 pixels a
+/// frame to the side, at 320 x 240.
 const WAY: f64 = 150.0;
 /// Where the way starts and ends, by the width of the frame.
 const START: f64 = 0.4;

@@ -1,8 +1,7 @@
-//! (C) How the look that the user pointed at would look if the target tilted a little.
+//! Augmentation of the first box's image: copies rotated by some degrees either way.
 //!
-//! A subspace of one vector knows one look. Turned by some degrees either way in the picture, the same look makes the first
-//! subspace one of three vectors: what a target does by tilting its head is in it from the first frame on, and is
-//! farther from no other look. The whole frame is turned, so the rim shows what would be there.
+//! A subspace of one vector is a point. With two rotated copies the first subspace spans what the target looks like when
+//! it tilts, from the first frame on. The whole frame is rotated, so the rim shows what would be there.
 
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
@@ -10,16 +9,16 @@ use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::Params;
 
-/// Most poses beside the look as it is.
-pub(crate) const MOST: usize = 2;
+/// Rotated copies at most.
+pub(crate) const MAX_VIEWS: usize = 2;
 
-/// By which angles, in radians, the look is turned; none where that is off.
+/// The angles of the copies, in radians; none where that is off.
 pub(crate) fn angles(params: &Params) -> impl Iterator<Item = f64> + use<> {
     let angle = params.augmentation_angle.to_radians();
     [angle, -angle].into_iter().filter(|angle| *angle != 0.0)
 }
 
-/// `frame` turned by `angle` around the centre of `target`.
+/// `frame` rotated by `angle` about the centre of `target`.
 pub(crate) fn rotated(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFrame {
     let everywhere = Rect::new(
         0.0,
@@ -27,7 +26,7 @@ pub(crate) fn rotated(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayF
         frame.downsample() * f64::from(frame.width()),
         frame.downsample() * f64::from(frame.height()),
     );
-    Rotation::about(target, angle).apply(frame, &everywhere, Vec::new())
+    Rotation::about((target.x, target.y), angle).apply(frame, &everywhere, Vec::new())
 }
 
 #[cfg(test)]
@@ -78,7 +77,7 @@ mod tests {
     fn there_are_two_poses_or_none() {
         assert_eq!(angles(&Preset::Paper.params()).count(), 0);
         let found: Vec<f64> = angles(&Preset::Robust.params()).collect();
-        assert_eq!(found.len(), MOST);
+        assert_eq!(found.len(), MAX_VIEWS);
         assert_eq!(found[0], -found[1]);
     }
 }

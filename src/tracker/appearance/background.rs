@@ -1,12 +1,9 @@
-//! The background: what the surroundings of the target look like, and the metric that they make.
+//! The background: vectors of areas beside the target, their mean and the metric that they make.
 //!
 //! Compared as they are, two patches are alike where both show any edges at all. So vectors of areas beside the target
 //! (and of areas that miss it by a third) give a mean and a covariance C, and vectors are compared by
-//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean): directions in which the background varies count less, which is the metric of
-//! a linear discriminant analysis. Where candidates stand alone, inner products are enough ([`metric`](crate::tracker::appearance::mahalanobis));
-//! otherwise vectors are whitened ([`whitening`](crate::tracker::appearance::whitening)).
-//!
-//! Without samples the metric is the plain one and the mean is zero.
+//! (x - mean)ᵀ (I + C / ridge)⁻¹ (y - mean): directions in which the background varies count less, as in a linear
+//! discriminant analysis ([`Metric`]). Without samples the metric is the plain one and the mean is empty.
 
 use std::collections::VecDeque;
 
@@ -16,7 +13,6 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::appearance::mahalanobis::{self, Metric};
-use crate::tracker::appearance::whitening::Whitening;
 use crate::tracker::features::quantized::QuantizedVector;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 use crate::tracker::params::table::Params;
@@ -27,6 +23,11 @@ const INNER: f64 = 0.3;
 const OUTER: f64 = 1.5;
 /// The box counts as at least this long on a side, in working pixels, so that areas beside a tiny target differ.
 const MIN_SIDE: f64 = 16.0;
+/// Frames from one refresh of the samples to the next.
+const REFRESH_EVERY: u64 = 10;
+/// The ridge of the covariance, as a multiple of its mean eigenvalue. It leaves single precision its digits: a vector
+/// that lies among the samples keeps one part in D of its squared length.
+const RIDGE: f64 = 1.0;
 /// The share of the samples that a refresh replaces.
 const RENEWED: f64 = 0.2;
 
@@ -37,12 +38,8 @@ pub(crate) struct Background {
     samples: VecDeque<QuantizedVector>,
     #[serde(skip)]
     mean: Vec<f32>,
-    /// Where candidates stand alone.
     #[serde(skip)]
     metric: Metric,
-    /// Where they do not.
-    #[serde(skip)]
-    whitening: Whitening,
 }
 
 /// Room for learning from samples.
@@ -71,10 +68,10 @@ impl WithSimd for Learn<'_> {
 impl Background {
     /// How many new samples frame `number` brings: all in the first frame, some in every so many of the others.
     pub fn wanted(number: u64, params: &Params) -> usize {
-        let all = params.background_samples as usize;
+        let all = params.metric_samples();
         if number == 0 {
             all
-        } else if number.is_multiple_of(u64::from(params.background_every)) {
+        } else if number.is_multiple_of(REFRESH_EVERY) {
             (all as f64 * RENEWED).ceil() as usize
         } else {
             0
@@ -84,10 +81,10 @@ impl Background {
     /// Takes new samples, vectors of length D one after the other; the oldest leave.
     pub fn rebuild(&mut self, vectors: &[f32], params: &Params, scratch: &mut Scratch) {
         for vector in vectors.chunks_exact(params.feature_len()) {
-            let full = self.samples.len() >= params.background_samples as usize;
+            let full = self.samples.len() >= params.metric_samples();
             let oldest = if full { self.samples.pop_front() } else { None };
             let mut look = oldest.unwrap_or_default();
-            look.keep(vector);
+            look.set(vector);
             self.samples.push_back(look);
         }
         self.learn(params, scratch);
@@ -115,13 +112,8 @@ impl Background {
             look.add_to(&mut self.mean, 1.0 / count as f32);
         }
         self.samples_into(&mut scratch.vectors);
-        let ridge = params.background_ridge;
-        if params.single_vector_candidate {
-            self.metric
-                .fit(&scratch.vectors, len, ridge, &mut scratch.metric);
-        } else {
-            self.whitening = Whitening::of(&self.mean, &scratch.vectors, ridge);
-        }
+        self.metric
+            .fit(&scratch.vectors, len, RIDGE, &mut scratch.metric);
     }
 
     /// Makes `out` the samples, with the mean taken off: none where there is no metric.
@@ -149,7 +141,7 @@ impl Background {
         }
         let vectors = out.chunks_exact_mut(self.mean.len());
         for (look, vector) in self.samples.iter().zip(vectors) {
-            look.write_without(&self.mean, vector);
+            look.write(&self.mean, vector);
         }
     }
 
@@ -158,19 +150,14 @@ impl Background {
         &self.mean
     }
 
-    /// The metric, where candidates stand alone.
+    /// The metric.
     pub fn metric(&self) -> &Metric {
         &self.metric
     }
 
-    /// The whitening, where candidates do not stand alone.
-    pub fn whitening(&self) -> &Whitening {
-        &self.whitening
-    }
-
     /// Whether the samples may be those of a tracker with `params`.
     pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
-        self.samples.len() == params.background_samples as usize
+        self.samples.len() == params.metric_samples()
             && self
                 .samples
                 .iter()

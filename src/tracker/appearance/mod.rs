@@ -1,10 +1,23 @@
-//! TODO-doc
+//! (B) Affine subspaces and (C) the bag of them: what the target has looked like, and what surrounds it.
+//!
+//! - `subspace`: an affine subspace A = {μ, U} as vectors (equation 1), for the printed evaluation.
+//! - `span`: the same as coefficients of the few vectors that it is made of, for single-vector candidates.
+//! - `bag`: up to K subspaces, a new one every W frames (equation 3, section III-C).
+//! - `augmentation`: rotated copies of the first box's image, which make its subspace.
+//! - `background`: vectors of areas beside the target; `mahalanobis`: the metric that their covariance makes.
+//! - `bag_matrix` and `point_distance`: the distances of single-vector candidates to all entries (equations 4 to 8 with
+//!   n = 1 for the candidate), under that metric.
+//!
+//! In: feature vectors of length D, one after the other. Out: N x K distances in \[0, 1\], and the products of the
+//! candidates with the discriminant's vectors. Vectors are kept quantised to a byte a value. A covariance of equal
+//! samples gives the plain metric, and a vector that is nothing but rounding after centring counts as the background's
+//! mean; nothing here divides by zero.
 
 pub(crate) mod augmentation;
 pub(crate) mod background;
 pub(crate) mod bag;
+pub(crate) mod bag_matrix;
 pub(crate) mod mahalanobis;
 pub(crate) mod point_distance;
 pub(crate) mod span;
 pub(crate) mod subspace;
-pub(crate) mod whitening;

@@ -88,7 +88,7 @@ impl WithSimd for Fit<'_> {
 
 impl Scratch {
     /// Takes the samples of `background`, which all combinations are made with from here on.
-    pub fn take(&mut self, background: &Background) {
+    pub fn load(&mut self, background: &Background) {
         Arch::new().dispatch(Take {
             scratch: self,
             background,
@@ -156,13 +156,11 @@ impl Span {
                 scratch.gram[i * count + j] = if is_left { product } else { 0.0 };
             }
             let square = scratch.gram[i * count + i];
-            scratch
-                .scales
-                .push(match (params.unit_length, square > 0.0) {
-                    (true, true) => 1.0 / square.sqrt(),
-                    (true, false) => 0.0,
-                    (false, _) => 1.0,
-                });
+            scratch.scales.push(if square > 0.0 {
+                1.0 / square.sqrt()
+            } else {
+                0.0
+            });
         }
         self.combine(count, params.basis_dim as usize, scratch);
         self.background_coordinates.clear();

@@ -2,11 +2,11 @@
 
 use pulp::Simd;
 
-use crate::tracker::classifier::dense_search::MAX_AWAY;
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, LANES};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::CHANNELS;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, LANES};
 
+/// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
+pub(crate) const MAX_OFFSET: usize = 24;
 /// After the directions and the gray values: energies of the directions, gray values and their squares, summed over as
 /// many cells to the right as a window is wide.
 const WIDE: usize = GRAY + 1;
@@ -27,12 +27,12 @@ pub(crate) struct ChannelPlanes {
 impl ChannelPlanes {
     /// Takes the cells of `grid`, for windows of so many columns and rows; with room for the most that a scan looks at.
     #[inline(always)]
-    pub fn take(&mut self, grid: &Grid, (width, height): (usize, usize)) {
-        let most_columns = width + 2 * MAX_AWAY + LANES;
-        let most = most_columns * (height + 2 * MAX_AWAY) * PLANES;
-        clamp(&mut self.lines, most);
-        clamp(&mut self.energies, most_columns);
-        clamp(&mut self.squares, most_columns);
+    pub fn load(&mut self, grid: &Grid, (width, height): (usize, usize)) {
+        let most_columns = width + 2 * MAX_OFFSET + LANES;
+        let most = most_columns * (height + 2 * MAX_OFFSET) * PLANES;
+        reserve(&mut self.lines, most);
+        reserve(&mut self.energies, most_columns);
+        reserve(&mut self.squares, most_columns);
         self.stride = grid.columns + LANES;
         let cells = grid.values.chunks_exact(grid.columns * CHANNELS);
         let rows = cells.zip(grid.grays.chunks_exact(grid.columns));
@@ -94,7 +94,7 @@ impl ChannelPlanes {
 }
 
 /// Makes `values` hold at least `count` of them, whatever they are.
-fn clamp(values: &mut Vec<f32>, count: usize) {
+fn reserve(values: &mut Vec<f32>, count: usize) {
     if values.len() < count {
         values.resize(count, 0.0);
     }
@@ -120,7 +120,7 @@ mod tests {
             grays: (0..columns * rows).map(number).collect(),
         };
         let mut planes = ChannelPlanes::default();
-        planes.take(&grid, (width, height));
+        planes.load(&grid, (width, height));
         let cell = |i: usize, j: usize| &grid.values[(j * columns + i) * CHANNELS..][..DIRECTIONS];
         let gray = |i: usize, j: usize| grid.grays[j * columns + i];
         for (i, j) in [(0, 0), (3, 2), (6, 5)] {

@@ -1,86 +1,85 @@
-//! (A) Where the discriminant sees the target among all places around the last answer.
+//! Dense search: the discriminant's scores at every place around the last answer, a cell apart.
 //!
 //! Particles are few, and what is between them is not seen: the further a target may have moved, the wider the gaps.
-//! Areas of one size that are whole cells apart have their cells in common, though. So one grid of cells over the
-//! surroundings serves all of them, and the discriminant's scores are a correlation of its weights with the grid.
-//! Some of the first particles are then drawn around the best places; they are weighed as all particles are.
+//! Areas of one size that are whole cells apart share their cells, so one grid of cells serves all of them, and the
+//! scores are a correlation of the discriminant's weights with the grid ([`SlidingWindow`]). Half of the first
+//! particles are then drawn around the maxima, and weighed as all particles are.
 //!
-//! A score here is not quite that of a particle at the same place: a cell at the edge of an area is normalised with
-//! the cells beyond the edge as well.
+//! A score here differs a little from that of a particle at the same place: a cell at the edge of an area is normalised
+//! with the cells beyond the edge as well.
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::tracker::classifier::channel_planes::MAX_OFFSET;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::sliding_window::SlidingWindow;
 use crate::tracker::features::extractor::{Extractor, Grid};
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::Particle;
-use crate::tracker::motion::proposal::SearchContext;
-use crate::tracker::params::table::Features;
-use crate::tracker::params::table::Params;
-use crate::tracker::workspace;
+use crate::tracker::motion::search::SearchContext;
+use crate::tracker::params::table::{Features, Params};
 
-/// Places in each direction at most: a look further than that costs more than the rest of a step.
-pub(crate) const MAX_AWAY: usize = 24;
-/// Values that are multiplied at most: as many as [`MAX_AWAY`] takes with 8 x 8 cells. More cells, fewer places.
+/// Multiplications of a dense search at most: as many as [`MAX_OFFSET`] takes with 8 x 8 cells.
 const MAX_PRODUCTS: usize = 1_600_000;
 
-/// The scores of a frame, and room for them.
+/// The dense search of a frame, and its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct DenseSearch {
     grid: Grid,
     sliding_window: SlidingWindow,
-    /// How likely each place is, row by row: the logarithm of what its particle's weight is multiplied with.
+    /// The logarithm of what the weight of a particle at each place is multiplied by, row by row.
     values: Vec<f32>,
-    /// The same without the peaks that were taken, and those.
-    left: Vec<f32>,
     maxima: Vec<Particle>,
-    /// Where the places are; none where nothing was looked at.
-    places: Option<SampleCoords>,
 }
 
-/// Places in a row and above each other, around a center.
+/// The places of a dense search: a grid around a center.
 #[derive(Debug, Clone, Copy)]
-struct SampleCoords {
+struct SearchGrid {
     center: Particle,
-    /// How far to the left of the center, and above it, the first of them is.
-    away: (usize, usize),
+    /// How many places there are on each side of the center: left and right, above and below.
+    offset: (usize, usize),
+    /// The distance of two neighbours, in working pixels.
     cell: (f64, f64),
 }
 
-impl SampleCoords {
+impl SearchGrid {
+    /// The grid around `center` that reaches `radius` working pixels far, or as far as a dense search may.
+    fn new(center: Particle, radius: f64, cell: (f64, f64), params: &Params) -> Self {
+        let [mut across, mut down] =
+            [cell.0, cell.1].map(|side| ((radius / side).ceil() as usize).min(MAX_OFFSET));
+        let len = params.feature_len();
+        while (2 * across + 1) * (2 * down + 1) * len > MAX_PRODUCTS && across.max(down) > 0 {
+            (across, down) = (across.saturating_sub(1), down.saturating_sub(1));
+        }
+        let offset = (across, down);
+        Self {
+            center,
+            offset,
+            cell,
+        }
+    }
+
+    fn columns(&self) -> usize {
+        2 * self.offset.0 + 1
+    }
+
+    fn rows(&self) -> usize {
+        2 * self.offset.1 + 1
+    }
+
     #[inline(always)]
     fn at(&self, column: usize, row: usize) -> Particle {
-        let ((across, down), (width, height)) = (self.away, self.cell);
         Particle {
-            x: self.center.x + (column as f64 - across as f64) * width,
-            y: self.center.y + (row as f64 - down as f64) * height,
+            x: self.center.x + (column as f64 - self.offset.0 as f64) * self.cell.0,
+            y: self.center.y + (row as f64 - self.offset.1 as f64) * self.cell.1,
             ..self.center
         }
     }
-
-    /// The value at `particle`, between those of the places around it; none beyond the last of them.
-    fn value(&self, values: &[f32], particle: &Particle) -> Option<f64> {
-        let ((across, down), (width, height)) = (self.away, self.cell);
-        let x = (particle.x - self.center.x) / width + across as f64;
-        let y = (particle.y - self.center.y) / height + down as f64;
-        let (columns, rows) = (2 * across + 1, 2 * down + 1);
-        let inside = |at: f64, count: usize| (0.0..(count - 1) as f64).contains(&at);
-        if !inside(x, columns) || !inside(y, rows) {
-            return None;
-        }
-        let corner = &values[y as usize * columns + x as usize..];
-        let (right, below) = (x.fract(), y.fract());
-        let line = |from: usize| {
-            let (a, b) = (f64::from(corner[from]), f64::from(corner[from + 1]));
-            a + (b - a) * right
-        };
-        Some(line(0) + (line(columns) - line(0)) * below)
-    }
 }
 
-/// What scores of places become together with the prior, to be compiled for the instructions that this machine has.
+/// Turns the scores in `values` into logarithms of weights, compiled for this machine's instructions.
 struct Weigh<'a> {
-    places: SampleCoords,
+    places: SearchGrid,
     search: &'a SearchContext<'a>,
     values: &'a mut [f32],
 }
@@ -90,26 +89,26 @@ impl WithSimd for Weigh<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let factor = self.search.params.discriminant_weight;
-        let columns = 2 * self.places.away.0 + 1;
-        for (row, values) in self.values.chunks_exact_mut(columns).enumerate() {
+        let weight = self.search.params.discriminant_weight;
+        let rows = self.values.chunks_exact_mut(self.places.columns());
+        for (row, values) in rows.enumerate() {
             for (column, value) in values.iter_mut().enumerate() {
-                let likely = factor * f64::from(*value);
-                let place = self.places.at(column, row);
-                *value = (likely + self.search.log_displacement(&place)) as f32;
+                let prior = self.search.log_prior(&self.places.at(column, row));
+                *value = (weight * f64::from(*value) + prior) as f32;
             }
         }
     }
 }
 
 impl DenseSearch {
-    /// The best places, best first.
+    /// The maxima, best first.
     pub fn maxima(&self) -> &[Particle] {
         &self.maxima
     }
 
-    /// Looks at all places around the one that is sought, in what `extractor` is open on.
-    pub fn look(
+    /// Scores all places around the last answer, displaced with the image, in the channels that `extractor` has
+    /// computed, and finds the maxima.
+    pub fn run(
         &mut self,
         extractor: &mut Extractor,
         search: &SearchContext<'_>,
@@ -117,87 +116,45 @@ impl DenseSearch {
     ) {
         let params = search.params;
         self.maxima.clear();
-        self.places = None;
-        if params.dense_maxima == 0
-            || !discriminant.is_on()
-            || params.features != Features::Gradients
-        {
+        let has_gradients = params.features == Features::Gradients;
+        if params.dense_maxima == 0 || !discriminant.is_on() || !has_gradients {
             return;
         }
         let center = search.displaced();
-        let (cell_width, cell_height) = Extractor::cell(&center, search.bounds, params);
-        let (across, down) = places(search.scanned(), (cell_width, cell_height), params);
+        let cell = Extractor::cell_size(&center, search.bounds, params);
+        let places = SearchGrid::new(center, search.dense_radius(), cell, params);
+        let grid = &mut self.grid;
         extractor.grid(
             &center,
-            (across, down),
-            MAX_AWAY,
+            places.offset,
+            MAX_OFFSET,
             search.bounds,
             params,
-            &mut self.grid,
+            grid,
         );
-        let (columns, rows) = (2 * across + 1, 2 * down + 1);
-        workspace::clear_and_reserve(&mut self.values, (2 * MAX_AWAY + 1).pow(2));
-        workspace::clear_and_reserve(&mut self.left, (2 * MAX_AWAY + 1).pow(2));
-        self.values.resize(columns * rows, 0.0);
-        let cell_pixels = (cell_width * cell_height) as f32;
+        clear_and_reserve(&mut self.values, (2 * MAX_OFFSET + 1).pow(2));
         let values = &mut self.values;
+        values.resize(places.columns() * places.rows(), 0.0);
+        let cell_pixels = (cell.0 * cell.1) as f32;
         self.sliding_window
-            .scores(&self.grid, discriminant, params, cell_pixels, values);
-        let places = SampleCoords {
-            center,
-            away: (across, down),
-            cell: (cell_width, cell_height),
-        };
+            .scores(grid, discriminant, params, cell_pixels, values);
         Arch::new().dispatch(Weigh {
             places,
             search,
-            values: &mut self.values,
+            values,
         });
-        self.places = Some(places);
-        self.left.clone_from(&self.values);
-        for _ in 0..params.dense_maxima {
-            let Some(best) = take_maximum(&mut self.left, columns) else {
+        let columns = places.columns();
+        while self.maxima.len() < params.dense_maxima as usize {
+            let Some(index) = take_maximum(values, columns) else {
                 break;
             };
-            self.maxima.push(places.at(best % columns, best / columns));
+            self.maxima
+                .push(places.at(index % columns, index / columns));
         }
-    }
-
-    /// Leaves out those of the first `particles` that are hopeless: at places less likely than the best one by more than is
-    /// asked for. What was last seen, there or carried along, stays, and what is out of sight may be anywhere.
-    pub fn prune(&self, search: &SearchContext<'_>, particles: &mut Vec<Particle>) {
-        let margin = search.params.prune_margin;
-        let Some(places) = self.places else { return };
-        if margin <= 0.0 || search.search_scale > 1.0 {
-            return;
-        }
-        let most = self
-            .values
-            .iter()
-            .copied()
-            .fold(f32::NEG_INFINITY, f32::max);
-        let least = f64::from(most) - margin;
-        let mut index = 0;
-        particles.retain(|particle| {
-            index += 1;
-            let value = places.value(&self.values, particle);
-            index <= 2 || value.is_none_or(|value| value >= least)
-        });
     }
 }
 
-/// How many places to look at to each side, and up and down, to get `away` working pixels far.
-fn places(away: f64, (cell_width, cell_height): (f64, f64), params: &Params) -> (usize, usize) {
-    let [mut across, mut down] =
-        [cell_width, cell_height].map(|cell| ((away / cell).ceil() as usize).min(MAX_AWAY));
-    let len = params.feature_len();
-    while (2 * across + 1) * (2 * down + 1) * len > MAX_PRODUCTS && across.max(down) > 0 {
-        (across, down) = (across.saturating_sub(1), down.saturating_sub(1));
-    }
-    (across, down)
-}
-
-/// The index of the greatest value; it and those beside it count no more.
+/// The index of the greatest value. It and its neighbours are removed.
 fn take_maximum(values: &mut [f32], columns: usize) -> Option<usize> {
     // In parts so that the loop vectorises.
     let mut parts = [f32::NEG_INFINITY; 16];
@@ -250,45 +207,17 @@ mod tests {
         let mut extractor = Extractor::default();
         extractor.compute_channels(&frame(), &[center], 40.0, &bounds, &params);
         let mut grid = Grid::default();
-        extractor.grid(&center, (2, 1), MAX_AWAY, &bounds, &params, &mut grid);
+        extractor.grid(&center, (2, 1), MAX_OFFSET, &bounds, &params, &mut grid);
         assert_eq!(grid.columns, 12);
         assert_eq!(grid.grays.len(), 120);
         let mut alone = Grid::default();
-        extractor.grid(&center, (0, 0), MAX_AWAY, &bounds, &params, &mut alone);
+        extractor.grid(&center, (0, 0), MAX_OFFSET, &bounds, &params, &mut alone);
         for (index, gray) in alone.grays.iter().enumerate() {
             let on_grid = grid.grays[(1 + index / 8) * 12 + 2 + index % 8];
             assert!(
                 (gray - on_grid).abs() < 1e-2 * gray.abs().max(1.0),
                 "{gray} {on_grid}"
             );
-        }
-    }
-
-    #[test]
-    fn a_value_between_places_is_that_of_a_plane_and_there_is_none_beyond() {
-        let center = Particle {
-            x: 50.0,
-            y: 40.0,
-            scale: 1.0,
-        };
-        let places = SampleCoords {
-            center,
-            away: (3, 2),
-            cell: (4.0, 5.0),
-        };
-        let plane = |place: &Particle| 2.0 * place.x - 3.0 * place.y + 7.0;
-        let values: Vec<f32> = (0..35)
-            .map(|i| plane(&places.at(i % 7, i / 7)) as f32)
-            .collect();
-        for (x, y) in [(50.0, 40.0), (38.0, 30.0), (43.7, 48.9), (61.9, 31.2)] {
-            let particle = Particle { x, y, ..center };
-            let value = places.value(&values, &particle);
-            let value = value.expect("it is among the places");
-            assert!((value - plane(&particle)).abs() < 1e-4, "{x} {y}: {value}");
-        }
-        for (x, y) in [(37.9, 40.0), (62.1, 40.0), (50.0, 29.9), (50.0, 50.1)] {
-            let particle = Particle { x, y, ..center };
-            assert_eq!(places.value(&values, &particle), None, "{x} {y}");
         }
     }
 

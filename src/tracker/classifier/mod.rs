@@ -1,4 +1,13 @@
-//! TODO-doc
+//! The discriminant: a linear classifier of the target against its surroundings, learned while tracking.
+//!
+//! - `ridge`: the classifier's weights, fitted frame by frame by regularised least squares.
+//! - `samples`: the training samples of a frame, as inner products of their feature vectors.
+//! - `dense_search`: its scores at every place around the last answer; `sliding_window` computes them as a correlation
+//!   on one grid of cells, which `channel_planes` brings into lines of one channel each.
+//!
+//! In: feature vectors of length D, or a grid of cells; labels in \[0, 1\]. Out: scores, about 1 on the target and 0
+//! beside it but not bounded; maxima as particles. A vector that is nothing but rounding has the score 0; samples whose
+//! squares underflow leave the weights finite.
 
 pub(crate) mod channel_planes;
 pub(crate) mod dense_search;

@@ -11,20 +11,31 @@
 //! makes the problem well conditioned. The unit vectors are never written out ([`examples`](crate::tracker::classifier::samples)).
 
 use pulp::{Arch, Simd, WithSimd};
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::motion::particles::{Particle, StateBounds};
+use crate::tracker::motion::random::normal;
 use crate::tracker::params::table::Params;
 
 /// Standard deviation of the labels' bell, as a share of the box along x and y, and of the logarithm of the scale.
 const LABEL_WIDTH: f64 = 0.15;
+/// How strongly w keeps to what it was, against the mean squared error over the samples of a frame.
+const DAMPING: f64 = 0.3;
 /// Steps of conjugate gradients in a frame.
 const STEPS: usize = 5;
 /// The first frame knows nothing before it: it is fitted more closely, by this factor of the damping, and longer.
 const FIRST_DAMPING: f64 = 0.1;
 const FIRST_STEPS: usize = 25;
+
+/// Areas around the first box that the discriminant starts from, and how far they are off: a third of them each of
+/// these shares of the box (standard deviations), so that near misses, misses and the surroundings are all known.
+const FIRST_AREAS: usize = 300;
+const FIRST_STDS: [f64; 3] = [0.1, 0.3, 0.8];
+/// The same for the logarithm of their scale, as a share of those.
+const FIRST_SCALE_STD: f64 = 0.3;
 
 /// A squared gradient below this says nothing, and its products would underflow: 0 / 0 is no step.
 const NOTHING: f32 = 1e-30;
@@ -99,32 +110,14 @@ impl Discriminant {
     }
 
     /// Learns from the first frame.
-    pub fn begin(
-        &mut self,
-        examples: &TrainingSamples,
-        vectors: &[f32],
-        params: &Params,
-        scratch: &mut Scratch,
-    ) {
-        let damping = params.discriminant_damping * FIRST_DAMPING;
+    pub fn begin(&mut self, examples: &TrainingSamples, vectors: &[f32], scratch: &mut Scratch) {
+        let damping = DAMPING * FIRST_DAMPING;
         self.fit(examples, vectors, damping, FIRST_STEPS, scratch);
     }
 
     /// Learns from a further frame: the examples that its particles are, their vectors, and the labels in `scratch`.
-    pub fn learn(
-        &mut self,
-        examples: &TrainingSamples,
-        vectors: &[f32],
-        params: &Params,
-        scratch: &mut Scratch,
-    ) {
-        self.fit(
-            examples,
-            vectors,
-            params.discriminant_damping,
-            STEPS,
-            scratch,
-        );
+    pub fn learn(&mut self, examples: &TrainingSamples, vectors: &[f32], scratch: &mut Scratch) {
+        self.fit(examples, vectors, DAMPING, STEPS, scratch);
     }
 
     fn fit(
@@ -212,9 +205,38 @@ impl Discriminant {
     }
 }
 
+/// Makes `out` the labels of `areas`.
+pub(crate) fn label_all(
+    areas: &[Particle],
+    target: &Particle,
+    bounds: &StateBounds,
+    out: &mut Vec<f32>,
+) {
+    out.clear();
+    out.extend(areas.iter().map(|area| label(area, target, bounds)));
+}
+
+/// Makes `areas` the target itself and draws around it, for the first fit.
+pub(crate) fn first_areas(
+    target: &Particle,
+    bounds: &StateBounds,
+    draws: &mut ChaCha8Rng,
+    areas: &mut Vec<Particle>,
+) {
+    areas.clear();
+    areas.push(*target);
+    for std in FIRST_STDS.iter().cycle().take(FIRST_AREAS) {
+        areas.push(bounds.clamp(Particle {
+            x: target.x + std * bounds.box_width * target.scale * normal(draws),
+            y: target.y + std * bounds.box_height * target.scale * normal(draws),
+            scale: target.scale * (FIRST_SCALE_STD * std * normal(draws)).exp(),
+        }));
+    }
+}
+
 /// How much of the target an area shows, as the discriminant is taught: 1 at `target`, falling as a bell with the
 /// distance and the ratio of scales.
-pub(crate) fn label(area: &Particle, target: &Particle, bounds: &StateBounds) -> f32 {
+fn label(area: &Particle, target: &Particle, bounds: &StateBounds) -> f32 {
     let across = (area.x - target.x) / (bounds.box_width * target.scale);
     let down = (area.y - target.y) / (bounds.box_height * target.scale);
     let larger = (area.scale / target.scale).ln();
@@ -241,7 +263,12 @@ mod tests {
             discriminant.weights.clone_from(&before);
             let shifted: Vec<f32> = vectors.iter().map(|value| value - mean).collect();
             let mut examples = TrainingSamples::default();
-            examples.begin(&discriminant, &vec![mean; len], 0);
+            examples.begin(
+                &discriminant.weights,
+                &discriminant.origin,
+                &vec![mean; len],
+                0,
+            );
             examples.score_vectors(&shifted);
             let mut scratch = Scratch {
                 labels: labels.clone(),
@@ -276,7 +303,7 @@ mod tests {
             let mut discriminant = Discriminant::new(vec![0.0; 4]);
             let vectors = [tiny, 0.0, 0.0, 0.0, 0.0, tiny, 0.0, 0.0];
             let mut examples = TrainingSamples::default();
-            examples.begin(&discriminant, &[], 0);
+            examples.begin(&discriminant.weights, &discriminant.origin, &[], 0);
             examples.score_vectors(&vectors);
             let mut scratch = Scratch {
                 labels: vec![1.0, 0.5],

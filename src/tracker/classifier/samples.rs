@@ -6,10 +6,9 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::linalg::vector_ops;
-use crate::tracker::workspace;
 
 /// What is left of a squared length below this share of it is rounding: the vector is the origin.
 const MIN_REMAINDER: f32 = 1e-6;
@@ -31,14 +30,14 @@ pub(crate) struct TrainingSamples {
 impl TrainingSamples {
     /// Forgets the last examples and takes `discriminant`, for vectors that have `mean` (or, where that is empty,
     /// nothing) taken off; with room for `most` examples.
-    pub fn begin(&mut self, discriminant: &Discriminant, mean: &[f32], most: usize) {
+    pub fn begin(&mut self, weights: &[f32], origin: &[f32], mean: &[f32], max: usize) {
         self.weights.clear();
-        self.weights.extend_from_slice(discriminant.weights());
+        self.weights.extend_from_slice(weights);
         self.origin.clear();
-        self.origin.extend_from_slice(discriminant.origin());
+        self.origin.extend_from_slice(origin);
         vector_ops::add(&mut self.origin, -1.0, mean);
-        workspace::clear_and_reserve(&mut self.scales, most);
-        workspace::clear_and_reserve(&mut self.scores, most);
+        clear_and_reserve(&mut self.scales, max);
+        clear_and_reserve(&mut self.scores, max);
     }
 
     /// The vectors whose products are asked for: the weights and the origin.

@@ -11,10 +11,9 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, GRAY_WEIGHT, Lanes};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog::CHANNELS;
 use crate::tracker::features::hog_cells::MIN_CONTRAST;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, Lanes};
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
@@ -49,8 +48,8 @@ impl WithSimd for Scores<'_> {
             self.params.patch_height as usize,
         );
         let planes = &mut self.sliding_window.planes;
-        planes.take(self.grid, size);
-        let scorer = Scorer::new(self.discriminant, self.params, self.cell_pixels);
+        planes.load(self.grid, size);
+        let scorer = Scorer::new(self.discriminant, self.cell_pixels);
         let columns = self.grid.columns + 1 - size.0;
         let last = self.out.len() / columns - 1;
         for (block, rows) in self.out.chunks_mut(ROWS * columns).enumerate() {
@@ -178,13 +177,12 @@ struct Scorer {
     origin_square: f32,
     /// Cells of a window.
     count: f32,
-    gray_weight: f32,
     least_deviation: f32,
 }
 
 impl Scorer {
     #[inline(always)]
-    fn new(discriminant: &Discriminant, params: &Params, cell_pixels: f32) -> Self {
+    fn new(discriminant: &Discriminant, cell_pixels: f32) -> Self {
         let (weights, origin) = (discriminant.weights(), discriminant.origin());
         let grays = |vector: &[f32]| -> f32 {
             let cells = vector.as_chunks::<CHANNELS>().0.iter();
@@ -195,7 +193,6 @@ impl Scorer {
             origin_score: vector_ops::dot(weights, origin),
             origin_square: vector_ops::dot(origin, origin),
             count: (weights.len() / CHANNELS) as f32,
-            gray_weight: params.gray_weight as f32,
             least_deviation: MIN_CONTRAST * cell_pixels,
         }
     }
@@ -219,7 +216,7 @@ impl Scorer {
         let variance = simd.max_f32s(variance, zero);
         let least_deviation = simd.splat_f32s(self.least_deviation);
         let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
-        let scale = simd.div_f32s(simd.splat_f32s(self.gray_weight), deviation);
+        let scale = simd.div_f32s(simd.splat_f32s(GRAY_WEIGHT), deviation);
         let mut whole = products.directions;
         for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
             let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
@@ -241,7 +238,7 @@ impl Scorer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::classifier::dense_search;
+    use crate::tracker::classifier::channel_planes::MAX_OFFSET;
     use crate::tracker::features::extractor::Extractor;
     use crate::tracker::image::frame::GrayFrame;
     use crate::tracker::motion::particles::{Particle, StateBounds};
@@ -289,13 +286,13 @@ mod tests {
             extractor.grid(
                 &center,
                 (across, down),
-                dense_search::MAX_AWAY,
+                MAX_OFFSET,
                 &bounds,
                 &params,
                 &mut grid,
             );
             let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
-            let (cell_width, cell_height) = Extractor::cell(&center, &bounds, &params);
+            let (cell_width, cell_height) = Extractor::cell_size(&center, &bounds, &params);
             let cell_pixels = (cell_width * cell_height) as f32;
             SlidingWindow::default().scores(
                 &grid,
@@ -318,7 +315,7 @@ mod tests {
                 for (c, gray) in grays.iter().enumerate() {
                     let values = &grid.values[cell(c) * CHANNELS..][..DIRECTIONS];
                     vector.extend_from_slice(values);
-                    vector.push((gray - mean) / deviation * params.gray_weight as f32);
+                    vector.push((gray - mean) / deviation * GRAY_WEIGHT);
                 }
                 let left = vector
                     .iter()

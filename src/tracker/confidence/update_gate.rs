@@ -10,6 +10,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::tracker::confidence::score::Evidence;
 use crate::tracker::params::table::Params;
 
 /// A running mean needs some frames before anything can be compared with it; a target that changes fast from the start
@@ -21,6 +22,8 @@ const FIRST_USUAL: f64 = 0.25;
 const ALWAYS_TRUSTED: f64 = 0.3;
 /// A target that has hardly changed so far may have changed this much when it comes back.
 const MIN_USUAL: f64 = 0.15;
+/// How much better than the lost threshold the discriminant must score a target that is found again.
+const FOUND_MARGIN: f64 = 0.2;
 /// The share of the newest frame in the running mean, when trusted and when not.
 const RENEWAL: f64 = 0.1;
 const RENEWAL_UNTRUSTED: f64 = 0.02;
@@ -34,19 +37,41 @@ pub(crate) fn passes(score: f64, number: u64, params: &Params) -> bool {
 /// What distances to the first subspace have been usual.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UpdateGate {
-    pub usual: f64,
+    pub mean_distance: f64,
 }
 
 impl Default for UpdateGate {
     fn default() -> Self {
-        Self { usual: FIRST_USUAL }
+        Self {
+            mean_distance: FIRST_USUAL,
+        }
     }
 }
 
 impl UpdateGate {
+    /// Whether the best particle is not the target; `frames_lost` tells for how many frames it has been lost, and `spread`
+    /// how many times as wide as usual the search was. A wide search finds more that looks a little like the target, so
+    /// to be found again takes a better score, and a distance that is recognised.
+    pub fn is_lost(
+        &self,
+        evidence: &Evidence,
+        frames_lost: u32,
+        spread: f64,
+        params: &Params,
+    ) -> bool {
+        let Some(score) = evidence.discriminant.map(f64::from) else {
+            return false;
+        };
+        if frames_lost == 0 {
+            return score < params.lost_threshold;
+        }
+        score < params.lost_threshold + FOUND_MARGIN
+            || !self.recognizes(evidence.first, spread, params)
+    }
+
     /// Whether `distance` from the first subspace is not far beyond what is usual.
     fn accepts(&self, distance: f64, params: &Params) -> bool {
-        let limit = (params.update_distance_ratio * self.usual).max(ALWAYS_TRUSTED);
+        let limit = (params.update_distance_ratio * self.mean_distance).max(ALWAYS_TRUSTED);
         params.update_distance_ratio <= 0.0 || distance < limit
     }
 
@@ -55,8 +80,8 @@ impl UpdateGate {
     /// that is trusted as ever; a wide one finds the likest of all things, so it must look as much like the first look
     /// as is usual.
     pub fn recognizes(&self, distance: f64, search_scale: f64, params: &Params) -> bool {
-        let limit =
-            self.usual.max(MIN_USUAL) * (1.0 + (params.update_distance_ratio - 1.0) / search_scale);
+        let limit = self.mean_distance.max(MIN_USUAL)
+            * (1.0 + (params.update_distance_ratio - 1.0) / search_scale);
         params.update_distance_ratio <= 0.0 || distance < limit
     }
 
@@ -64,7 +89,7 @@ impl UpdateGate {
     pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
         let trusted = number < UNTIL_USUAL || self.accepts(distance, params);
         let renewal = if trusted { RENEWAL } else { RENEWAL_UNTRUSTED };
-        self.usual += renewal * (distance - self.usual);
+        self.mean_distance += renewal * (distance - self.mean_distance);
         trusted
     }
 }
@@ -97,7 +122,9 @@ mod tests {
     #[test]
     fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
         let params = Preset::Robust.params();
-        let update_gate = UpdateGate { usual: 0.57 };
+        let update_gate = UpdateGate {
+            mean_distance: 0.57,
+        };
         assert!(update_gate.recognizes(0.6, 1.5, &params));
         assert!(!update_gate.recognizes(0.6, 11.0, &params));
         assert!(update_gate.recognizes(0.55, 11.0, &params));

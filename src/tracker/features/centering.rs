@@ -1,48 +1,36 @@
-//! Vectors with the background's mean taken off, and their squared lengths.
+//! Centering: the background's mean is subtracted from feature vectors while they are in the cache.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::linalg::vector_ops;
 
-/// What is taken off, and where the squared lengths go.
+/// Subtracts a mean from feature vectors and collects their squared lengths.
 pub(crate) struct Centering<'a> {
-    /// Where it is empty nothing is taken off.
+    /// The mean; none is subtracted where it is empty.
     pub mean: &'a [f32],
+    /// The squared length of each vector is appended here.
     pub squares: &'a mut Vec<f32>,
 }
 
-/// [`Centering::apply_to_all`], to be compiled for the instructions that this machine has.
-struct ApplyToAll<'a> {
-    centering: Centering<'a>,
-    vectors: &'a mut [f32],
-    len: usize,
-}
-
-impl WithSimd for ApplyToAll<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        for vector in self.vectors.chunks_exact_mut(self.len) {
-            self.centering.apply(simd, vector);
-        }
-    }
-}
-
 impl Centering<'_> {
-    /// Takes the mean off a vector and appends its squared length.
+    /// Centers one vector.
     #[inline(always)]
     pub fn apply<S: Simd>(&mut self, _: S, vector: &mut [f32]) {
         vector_ops::add(vector, -1.0, self.mean);
         self.squares.push(vector_ops::dot(vector, vector));
     }
+}
 
-    /// The same for several vectors of length `len`.
-    pub fn apply_to_all(self, vectors: &mut [f32], len: usize) {
-        Arch::new().dispatch(ApplyToAll {
-            centering: self,
-            vectors,
-            len,
-        });
+/// Centers all `vectors`, each of length `len`.
+#[pulp::with_simd(center_all = Arch::new())]
+#[inline(always)]
+pub(crate) fn center_all_simd<S: Simd>(
+    simd: S,
+    vectors: &mut [f32],
+    len: usize,
+    centering: &mut Centering<'_>,
+) {
+    for vector in vectors.chunks_exact_mut(len) {
+        centering.apply(simd, vector);
     }
 }

@@ -1,47 +1,51 @@
-//! From particles to the feature vectors of what is seen there, whichever features the parameters ask for.
+//! From particles to their feature vectors: gray patches or gradient histograms, as the parameters say.
 //!
-//! A view is open on one frame, around one place: what lies further off is not there.
+//! [`compute_channels`](Extractor::compute_channels) comes first in each frame. It covers a window of the frame;
+//! feature vectors are for areas in that window.
 
-use crate::tracker::features::centering::Centering;
+use crate::tracker::features::centering::{Centering, center_all};
+use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::gray::GrayPatches;
-use crate::tracker::features::hog::{CHANNELS, Hog};
-use crate::tracker::features::integral::{DIRECTIONS, IntegralChannels};
+use crate::tracker::features::hog::Hog;
+use crate::tracker::features::integral::IntegralChannels;
+use crate::tracker::image::downsample;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 use crate::tracker::params::table::Features;
 use crate::tracker::params::table::Params;
-use crate::tracker::scale::pyramid;
-use crate::tracker::workspace;
 
-/// How much larger than the largest particle the areas of a frame may be: scales change by a few hundredths a frame.
+/// How much larger than the largest particle the areas of a frame may be. Scales change by a few percent a frame.
 const SCALE_MARGIN: f64 = 1.08;
+/// How much larger than its particle the largest level of a scale pyramid is; a test of `scale/pyramid.rs` checks this.
+pub(crate) const PYRAMID_MARGIN: f64 = 1.271_249_150_321_404_7;
 
-/// Cuts feature vectors out of one frame.
+/// Computes the feature vectors of one frame's particles; its memory is kept from one frame to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Extractor {
-    cutter: GrayPatches,
-    /// Working pixels along a pixel of the frame's.
+    gray: GrayPatches,
+    /// Working pixels along a side of one of the frame's pixels.
     downsample: f64,
-    gradients: IntegralChannels,
-    cells: Hog,
-    /// Those of a grid.
-    grid_cells: Hog,
+    integral: IntegralChannels,
+    hog: Hog,
+    /// For grids, which have other numbers of cells.
+    grid_hog: Hog,
 }
 
-/// The cells of a place and its surroundings, row by row.
+/// The cells of a particle and its surroundings, row by row.
 #[derive(Debug, Default)]
 pub(crate) struct Grid {
     pub columns: usize,
-    /// The channels of each cell; in place of the gray value 0.
+    /// The channels of each cell, normalised, with a gray value of 0.
     pub values: Vec<f32>,
-    /// The gray value of each cell, summed over its pixels.
+    /// The gray sum of each cell, up to a constant, not normalised.
     pub grays: Vec<f32>,
 }
 
 impl Extractor {
-    /// What is looked at for the areas of `particles`, of which there is one, and for others up to `radius` working pixels
-    /// from one of these and [`SCALE_MARGIN`] than the largest.
+    /// The window (working pixels) that holds the areas of `particles`, at least one, and of all others within `radius`
+    /// working pixels of one of these that are larger than the largest by at most [`SCALE_MARGIN`].
     pub fn window(
         particles: &[Particle],
         radius: f64,
@@ -56,10 +60,10 @@ impl Extractor {
             (top, bottom) = (top.min(particle.y), bottom.max(particle.y));
             largest.scale = largest.scale.max(particle.scale);
         }
-        let area = seen(&largest, bounds, params);
-        // A pyramid is of the box alone, without its context.
-        let larger = SCALE_MARGIN.max(pyramid::largest() / params.context);
-        let (width, height) = (larger * area.width, larger * area.height);
+        let area = context_area(&largest, bounds, params);
+        // A scale pyramid shows the box alone, without its context.
+        let margin = SCALE_MARGIN.max(PYRAMID_MARGIN / params.context);
+        let (width, height) = (margin * area.width, margin * area.height);
         Rect::new(
             left - radius - width / 2.0,
             top - radius - height / 2.0,
@@ -68,7 +72,8 @@ impl Extractor {
         )
     }
 
-    /// Gets ready for the areas in the [`window`](Self::window).
+    /// Computes what the areas in the [`window`](Self::window) of these particles share. The first particle is the last
+    /// answer: its cells decide the resolution.
     pub fn compute_channels(
         &mut self,
         frame: &GrayFrame,
@@ -80,15 +85,14 @@ impl Extractor {
         self.downsample = frame.downsample();
         if params.features == Features::Gradients {
             let window = Self::window(particles, radius, bounds, params);
-            // One size of cells for all: the first particle is the last answer.
-            let (width, height) = Self::cell(&particles[0], bounds, params);
+            let (width, height) = Self::cell_size(&particles[0], bounds, params);
             let cell = (width / self.downsample, height / self.downsample);
-            self.gradients
-                .compute(frame, &window.in_pixels_of(self.downsample), cell);
+            let window = window.in_pixels_of(self.downsample);
+            self.integral.compute(frame, &window, cell);
         }
     }
 
-    /// Makes `out` the feature vectors, of length D, of `particles`.
+    /// Replaces `out` by the feature vectors of `particles`, of length D each.
     pub fn features(
         &mut self,
         frame: &GrayFrame,
@@ -101,8 +105,8 @@ impl Extractor {
         self.describe(frame, particles, bounds, params, out, None);
     }
 
-    /// Writes the feature vectors, of length D, of `particles` to `out`, which is as long as they are; centered, if that is
-    /// asked for.
+    /// Writes the feature vectors of `particles`, of length D each, to `out`, which has room for just these. Then
+    /// centers them, where that is asked for.
     pub fn describe(
         &mut self,
         frame: &GrayFrame,
@@ -115,72 +119,82 @@ impl Extractor {
         match params.features {
             Features::Gray => {
                 self.cut(frame, particles, bounds, params, out);
-                if let Some(centering) = centering {
-                    centering.apply_to_all(out, params.feature_len());
+                if let Some(mut centering) = centering {
+                    center_all(out, params.feature_len(), &mut centering);
                 }
             }
             Features::Gradients => {
                 let downsample = self.downsample;
-                let areas = particles
-                    .iter()
-                    .map(|particle| seen(particle, bounds, params).in_pixels_of(downsample));
-                self.cells
-                    .describe(&self.gradients, areas, params, out, centering);
+                let area =
+                    |particle| context_area(particle, bounds, params).in_pixels_of(downsample);
+                let areas = particles.iter().map(area);
+                let size = (params.patch_width as usize, params.patch_height as usize);
+                self.hog
+                    .describe(&self.integral, areas, size, out, centering);
             }
         }
     }
 
     /// Width and height of a cell of `particle`, in working pixels.
-    pub fn cell(particle: &Particle, bounds: &StateBounds, params: &Params) -> (f64, f64) {
-        let area = seen(particle, bounds, params);
+    pub fn cell_size(particle: &Particle, bounds: &StateBounds, params: &Params) -> (f64, f64) {
+        let area = context_area(particle, bounds, params);
         (
             area.width / f64::from(params.patch_width),
             area.height / f64::from(params.patch_height),
         )
     }
 
-    /// Makes `grid` the cells of `center` and as many more as `more` says to the left and to the right, above and below:
-    /// with room for `most` of these.
+    /// The downsample factor at which `target` is searched: 1, 2 or 4. Gray patches are cut from the frame itself.
+    pub fn downsample_factor(target: &Particle, bounds: &StateBounds, params: &Params) -> usize {
+        if params.features == Features::Gray {
+            return 1;
+        }
+        let first = Particle {
+            scale: 1.0,
+            ..*target
+        };
+        let (width, height) = Self::cell_size(&first, bounds, params);
+        let first_cell = width.min(height);
+        let frame_side = bounds.frame_width.min(bounds.frame_height);
+        downsample::factor(first_cell, first_cell * target.scale, frame_side)
+    }
+
+    /// Replaces `grid` by the cells of `center`, with `margin` more columns on either side and `margin` more rows above
+    /// and below. Reserves memory for `max_margin` of both.
     pub fn grid(
         &mut self,
         center: &Particle,
-        more: (usize, usize),
-        most: usize,
+        margin: (usize, usize),
+        max_margin: usize,
         bounds: &StateBounds,
         params: &Params,
         grid: &mut Grid,
     ) {
-        let sides = |more: (usize, usize)| {
-            let width = params.patch_width + 2 * more.0 as u32;
-            (width, params.patch_height + 2 * more.1 as u32)
+        let size = |margin: (usize, usize)| {
+            let columns = params.patch_width as usize + 2 * margin.0;
+            (columns, params.patch_height as usize + 2 * margin.1)
         };
-        let (columns, rows) = sides(more);
-        let (most_columns, most_rows) = sides((most, most));
+        let (columns, rows) = size(margin);
+        let (max_columns, max_rows) = size((max_margin, max_margin));
         let (x, y) = bounds.area(center).center();
-        let (width, height) = Self::cell(center, bounds, params);
-        let area = Rect::centered(x, y, width * f64::from(columns), height * f64::from(rows));
-        let most = (most_columns * most_rows) as usize;
-        workspace::clear_and_reserve(&mut grid.values, most * CHANNELS);
-        workspace::clear_and_reserve(&mut grid.grays, most);
-        grid.columns = columns as usize;
-        grid.values
-            .resize((columns * rows) as usize * CHANNELS, 0.0);
-        let params = Params {
-            patch_width: columns,
-            patch_height: rows,
-            ..params.clone()
-        };
-        let cells = &mut self.grid_cells;
-        cells.reserve(most_columns as usize, most_rows as usize);
+        let (width, height) = Self::cell_size(center, bounds, params);
+        let area = Rect::centered(x, y, width * columns as f64, height * rows as f64);
+        clear_and_reserve(&mut grid.values, max_columns * max_rows * CHANNELS);
+        clear_and_reserve(&mut grid.grays, max_columns * max_rows);
+        grid.columns = columns;
+        grid.values.resize(columns * rows * CHANNELS, 0.0);
         let areas = std::iter::once(area.in_pixels_of(self.downsample));
-        cells.describe(&self.gradients, areas, &params, &mut grid.values, None);
-        grid.grays.extend(cells.grays());
+        let hog = &mut self.grid_hog;
+        hog.reserve(max_columns, max_rows);
+        let (size, values) = ((columns, rows), &mut grid.values);
+        hog.describe(&self.integral, areas, size, values, None);
+        grid.grays.extend(hog.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
-            cell[DIRECTIONS] = 0.0;
+            cell[GRAY] = 0.0;
         }
     }
 
-    /// Writes gray features to `out`.
+    /// Writes the gray patches of `particles`, of length D each, to `out`, whatever the features are.
     pub fn cut(
         &mut self,
         frame: &GrayFrame,
@@ -191,13 +205,13 @@ impl Extractor {
     ) {
         let areas = particles
             .iter()
-            .map(|particle| seen(particle, bounds, params));
-        self.cutter.cut(frame, areas, params, out);
+            .map(|particle| context_area(particle, bounds, params));
+        self.gray.cut(frame, areas, params, out);
     }
 }
 
-/// The area that is looked at for a particle: its box and the context around it.
-fn seen(particle: &Particle, bounds: &StateBounds, params: &Params) -> Rect {
+/// The area of a particle's features: its box and the context around it, in working pixels.
+fn context_area(particle: &Particle, bounds: &StateBounds, params: &Params) -> Rect {
     let area = bounds.area(particle);
     let (x, y) = area.center();
     Rect::centered(

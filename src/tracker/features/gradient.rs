@@ -1,33 +1,41 @@
-//! Histograms of gradient directions: the direction and the strength of the gradient of each pixel of a row.
+//! The gradients of a row of pixels: their directions and strengths.
 
 use std::ops::Range;
 
-use crate::tracker::features::integral::DIRECTIONS;
+use crate::tracker::features::channels::DIRECTIONS;
 use crate::tracker::image::frame::GrayFrame;
 
-/// For each pixel of a row the direction of its gradient, in bins, and its strength.
+/// The gradients of a row of pixels.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GradientRow {
+    /// The unsigned direction of each pixel's gradient, in bins: 0 to [`DIRECTIONS`] for 0 to 180 degrees.
     pub bins: Vec<f32>,
+    /// Their lengths, in gray levels: 0 to 255 √2.
     pub strengths: Vec<f32>,
-    /// The row's gray values, and one more at each end.
+    /// The gray values minus an offset, after that of the pixel before the row.
     pub gray: Vec<f32>,
 }
 
 impl GradientRow {
-    /// The gradients, by central differences, of `pixels` in row `y`, and nothing after them up to `padded` pixels. The
-    /// frame's edge goes on as it is.
+    /// Computes the gradients of `pixels` in row `y` by central differences, not halved. Zeros follow up to `padded`
+    /// pixels. Beyond the frame's edge the edge's pixel counts. `offset` is subtracted from the gray values.
     #[inline(always)]
-    pub fn compute(&mut self, frame: &GrayFrame, pixels: Range<usize>, y: usize, padded: usize) {
+    pub fn compute(
+        &mut self,
+        frame: &GrayFrame,
+        pixels: Range<usize>,
+        y: usize,
+        padded: usize,
+        offset: f32,
+    ) {
         let (width, height) = (frame.width() as usize, frame.height() as usize);
         let row = |y: usize| &frame.pixels()[y * width..][..width];
-        let here = row(y);
+        let line = row(y);
+        let gray = |&value: &u8| f32::from(value) - offset;
         self.gray.clear();
-        self.gray
-            .push(f32::from(here[pixels.start.saturating_sub(1)]));
-        self.gray
-            .extend(here[pixels.clone()].iter().map(|&gray| f32::from(gray)));
-        self.gray.push(f32::from(here[pixels.end.min(width - 1)]));
+        self.gray.push(gray(&line[pixels.start.saturating_sub(1)]));
+        self.gray.extend(line[pixels.clone()].iter().map(gray));
+        self.gray.push(gray(&line[pixels.end.min(width - 1)]));
 
         let count = pixels.len();
         self.bins.resize(count, 0.0);
@@ -50,18 +58,18 @@ impl GradientRow {
     }
 }
 
-/// The unsigned angle of (x, y), from 0 to π, to 0.0003: a polynomial that vectorises (minimax fit of the arc tangent
-/// on \[0, 1\]), several times as fast as `atan2`.
+/// The unsigned angle of (x, y), 0 to π, to within 0.0003: a minimax polynomial of the arc tangent on \[0, 1\]. It
+/// vectorises, and is several times as fast as `atan2`.
 #[inline(always)]
 fn angle(x: f32, y: f32) -> f32 {
     let (across, down) = (x.abs(), y.abs());
-    let (lesser, greater) = if down > across {
+    let (shorter, longer) = if down > across {
         (across, down)
     } else {
         (down, across)
     };
-    let greater = if greater > 1e-9 { greater } else { 1e-9 };
-    let ratio = lesser / greater;
+    let longer = if longer > 1e-9 { longer } else { 1e-9 };
+    let ratio = shorter / longer;
     let square = ratio * ratio;
     let octant =
         ((-0.046_496_475 * square + 0.159_314_22) * square - 0.327_622_76) * square * ratio + ratio;

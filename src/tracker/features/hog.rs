@@ -1,76 +1,102 @@
-//! Histograms of gradient directions: the feature vector of an area, from the sums over its cells.
+//! The gradient histogram of an area: its feature vector, from the integral image.
+//!
+//! A vector has [`CHANNELS`] values for each cell, cell by cell, row by row: the nine directions, then the gray value.
+//! Each cell's directions are divided by three times the root of the mean energy of the 3 x 3 cells around it, and
+//! clipped. The gray values have the area's mean subtracted and are divided by its standard deviation.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::features::centering::Centering;
-use crate::tracker::features::hog_cells::Area;
-use crate::tracker::features::integral::{DIRECTIONS, GRAY, IntegralChannels};
+use crate::tracker::features::channels::{CHANNELS, GRAY};
+use crate::tracker::features::hog_cells::HogCells;
+use crate::tracker::features::integral::IntegralChannels;
 use crate::tracker::image::rect::Rect;
-use crate::tracker::params::table::Params;
 
-/// Values of a cell: the directions, then its gray value.
-pub(crate) const CHANNELS: usize = DIRECTIONS + 1;
-
-/// Room for the cells of areas.
+/// Computes the feature vectors of areas; its memory is kept from one frame to the next.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Hog {
     columns: usize,
     rows: usize,
-    /// Of two areas, so that the one is summed up while the other is still divided.
-    areas: [Area; 2],
+    /// The cells of two areas: one is summed while the other is normalised.
+    cells: [HogCells; 2],
 }
 
-/// [`Hog::describe`], to be compiled for the instructions that this machine has.
-struct Describe<'a, A> {
-    cells: &'a mut Hog,
-    sums: &'a IntegralChannels,
-    areas: A,
-    gray_weight: f32,
-    out: &'a mut [f32],
-    centering: Option<Centering<'a>>,
-}
+impl Hog {
+    /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to
+    /// `out`: `columns * rows * CHANNELS` values each. Then centers them, where that is asked for.
+    pub fn describe(
+        &mut self,
+        integral: &IntegralChannels,
+        areas: impl Iterator<Item = Rect>,
+        (columns, rows): (usize, usize),
+        out: &mut [f32],
+        centering: Option<Centering<'_>>,
+    ) {
+        self.resize(columns, rows);
+        describe_all(self, integral, areas, out, centering);
+    }
 
-impl<A: Iterator<Item = Rect>> WithSimd for Describe<'_, A> {
-    type Output = ();
+    /// The gray sums of the cells of the area that was described, if it was only one, with the mean gray subtracted.
+    pub fn grays(&self) -> impl Iterator<Item = f32> {
+        self.cells[0].cells.iter().map(|cell| cell.0[GRAY])
+    }
 
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            cells,
-            sums,
-            mut areas,
-            gray_weight,
-            out,
-            mut centering,
-        } = self;
-        let size = (cells.columns, cells.rows);
-        let [now, before] = &mut cells.areas;
-        let (mut now, mut before) = (now, before);
-        let mut coming = areas.next();
-        if let Some(area) = &coming {
-            now.locate(sums, area, size);
+    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
+    pub fn reserve(&mut self, columns: usize, rows: usize) {
+        if self.cells[0].cells.capacity() < columns * rows {
+            self.resize(columns, rows);
         }
-        let mut vectors = out.chunks_exact_mut(size.0 * size.1 * CHANNELS);
-        let (mut last, mut one_before) = (&mut [][..], &mut [][..]);
-        // What is read was written one area ago: it has come to the cache meanwhile, which takes longer than to compute it.
-        while let Some(area) = coming {
-            coming = areas.next();
-            if let Some(area) = &coming {
-                before.locate(sums, area, size);
+    }
+
+    fn resize(&mut self, columns: usize, rows: usize) {
+        if (self.columns, self.rows) != (columns, rows) {
+            (self.columns, self.rows) = (columns, rows);
+            for cells in &mut self.cells {
+                cells.resize(columns, rows);
             }
-            now.sum_up(simd, sums, &area, size.0);
-            before.normalize(simd, size.0, gray_weight, last);
-            center(simd, &mut centering, one_before);
-            (one_before, last) = (last, vectors.next().expect("a vector for each area"));
-            (now, before) = (before, now);
         }
-        before.normalize(simd, size.0, gray_weight, last);
-        center(simd, &mut centering, one_before);
-        center(simd, &mut centering, last);
     }
 }
 
-/// Centers a vector, if there is one and that is asked for.
+/// A pipeline over the areas: one is summed, the one before is normalised, and the one before that is centered. A value
+/// that was just written takes longer to read than to compute; one area later it is in the cache.
+#[pulp::with_simd(describe_all = Arch::new())]
+#[inline(always)]
+fn describe_all_simd<S: Simd, A: Iterator<Item = Rect>>(
+    simd: S,
+    hog: &mut Hog,
+    integral: &IntegralChannels,
+    mut areas: A,
+    out: &mut [f32],
+    mut centering: Option<Centering<'_>>,
+) {
+    let size = (hog.columns, hog.rows);
+    let [current, previous] = &mut hog.cells;
+    let (mut current, mut previous) = (current, previous);
+    let mut next = areas.next();
+    if let Some(area) = &next {
+        current.locate(integral, area, size);
+    }
+    let mut vectors = out.chunks_exact_mut(size.0 * size.1 * CHANNELS);
+    let (mut to_normalize, mut to_center) = (&mut [][..], &mut [][..]);
+    while let Some(area) = next {
+        next = areas.next();
+        if let Some(area) = &next {
+            previous.locate(integral, area, size);
+        }
+        current.sum(simd, integral, &area, size.0);
+        previous.normalize(simd, size.0, to_normalize);
+        center(simd, &mut centering, to_center);
+        to_center = to_normalize;
+        to_normalize = vectors.next().expect("a vector for each area");
+        (current, previous) = (previous, current);
+    }
+    previous.normalize(simd, size.0, to_normalize);
+    center(simd, &mut centering, to_center);
+    center(simd, &mut centering, to_normalize);
+}
+
+/// Centers a vector, where there is one and that is asked for.
 #[inline(always)]
 fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut [f32]) {
     if let Some(centering) = centering
@@ -80,62 +106,14 @@ fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut 
     }
 }
 
-impl Hog {
-    /// Writes the feature vectors of `areas` (working pixels, sides above 0, in the window that was summed up) to `out`,
-    /// each of length D: cell by cell, row by row, the nine directions and the gray value.
-    ///
-    /// Each cell's directions are divided by the root of the mean energy of the 3 x 3 cells around it and clipped.
-    /// Gray values have the area's mean taken off and are divided by its standard deviation. The vectors are centered, if
-    /// that is asked for.
-    pub fn describe(
-        &mut self,
-        sums: &IntegralChannels,
-        areas: impl Iterator<Item = Rect>,
-        params: &Params,
-        out: &mut [f32],
-        centering: Option<Centering<'_>>,
-    ) {
-        self.prepare(params.patch_width as usize, params.patch_height as usize);
-        Arch::new().dispatch(Describe {
-            cells: self,
-            sums,
-            areas,
-            gray_weight: params.gray_weight as f32,
-            out,
-            centering,
-        });
-    }
-
-    /// The gray values of the cells of an area that was described alone, summed over their pixels.
-    pub fn grays(&self) -> impl Iterator<Item = f32> {
-        self.areas[0].cells.iter().map(|cell| cell.0[GRAY])
-    }
-
-    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
-    pub fn reserve(&mut self, columns: usize, rows: usize) {
-        if self.areas[0].cells.capacity() < columns * rows {
-            self.prepare(columns, rows);
-        }
-    }
-
-    /// Makes room for so many columns and rows of cells.
-    fn prepare(&mut self, columns: usize, rows: usize) {
-        if (self.columns, self.rows) == (columns, rows) {
-            return;
-        }
-        (self.columns, self.rows) = (columns, rows);
-        for area in &mut self.areas {
-            area.prepare(columns, rows);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::features::hog_cells::{FLAT, GREATEST};
+    use crate::tracker::features::channels::{DIRECTIONS, GRAY_WEIGHT};
+    use crate::tracker::features::hog_cells::{MAX_DIRECTION, MIN_STRENGTH};
     use crate::tracker::image::frame::GrayFrame;
     use crate::tracker::params::presets::Preset;
+    use crate::tracker::params::table::Params;
 
     fn frame() -> GrayFrame {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
@@ -156,7 +134,7 @@ mod tests {
         )
     }
 
-    /// Sums over a cell by going through its pixels, each with the share of it that is inside.
+    /// The sums over a cell, pixel by pixel, each weighted by the share of it that is inside.
     fn cell(frame: &GrayFrame, area: &Rect) -> [f64; CHANNELS] {
         let mut sums = [0.0; CHANNELS];
         let width = frame.width() as usize;
@@ -179,39 +157,42 @@ mod tests {
     #[test]
     fn cells_are_sums_over_their_pixels() {
         let frame = frame();
-        let (mut sums, mut cells) = (IntegralChannels::default(), Hog::default());
-        cells.prepare(4, 4);
+        let (mut integral, mut cells) = (IntegralChannels::default(), HogCells::default());
+        cells.resize(4, 4);
         for area in [
             Rect::new(10.0, 8.0, 32.0, 24.0),
             Rect::new(3.3, 4.7, 21.9, 17.1),
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
-            sums.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
-            cells.areas[0].locate(&sums, &area, (4, 4));
-            cells.areas[0].sum_up(pulp::Scalar, &sums, &area, 4);
+            integral.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
+            cells.locate(&integral, &area, (4, 4));
+            cells.sum(pulp::Scalar, &integral, &area, 4);
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
                 let x = area.x + (index % 4) as f64 * width;
                 let y = area.y + (index / 4) as f64 * height;
                 let expected = cell(&frame, &Rect::new(x, y, width, height));
-                let found = &cells.areas[0].cells[index].0;
+                let found = &cells.cells[index].0;
                 for (found, expected) in found.iter().zip(&expected[..DIRECTIONS]) {
                     assert!(
                         (f64::from(*found) - expected).abs() < 4.0,
                         "{found} {expected}"
                     );
                 }
-                assert!((f64::from(found[GRAY]) - expected[DIRECTIONS]).abs() < 2.0);
+                let expected = expected[GRAY] - f64::from(integral.mean_gray()) * width * height;
+                assert!((f64::from(found[GRAY]) - expected).abs() < 1.0);
             }
         }
     }
 
     fn features(frame: &GrayFrame, area: Rect, params: &Params) -> Vec<f32> {
-        let mut sums = IntegralChannels::default();
+        let mut integral = IntegralChannels::default();
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
-        sums.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
+        integral.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
+        let size = (params.patch_width as usize, params.patch_height as usize);
         let mut out = vec![1.0; params.feature_len()];
-        Hog::default().describe(&sums, std::iter::once(area), params, &mut out, None);
+        let areas = std::iter::once(area);
+        Hog::default().describe(&integral, areas, size, &mut out, None);
         out
     }
 
@@ -226,7 +207,7 @@ mod tests {
         let area = Rect::new(9.2, 6.1, 35.0, 30.0);
         let found = features(&frame, area, &params);
         let (width, height) = (area.width / 5.0, area.height / 4.0);
-        let place = |i: usize| {
+        let cell_area = |i: usize| {
             Rect::new(
                 area.x + (i % 5) as f64 * width,
                 area.y + (i / 5) as f64 * height,
@@ -234,7 +215,7 @@ mod tests {
                 height,
             )
         };
-        let cells: Vec<_> = (0..20).map(|i| cell(&frame, &place(i))).collect();
+        let cells: Vec<_> = (0..20).map(|i| cell(&frame, &cell_area(i))).collect();
         let energy =
             |cell: &[f64; CHANNELS]| -> f64 { cell[..DIRECTIONS].iter().map(|v| v * v).sum() };
         let mean = cells.iter().map(|cell| cell[DIRECTIONS]).sum::<f64>() / 20.0;
@@ -251,16 +232,16 @@ mod tests {
                 .map(|at| energy(&cells[at]))
                 .collect();
             let mean_energy = around.iter().sum::<f64>() / around.len() as f64;
-            let floor = (f64::from(FLAT) * width * height).powi(2);
+            let floor = (f64::from(MIN_STRENGTH) * width * height).powi(2);
             let divisor = 3.0 * (mean_energy + floor).sqrt();
             for (value, sum) in values.iter().zip(&cells[index][..DIRECTIONS]) {
-                let expected = (sum / divisor).min(f64::from(GREATEST));
+                let expected = (sum / divisor).min(f64::from(MAX_DIRECTION));
                 assert!(
                     (f64::from(*value) - expected).abs() < 2e-3,
                     "{value} {expected}"
                 );
             }
-            let gray = (cells[index][DIRECTIONS] - mean) * params.gray_weight / variance.sqrt();
+            let gray = (cells[index][DIRECTIONS] - mean) * f64::from(GRAY_WEIGHT) / variance.sqrt();
             assert!((f64::from(values[DIRECTIONS]) - gray).abs() < 2e-3);
         }
     }
@@ -279,6 +260,26 @@ mod tests {
         let moved = Rect { x: 17.0, ..area };
         let moved = distance(&here, &features(&bright, moved, &params));
         assert!(dimmed * 5.0 < moved, "{dimmed} {moved}");
+    }
+
+    /// Sums over a bright frame pass 2^24, beyond which single precision does not hold every whole number.
+    #[test]
+    fn features_in_the_last_corner_of_a_bright_frame_are_those_of_the_same_pixels_alone() {
+        let gray = |x: usize, y: usize| (243 + (x * x / 7 + y * 5 + x * y) % 13) as u8;
+        let pixels = (0..320 * 240).map(|i| gray(i % 320, i / 320)).collect();
+        let frame = GrayFrame::from_luma(320, 240, pixels).expect("a frame of this size");
+        let pixels = (0..48 * 40)
+            .map(|i| gray(272 + i % 48, 200 + i / 48))
+            .collect();
+        let corner = GrayFrame::from_luma(48, 40, pixels).expect("a frame of this size");
+        let params = Preset::Robust.params();
+        for (x, y) in [(4.0, 3.0), (6.3, 2.6), (11.8, 3.1)] {
+            let alone = features(&corner, Rect::new(x, y, 32.0, 32.0), &params);
+            let area = Rect::new(272.0 + x, 200.0 + y, 32.0, 32.0);
+            for (found, expected) in features(&frame, area, &params).iter().zip(alone) {
+                assert!((found - expected).abs() < 5e-4, "{found} {expected}");
+            }
+        }
     }
 
     #[test]

@@ -1,12 +1,33 @@
-//! TODO-doc
+//! From areas of a frame to feature vectors: what the tracker compares.
+//!
+//! In: a [`GrayFrame`](crate::tracker::image::frame::GrayFrame) and particles, in working pixels. Out: for each
+//! particle a vector of D `f32` values, one after the other. These are H₁ x H₂ gray values in [0, 1] (section III-B),
+//! or H₁ x H₂ cells of ten values: nine gradient directions in [0, 0.4] and a gray value of mean 0.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind |
+//! | [`gray`] | gray patches, and `gray_avx512` the same for machines with AVX-512 |
+//! | [`hog`] | the gradient histograms of many areas |
+//! | [`centering`] | a mean subtracted from vectors |
+//! | [`hog_cells`], [`block_norm`] | the cells of one area, and the normalisation of their directions |
+//! | [`integral`] | the integral image that cells are sums of |
+//! | [`gradient`], [`binning`] | a row of gradients, and its row of the integral image |
+//! | [`sample_coords`] | coordinates in the integral image |
+//! | [`channels`] | the order of the channels |
+//! | [`quantized`] | a vector in 8 bits a value, as the state keeps it |
+//!
+//! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
+//! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and
+//! black. Areas outside the window that was computed for the frame are treated as if the frame ended there.
 
+pub(crate) mod binning;
 pub(crate) mod block_norm;
 pub(crate) mod centering;
+pub(crate) mod channels;
 pub(crate) mod extractor;
 pub(crate) mod gradient;
 pub(crate) mod gray;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod gray_avx512;
 pub(crate) mod hog;
 pub(crate) mod hog_cells;
 pub(crate) mod integral;

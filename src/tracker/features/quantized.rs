@@ -1,73 +1,55 @@
-//! A feature vector as it is kept for later, in a byte a value.
+//! A feature vector in 8 bits a value, as the state keeps it.
 //!
-//! A session keeps more than a hundred of them: those the bag's subspaces were made of, and those of the background.
-//! Each has its own scale, so the error of a value is at most 1/254 of the vector's greatest.
+//! A session keeps more than a hundred vectors, of the bag's subspaces and of the background. Each has a scale of its
+//! own, so a value is off by at most 1/254 of the vector's largest.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
-/// Added to a number below 2^22 it leaves the nearest whole number in the last bits.
+/// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
 const ROUND: f32 = 12_582_912.0;
+/// The largest quantised value.
+const MAX_VALUE: f32 = 127.0;
 
-/// A feature vector in a byte a value.
+/// A feature vector: `scale` times 8-bit values.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct QuantizedVector {
-    /// What one step of a value is worth.
     scale: f32,
     values: Vec<i8>,
 }
 
-/// [`QuantizedVector::keep`], to be compiled for the instructions that this machine has.
-struct Keep<'a> {
-    look: &'a mut QuantizedVector,
-    features: &'a [f32],
-}
-
-impl WithSimd for Keep<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.look.keep_all(self.features);
+#[pulp::with_simd(quantize = Arch::new())]
+#[inline(always)]
+fn quantize_simd<S: Simd>(_: S, vector: &mut QuantizedVector, features: &[f32]) {
+    // Sixteen maxima, so that the loop vectorises.
+    let mut maxima = [0.0_f32; 16];
+    let (chunks, rest) = features.as_chunks::<16>();
+    for chunk in chunks {
+        for (max, value) in maxima.iter_mut().zip(chunk) {
+            let value = value.abs();
+            *max = if value > *max { value } else { *max };
+        }
+    }
+    let all = maxima.iter().chain(rest);
+    vector.scale = all.fold(0.0_f32, |max, value| max.max(value.abs())) / MAX_VALUE;
+    let inverse = if vector.scale > 0.0 {
+        1.0 / vector.scale
+    } else {
+        0.0
+    };
+    vector.values.resize(features.len(), 0);
+    for (quantized, value) in vector.values.iter_mut().zip(features) {
+        *quantized = (value * inverse + ROUND).to_bits() as i8;
     }
 }
 
 impl QuantizedVector {
-    /// Keeps `features` in place of what it kept.
-    pub fn keep(&mut self, features: &[f32]) {
-        Arch::new().dispatch(Keep {
-            look: self,
-            features,
-        });
+    /// Quantises `features` in place of the vector that was there.
+    pub fn set(&mut self, features: &[f32]) {
+        quantize(self, features);
     }
 
-    #[inline(always)]
-    fn keep_all(&mut self, features: &[f32]) {
-        // In parts so that the loop vectorises.
-        let mut parts = [0.0_f32; 16];
-        let (chunks, rest) = features.as_chunks::<16>();
-        for chunk in chunks {
-            for (most, value) in parts.iter_mut().zip(chunk) {
-                let value = value.abs();
-                *most = if value > *most { value } else { *most };
-            }
-        }
-        let all = parts.iter().chain(rest);
-        let greatest = all.fold(0.0_f32, |most, value| most.max(value.abs()));
-        self.scale = greatest / 127.0;
-        let inverse = if self.scale > 0.0 {
-            1.0 / self.scale
-        } else {
-            0.0
-        };
-        self.values.resize(features.len(), 0);
-        for (kept, value) in self.values.iter_mut().zip(features) {
-            // None is further from 0 than 127.
-            *kept = (value * inverse + ROUND).to_bits() as i8;
-        }
-    }
-
-    /// Adds the features, times `factor`, to `target`.
+    /// Adds `factor` times the vector to `target`.
     #[inline(always)]
     pub fn add_to(&self, target: &mut [f32], factor: f32) {
         let factor = factor * self.scale;
@@ -76,28 +58,22 @@ impl QuantizedVector {
         }
     }
 
-    /// Writes the features, with `mean` taken off, to `out`.
-    #[inline(always)]
-    pub fn write_without(&self, mean: &[f32], out: &mut [f32]) {
-        for ((out, &value), mean) in out.iter_mut().zip(&self.values).zip(mean) {
-            *out = self.scale * f32::from(value) - mean;
-        }
-    }
-
-    /// Writes the features, with `mean` taken off if there is one, to `out`.
+    /// Writes the vector minus `mean` to `out`; the vector itself where `mean` is empty.
     #[inline(always)]
     pub fn write(&self, mean: &[f32], out: &mut [f32]) {
         if mean.is_empty() {
             out.fill(0.0);
             self.add_to(out, 1.0);
-        } else {
-            self.write_without(mean, out);
+            return;
+        }
+        for ((out, &value), mean) in out.iter_mut().zip(&self.values).zip(mean) {
+            *out = self.scale * f32::from(value) - mean;
         }
     }
 
-    /// Whether this may be a feature vector of length `len` with no value over `greatest`.
-    pub fn is_valid_for(&self, len: usize, greatest: f32) -> bool {
-        self.values.len() == len && (0.0..=greatest / 127.0).contains(&self.scale)
+    /// Whether this is a feature vector of length `len` with no absolute value above `max`.
+    pub fn is_valid_for(&self, len: usize, max: f32) -> bool {
+        self.values.len() == len && (0.0..=max / MAX_VALUE).contains(&self.scale)
     }
 }
 
@@ -106,26 +82,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_look_comes_back_within_half_a_step() {
+    fn a_vector_comes_back_within_half_a_step() {
         let features: Vec<f32> = (0..100).map(|i| (i as f32 * 0.7).sin() * 0.3).collect();
-        let mut look = QuantizedVector::default();
-        look.keep(&features);
+        let mut vector = QuantizedVector::default();
+        vector.set(&features);
         let mut back = vec![0.0; 100];
-        look.add_to(&mut back, 1.0);
+        vector.add_to(&mut back, 1.0);
         for (value, back) in features.iter().zip(&back) {
             assert!((value - back).abs() <= 0.3 / 254.0 + 1e-6);
         }
         let mut without = vec![7.0; 100];
-        look.write_without(&features, &mut without);
+        vector.write(&features, &mut without);
         assert!(without.iter().all(|rest| rest.abs() <= 0.3 / 254.0 + 1e-6));
         let rounded: Vec<i8> = features
             .iter()
-            .map(|v| (v / look.scale).round() as i8)
+            .map(|v| (v / vector.scale).round() as i8)
             .collect();
-        assert_eq!(look.values, rounded);
-        look.keep(&[0.0; 3]);
+        assert_eq!(vector.values, rounded);
+        vector.set(&[0.0; 3]);
         let mut zeros = vec![0.0; 3];
-        look.add_to(&mut zeros, 1.0);
+        vector.add_to(&mut zeros, 1.0);
         assert_eq!(zeros, [0.0; 3]);
     }
 }

@@ -1,20 +1,20 @@
 //! Exact area averaging, in integers.
 //!
-//! An output pixel of index `o` covers the source interval `[o * S / T, (o + 1) * S / T)` for source size `S` and
-//! target size `T`. Measured in units of `1 / T` of a source pixel every interval has the whole length `S`, and
-//! its shares of source pixels are whole numbers too, so the average is exact up to the final rounding.
+//! Along each axis, target pixel `o` covers the source interval `[o * S / T, (o + 1) * S / T)` for source size `S` and
+//! target size `T`. In units of `1 / T` source pixel every interval has the length `S`, and its shares of source pixels
+//! are whole numbers too. So the average is exact up to the final rounding.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
-/// The share of one source index in one or two neighbouring target indices, in units of `1 / target`.
+/// How one source pixel is shared between target pixel `target` and the next one, in units of `1 / T`.
 struct Share {
     target: usize,
     first: u32,
     second: u32,
 }
 
-/// The source indices of one target index: `begin..end` as a whole, the one before and the one after by a share, in units of
-/// `1 / target`.
+/// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
+/// `1 / T`.
 struct Cell {
     begin: usize,
     end: usize,
@@ -22,7 +22,7 @@ struct Cell {
     after: u32,
 }
 
-/// Which of `source` indices each of `target` indices covers, `target <= source`.
+/// The source pixels that each target pixel covers, `target <= source`.
 fn cells(source: u32, target: u32) -> Vec<Cell> {
     let (source, target) = (u64::from(source), u64::from(target));
     (0..target)
@@ -39,7 +39,7 @@ fn cells(source: u32, target: u32) -> Vec<Cell> {
         .collect()
 }
 
-/// How each of `source` indices is shared among `target` indices, `target <= source`.
+/// How each source pixel is shared among the target pixels, `target <= source`.
 fn shares(source: u32, target: u32) -> Vec<Share> {
     (0..u64::from(source))
         .map(|index| {
@@ -57,83 +57,54 @@ fn shares(source: u32, target: u32) -> Vec<Share> {
         .collect()
 }
 
-/// The area average of `luma` (`source` = width, height, row order) on a grid of `target` = width, height, where
-/// no target side is above its source side. It is put into `out`, which is empty.
-pub(crate) fn area_average(
+/// The area average of `luma` (`source` = width, height, row by row) on a grid of `target` = width, height. No target
+/// side is longer than its source side. The averages are appended to `out`.
+#[pulp::with_simd(area_average = Arch::new())]
+#[inline(always)]
+pub(crate) fn area_average_simd<S: Simd>(
+    _: S,
     luma: &[u8],
     source: (u32, u32),
     target: (u32, u32),
-    out: Vec<u8>,
-) -> Vec<u8> {
-    Arch::new().dispatch(Average {
-        luma,
-        source,
-        target,
-        out,
-    })
-}
-
-/// One average, to be compiled for the instructions that this machine has.
-struct Average<'a> {
-    luma: &'a [u8],
-    source: (u32, u32),
-    target: (u32, u32),
-    out: Vec<u8>,
-}
-
-impl WithSimd for Average<'_> {
-    type Output = Vec<u8>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<u8> {
-        let Self {
-            luma,
-            source,
-            target,
-            mut out,
-        } = self;
-        let is_whole = source.0.is_multiple_of(target.0);
-        let columns = cells(source.0, target.0);
-        let rows = shares(source.1, target.1);
-        out.reserve_exact(target.0 as usize * target.1 as usize);
-        // Rows first: that loop runs over every source pixel, and this way it is contiguous. 255 times the weights
-        // of a column, which sum to the source height, stays far below 2^32 for any image that fits into memory.
-        let mut sums = vec![0_u32; source.0 as usize];
-        let mut next_sums = vec![0_u32; source.0 as usize];
-        for (index, row) in luma.chunks_exact(source.0 as usize).enumerate() {
-            let share = &rows[index];
-            for (sum, &value) in sums.iter_mut().zip(row) {
-                *sum += u32::from(value) * share.first;
-            }
-            if share.second > 0 {
-                for (sum, &value) in next_sums.iter_mut().zip(row) {
-                    *sum += u32::from(value) * share.second;
-                }
-            }
-            let last_of_cell = rows
-                .get(index + 1)
-                .is_none_or(|next| next.target > share.target);
-            if last_of_cell {
-                match source.0 / target.0 {
-                    2 if is_whole => average_whole::<2>(&sums, source.1, &mut out),
-                    3 if is_whole => average_whole::<3>(&sums, source.1, &mut out),
-                    4 if is_whole => average_whole::<4>(&sums, source.1, &mut out),
-                    6 if is_whole => average_whole::<6>(&sums, source.1, &mut out),
-                    _ => average_row(&sums, &columns, source, target.0, &mut out),
-                }
-                std::mem::swap(&mut sums, &mut next_sums);
-                next_sums.fill(0);
+    out: &mut Vec<u8>,
+) {
+    let is_whole = source.0.is_multiple_of(target.0);
+    let columns = cells(source.0, target.0);
+    let rows = shares(source.1, target.1);
+    out.reserve_exact(target.0 as usize * target.1 as usize);
+    // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
+    // source height; 255 times that stays far below 2^32 for any image that fits into memory.
+    let mut sums = vec![0_u32; source.0 as usize];
+    let mut next_sums = vec![0_u32; source.0 as usize];
+    for (index, row) in luma.chunks_exact(source.0 as usize).enumerate() {
+        let share = &rows[index];
+        for (sum, &value) in sums.iter_mut().zip(row) {
+            *sum += u32::from(value) * share.first;
+        }
+        if share.second > 0 {
+            for (sum, &value) in next_sums.iter_mut().zip(row) {
+                *sum += u32::from(value) * share.second;
             }
         }
-        out
+        let next = rows.get(index + 1);
+        if next.is_none_or(|next| next.target > share.target) {
+            match source.0 / target.0 {
+                2 if is_whole => average_whole::<2>(&sums, source.1, out),
+                3 if is_whole => average_whole::<3>(&sums, source.1, out),
+                4 if is_whole => average_whole::<4>(&sums, source.1, out),
+                6 if is_whole => average_whole::<6>(&sums, source.1, out),
+                _ => average_row(&sums, &columns, source, target.0, out),
+            }
+            std::mem::swap(&mut sums, &mut next_sums);
+            next_sums.fill(0);
+        }
     }
 }
 
-/// The averages of one row of cells, from the sums of its columns.
+/// Appends the averages of one row of target pixels, from the sums of its source columns.
 #[inline(always)]
 fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, out: &mut Vec<u8>) {
     let full = u64::from(source.0) * u64::from(source.1);
-    // Rounded down it is the exact quotient, or one less than it: see `quotient`.
     let inverse = 1.0 / full as f64;
     out.extend(cells.iter().map(|cell| {
         let whole = sums[cell.begin..cell.end].iter();
@@ -148,7 +119,7 @@ fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, ou
     }));
 }
 
-/// The same where a cell is `WIDTH` whole columns, as it is for the usual sizes of video: no loop within a cell.
+/// As [`average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
 #[inline(always)]
 fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
     let full = WIDTH as u32 * height;
@@ -162,8 +133,8 @@ fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8
     }));
 }
 
-/// `value / divisor` where `inverse` is 1 / `divisor` and the quotient is small: a division by a variable takes longer
-/// than all else that is done for a cell.
+/// `value / divisor`, where `inverse` is 1 / `divisor` and the quotient is small. An integer division would take longer
+/// than everything else that is done for a target pixel.
 #[inline(always)]
 fn quotient(value: u64, divisor: u64, inverse: f64) -> u32 {
     let near = (value as f64 * inverse) as u32;
@@ -214,7 +185,8 @@ mod tests {
             let luma: Vec<u8> = (0..source.0 * source.1)
                 .map(|i| (i * 89 % 256) as u8)
                 .collect();
-            let averages = area_average(&luma, source, target, Vec::new());
+            let mut averages = Vec::new();
+            area_average(&luma, source, target, &mut averages);
             let expected = by_definition(&luma, source, target);
             assert_eq!(averages.len(), expected.len());
             for (&average, &expected) in averages.iter().zip(&expected) {
@@ -226,10 +198,15 @@ mod tests {
 
     #[test]
     fn white_stays_white_at_any_size() {
-        for source in [(1921, 1079), (321, 1), (1, 5000), (640, 480)] {
+        for (source, target) in [
+            ((1921, 1079), (320, 180)),
+            ((321, 1), (320, 1)),
+            ((1, 5000), (1, 320)),
+            ((640, 480), (320, 240)),
+        ] {
             let luma = vec![255; source.0 as usize * source.1 as usize];
-            let target = crate::tracker::image::frame::working_size(source.0, source.1);
-            let averages = area_average(&luma, source, target, Vec::new());
+            let mut averages = Vec::new();
+            area_average(&luma, source, target, &mut averages);
             assert_eq!(averages.len(), target.0 as usize * target.1 as usize);
             assert!(averages.iter().all(|&value| value == 255));
         }

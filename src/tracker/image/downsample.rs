@@ -1,101 +1,95 @@
-//! A frame in larger pixels, for a large target: each is the mean of a square of the frame's own.
+//! A frame in larger pixels: each is the mean of a square of 2 x 2 or 4 x 4 of the frame's own.
 //!
-//! Gradients and their sums are made of every pixel around the target, so a large one costs as many times more, and says no
-//! more: what is compared are cells of it, of which there are always as many. Squares that the edge cuts are left out.
+//! A feature vector has as many cells for a large target as for a small one. In larger pixels a large target costs no
+//! more time than a small one, and its cells say the same. Squares that the frame's edge cuts are left out.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
-use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::motion::particles::{Particle, StateBounds};
-use crate::tracker::params::table::Features;
-use crate::tracker::params::table::Params;
 
-/// Pixels along the shorter side of a cell, at least. With 4 a car's growth in the picture is measured too poorly, and the box does not follow it.
-const FINEST: f64 = 6.0;
-/// The same once the target has become smaller: what is remembered was seen in pixels as large as at first.
-const SHRUNK: f64 = 4.0;
-/// The greatest side of a square.
-const GREATEST: usize = 4;
+/// The shorter side of a cell in larger pixels is at least this long. At 4 the scale is measured too coarsely, and the
+/// box does not follow a target that grows.
+const MIN_CELL_SIDE: f64 = 6.0;
+/// The same for a target that has become smaller. What is remembered of it was seen at the first factor, so the factor
+/// changes late.
+const MIN_SHRUNK_CELL_SIDE: f64 = 4.0;
+/// The largest factor.
+const MAX_FACTOR: usize = 4;
 
-/// Along how many pixels of the frame one of the picture goes in which `target` is looked at: 1, 2 or 4.
-pub(crate) fn downsample(target: &Particle, bounds: &StateBounds, params: &Params) -> usize {
-    if params.features == Features::Gray {
-        return 1;
-    }
-    let first = Particle {
-        scale: 1.0,
-        ..*target
-    };
-    let (width, height) = Extractor::cell(&first, bounds, params);
-    let shorter = width.min(height);
-    // A box may be larger than the frame, which has to have a pixel.
-    let most = bounds.frame_width.min(bounds.frame_height);
-    let mut downsample = 1;
-    while downsample < GREATEST {
-        let next = (2 * downsample) as f64;
-        if shorter < FINEST * next || shorter * target.scale < SHRUNK * next || next > most {
+/// How many working pixels along each side become one pixel: 1, 2 or 4. `first_cell` and `cell` are the shorter side of
+/// a cell of the target, at first and now, and `frame_side` the shorter side of the frame, all in working pixels.
+pub(crate) fn factor(first_cell: f64, cell: f64, frame_side: f64) -> usize {
+    let mut factor = 1;
+    while factor < MAX_FACTOR {
+        let next = (2 * factor) as f64;
+        // A box may be larger than the frame, which needs a pixel.
+        if first_cell < MIN_CELL_SIDE * next
+            || cell < MIN_SHRUNK_CELL_SIDE * next
+            || frame_side < next
+        {
             break;
         }
-        downsample *= 2;
+        factor *= 2;
     }
-    downsample
+    factor
 }
 
-/// `frame` in pixels of `downsample` = 2 or 4 by as many of its own. `scratch` is memory, whatever it holds.
-pub(crate) fn picture(frame: &GrayFrame, downsample: usize, mut scratch: Vec<u8>) -> GrayFrame {
-    let (width, height) = (
-        frame.width() as usize / downsample,
-        frame.height() as usize / downsample,
+/// `frame` in pixels that are `factor` = 2 or 4 times as large; neither side of the frame is shorter than that. The
+/// memory of `pixels` is used again, whatever it holds.
+pub(crate) fn downsampled(frame: &GrayFrame, factor: usize, mut pixels: Vec<u8>) -> GrayFrame {
+    let columns = downsample(frame, factor, &mut pixels);
+    let rows = pixels.len() / columns;
+    frame.in_larger_pixels(factor as u32, (columns as u32, rows as u32), pixels)
+}
+
+/// Replaces `out` by the mean of each whole square of `factor` = 2 or 4 pixels a side, row by row. Returns the number
+/// of squares in a row, which may be 0.
+pub(crate) fn downsample(frame: &GrayFrame, factor: usize, out: &mut Vec<u8>) -> usize {
+    let (columns, rows) = (
+        frame.width() as usize / factor,
+        frame.height() as usize / factor,
     );
-    scratch.clear();
-    scratch.resize(width * height, 0);
-    Arch::new().dispatch(Average {
-        frame,
-        downsample,
-        width,
-        out: &mut scratch,
-    });
-    frame.coarse(downsample as u32, (width as u32, height as u32), scratch)
+    out.clear();
+    out.resize(columns * rows, 0);
+    if columns > 0 {
+        square_means(frame, factor, columns, out);
+    }
+    columns
 }
 
-/// The means of [`picture`], to be compiled for the instructions that this machine has.
-struct Average<'a> {
-    frame: &'a GrayFrame,
-    downsample: usize,
-    width: usize,
-    out: &'a mut [u8],
-}
-
-impl WithSimd for Average<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        if self.downsample == 2 {
-            self.average::<2>();
-        } else {
-            self.average::<4>();
-        }
+#[pulp::with_simd(square_means = Arch::new())]
+#[inline(always)]
+fn square_means_simd<S: Simd>(
+    _: S,
+    frame: &GrayFrame,
+    factor: usize,
+    columns: usize,
+    out: &mut [u8],
+) {
+    match factor {
+        2 => square_means_of::<2>(frame, columns, out),
+        4 => square_means_of::<4>(frame, columns, out),
+        _ => unreachable!("the factor is 2 or 4"),
     }
 }
 
-impl Average<'_> {
-    #[inline(always)]
-    fn average<const FACTOR: usize>(self) {
-        let source_width = self.frame.width() as usize;
-        let rows = self.frame.pixels().chunks_exact(FACTOR * source_width);
-        for (out, rows) in self.out.chunks_exact_mut(self.width).zip(rows) {
-            let lines: [&[[u8; FACTOR]]; FACTOR] = std::array::from_fn(|row| {
-                let line = &rows[row * source_width..][..source_width];
-                &line.as_chunks::<FACTOR>().0[..out.len()]
-            });
-            for (i, out) in out.iter_mut().enumerate() {
-                let square = lines.iter().flat_map(|line| line[i]);
-                let sum: u16 = square.map(u16::from).sum();
-                let count = (FACTOR * FACTOR) as u16;
-                *out = ((sum + count / 2) / count) as u8;
+#[inline(always)]
+fn square_means_of<const FACTOR: usize>(frame: &GrayFrame, columns: usize, out: &mut [u8]) {
+    let width = frame.width() as usize;
+    let bands = frame.pixels().chunks_exact(FACTOR * width);
+    for (out, band) in out.chunks_exact_mut(columns).zip(bands) {
+        let lines: [&[[u8; FACTOR]]; FACTOR] =
+            std::array::from_fn(|row| &band[row * width..][..width].as_chunks().0[..columns]);
+        for (i, out) in out.iter_mut().enumerate() {
+            let mut sum = 0;
+            // Two plain loops become vector instructions; an iterator over the square does not.
+            for line in lines {
+                for value in line[i] {
+                    sum += u16::from(value);
+                }
             }
+            let count = (FACTOR * FACTOR) as u16;
+            *out = ((sum + count / 2) / count) as u8;
         }
     }
 }
@@ -103,80 +97,47 @@ impl Average<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::params::presets::Preset;
 
     #[test]
-    fn pixels_are_the_means_of_whole_squares() {
-        let gray = |x: usize, y: usize| ((x * 13 + y * y * 7) % 256) as u8;
-        let (width, height) = (43, 18);
-        let luma = (0..width * height).map(|i| gray(i % width, i / width));
-        let frame = GrayFrame::from_luma(width as u32, height as u32, luma.collect());
-        let frame = frame.expect("a frame of this size");
-        for downsample in [2, 4] {
-            let found = picture(&frame, downsample, vec![9; 5]);
-            let (columns, rows) = (width / downsample, height / downsample);
-            assert_eq!(
-                (found.width(), found.height()),
-                (columns as u32, rows as u32)
-            );
-            assert_eq!(found.downsample(), downsample as f64);
-            for (at, found) in found.pixels().iter().enumerate() {
-                let (column, row) = (at % columns, at / columns);
-                let square = (0..downsample * downsample).map(|i| {
-                    let (x, y) = (
-                        column * downsample + i % downsample,
-                        row * downsample + i / downsample,
-                    );
-                    f64::from(gray(x, y))
-                });
-                let mean = square.sum::<f64>() / (downsample * downsample) as f64;
-                assert!((f64::from(*found) - mean).abs() <= 0.5, "{found} {mean}");
+    fn pixels_are_the_rounded_means_of_whole_squares() {
+        for (width, height) in [(320, 240), (43, 18), (4, 4), (3, 9), (9, 3)] {
+            let texture = (0..width * height).map(|i| (i * i * 7 + i) as u8);
+            for luma in [vec![255; width * height], texture.collect()] {
+                let frame = GrayFrame::from_luma(width as u32, height as u32, luma.clone());
+                let frame = frame.expect("a frame of this size");
+                for factor in [2, 4] {
+                    let mut found = vec![1, 2, 3];
+                    let columns = downsample(&frame, factor, &mut found);
+                    assert_eq!(columns, width / factor);
+                    assert_eq!(found.len(), columns * (height / factor));
+                    let count = factor * factor;
+                    for (index, found) in found.into_iter().enumerate() {
+                        let (left, top) = (index % columns * factor, index / columns * factor);
+                        let pixel = |i: usize| luma[(top + i / factor) * width + left + i % factor];
+                        let sum: usize = (0..count).map(|i| usize::from(pixel(i))).sum();
+                        assert_eq!(usize::from(found), (sum + count / 2) / count);
+                    }
+                }
             }
         }
     }
 
     #[test]
+    fn a_downsampled_frame_knows_its_size_and_factor() {
+        let frame = GrayFrame::from_luma(43, 18, vec![9; 43 * 18]).expect("a frame of this size");
+        let found = downsampled(&frame, 4, vec![7; 5]);
+        assert_eq!((found.width(), found.height()), (10, 4));
+        assert_eq!(found.downsample(), 4.0);
+        assert_eq!(found.source_size(), (43, 18));
+    }
+
+    #[test]
     fn cells_have_six_pixels_and_four_when_they_have_shrunk() {
-        let params = Preset::Robust.params();
-        // Boxes with eight cells along 1.2 of their sides.
-        let of = |cell: f64, scale: f64| {
-            let bounds = StateBounds {
-                frame_width: 320.0,
-                frame_height: 240.0,
-                box_width: cell * 8.0 / 1.2,
-                box_height: 2.0 * cell * 8.0 / 1.2,
-            };
-            let target = Particle {
-                x: 160.0,
-                y: 120.0,
-                scale,
-            };
-            downsample(&target, &bounds, &params)
-        };
-        assert_eq!(
-            [3.0, 11.9, 12.1, 23.9, 24.1, 50.0].map(|cell| of(cell, 1.0)),
-            [1, 1, 2, 2, 4, 4]
-        );
-        assert_eq!(
-            [2.0, 1.0, 0.67, 0.66].map(|scale| of(12.1, scale)),
-            [2, 2, 2, 1]
-        );
-        let target = Particle {
-            x: 1.0,
-            y: 1.0,
-            scale: 1.0,
-        };
-        let thin = StateBounds {
-            frame_width: 300.0,
-            frame_height: 3.0,
-            box_width: 300.0,
-            box_height: 300.0,
-        };
-        assert_eq!(downsample(&target, &thin, &params), 2);
-        let gray = Params {
-            features: Features::Gray,
-            ..params
-        };
-        assert_eq!(downsample(&target, &thin, &gray), 1);
+        let of = |cell: f64, scale: f64| factor(cell, cell * scale, 240.0);
+        let sides = [3.0, 11.9, 12.1, 23.9, 24.1, 50.0];
+        assert_eq!(sides.map(|cell| of(cell, 1.0)), [1, 1, 2, 2, 4, 4]);
+        let scales = [2.0, 1.0, 0.67, 0.66];
+        assert_eq!(scales.map(|scale| of(12.1, scale)), [2, 2, 2, 1]);
+        assert_eq!(factor(45.0, 45.0, 3.0), 2);
     }
 }

@@ -4,7 +4,7 @@
 //! at most [`WORKING_SIDE`] on its longer side, and the tracker works there. A frame remembers the size it was
 //! uploaded with, which is what boxes are given in.
 
-use crate::tracker::image::area_average;
+use crate::tracker::image::area_average::area_average;
 
 /// Longest side, in pixels, of the working image. The paper's pixel lengths hold at this size.
 pub const WORKING_SIDE: u32 = 320;
@@ -33,7 +33,7 @@ pub struct GrayFrame {
     pixels: Vec<u8>,
     source_width: u32,
     source_height: u32,
-    /// Working pixels along a side of a pixel: 1, but where the tracker made it coarser.
+    /// Working pixels along a side of one of `pixels`: 1, 2 or 4.
     downsample: u32,
 }
 
@@ -47,19 +47,20 @@ impl GrayFrame {
     pub fn from_luma(width: u32, height: u32, luma: Vec<u8>) -> Result<Self, FrameError> {
         let size = (width, height);
         let working = checked_working_size(size, size, luma.len())?;
-        let pixels = if working == size {
-            luma
-        } else {
-            area_average::area_average(&luma, size, working, Vec::new())
-        };
+        if working == size {
+            return Ok(Self::new(size, working, luma));
+        }
+        let mut pixels = Vec::new();
+        area_average(&luma, size, working, &mut pixels);
         Ok(Self::new(size, working, pixels))
     }
 
-    /// The same for a frame of `source` = width, height, of which a decoder gives a reduced picture, with `size` = width,
-    /// height, in `luma`. It may be as small as the working image. `scratch` is memory for the working image, whatever it holds.
+    /// The working image of a frame of `source` = width, height, from a reduced image of it that a decoder gives:
+    /// `luma` of `size` = width, height, not smaller than the working image. The memory of `scratch` is used again,
+    /// whatever it holds.
     ///
     /// # Errors
-    /// As [`Self::from_luma`]; also a picture that is smaller than the working image, or larger than the frame.
+    /// As [`Self::from_luma`]; also a reduced image that is smaller than the working image or larger than the frame.
     pub fn from_reduced(
         source: (u32, u32),
         size: (u32, u32),
@@ -68,13 +69,12 @@ impl GrayFrame {
     ) -> Result<Self, FrameError> {
         let working = checked_working_size(source, size, luma.len())?;
         scratch.clear();
-        let pixels = if working == size {
+        if working == size {
             scratch.extend_from_slice(luma);
-            scratch
         } else {
-            area_average::area_average(luma, size, working, scratch)
-        };
-        Ok(Self::new(source, working, pixels))
+            area_average(luma, size, working, &mut scratch);
+        }
+        Ok(Self::new(source, working, scratch))
     }
 
     fn new(source: (u32, u32), working: (u32, u32), pixels: Vec<u8>) -> Self {
@@ -88,26 +88,26 @@ impl GrayFrame {
         }
     }
 
-    /// A frame of the same size, with other `pixels`, of which there are as many.
+    /// A frame of the same size with other `pixels`, as many as it has.
     pub(crate) fn with_pixels(&self, pixels: Vec<u8>) -> Self {
         debug_assert_eq!(pixels.len(), self.pixels.len());
         Self { pixels, ..*self }
     }
 
-    /// The same frame in `pixels` that are `downsample` times as large, of which there are `size` = columns, rows.
-    pub(crate) fn coarse(&self, downsample: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
+    /// The same frame in `pixels` that are `factor` times as large; `size` = columns, rows of them.
+    pub(crate) fn in_larger_pixels(&self, factor: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
         debug_assert_eq!(pixels.len(), (size.0 * size.1) as usize);
         let (width, height) = size;
         Self {
             width,
             height,
             pixels,
-            downsample,
+            downsample: factor,
             ..*self
         }
     }
 
-    /// Working pixels along a side of one of these pixels.
+    /// Working pixels along a side of one of the pixels: 1, 2 or 4.
     pub(crate) fn downsample(&self) -> f64 {
         f64::from(self.downsample)
     }
@@ -127,7 +127,7 @@ impl GrayFrame {
         &self.pixels
     }
 
-    /// The luma values themselves, or the memory that they were in.
+    /// The luma values, moved out, so that their memory can be used again.
     pub fn into_pixels(self) -> Vec<u8> {
         self.pixels
     }
@@ -138,7 +138,7 @@ impl GrayFrame {
     }
 }
 
-/// The size of the working image of a frame of which there are `values` in a picture of this `size`.
+/// The working size of a frame of size `source`, checked against a reduced image of `size` with `values` pixels.
 fn checked_working_size(
     source: (u32, u32),
     size: (u32, u32),

@@ -1,72 +1,66 @@
-//! (A) The pictures in which the target of a frame is looked for.
+//! The images in which the target of one frame is searched.
 //!
-//! That is the frame itself, unless another one serves better: one in larger pixels where the target is large
-//! ([`coarse`]), and one that is turned with the target where that is turned ([`Rotation`]). Both are made in memory of
-//! the thread, which has to be given back, or the next frame asks for memory again.
+//! The first is the frame itself, or the frame in larger pixels ([`downsampled`]) where the target is large. The
+//! *rectified* one is that image rotated so that a rotated target is upright ([`Rotation`]).
 
-use crate::tracker::image::downsample;
+use crate::tracker::image::downsample::downsampled;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::image::warp::Rotation;
-use crate::tracker::motion::particles::StateBounds;
-use crate::tracker::state::State;
 
-/// Memory for the pixels of pictures, whatever it holds.
+/// Memory for the pixels of views. [`FrameViews::give_back`] returns it; otherwise the next frame allocates again.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    coarse: Vec<u8>,
+    downsampled: Vec<u8>,
     rectified: Vec<u8>,
 }
 
 impl Scratch {
-    /// Makes room for a turned picture of a frame of `bounds`, so that the first turn finds it.
-    pub fn begin(&mut self, bounds: &StateBounds) {
-        let pixels = bounds.frame_width * bounds.frame_height;
-        self.rectified.reserve(pixels as usize);
+    /// Reserves the memory of a rectified view of `pixels` pixels, so that the first rotation does not allocate.
+    pub fn reserve_rectified(&mut self, pixels: usize) {
+        self.rectified.reserve(pixels);
     }
 }
 
-/// The pictures of one frame.
+/// The views of one frame.
 #[derive(Debug)]
 pub(crate) struct FrameViews<'a> {
     frame: &'a GrayFrame,
-    coarse: Option<GrayFrame>,
+    downsampled: Option<GrayFrame>,
     rectified: Option<GrayFrame>,
 }
 
 impl<'a> FrameViews<'a> {
-    /// The pictures of `frame` for a target about as large as the last answer of `state`, not turned yet.
-    pub fn of(frame: &'a GrayFrame, state: &State, scratch: &mut Scratch) -> Self {
-        let downsample = downsample::downsample(&state.answer, &state.bounds, &state.params);
-        let coarse = (downsample > 1)
-            .then(|| downsample::picture(frame, downsample, std::mem::take(&mut scratch.coarse)));
+    /// The views of `frame` in pixels that are `factor` = 1, 2 or 4 times as large, not rotated.
+    pub fn new(frame: &'a GrayFrame, factor: usize, scratch: &mut Scratch) -> Self {
+        let pixels = &mut scratch.downsampled;
         Self {
             frame,
-            coarse,
+            downsampled: (factor > 1).then(|| downsampled(frame, factor, std::mem::take(pixels))),
             rectified: None,
         }
     }
 
-    /// Turns what is in `window`, in working pixels, by `rotation`.
-    pub fn orientation(&mut self, rotation: &Rotation, window: &Rect, scratch: &mut Scratch) {
+    /// Rotates what is in `window`, in working pixels.
+    pub fn rectify(&mut self, rotation: &Rotation, window: &Rect, scratch: &mut Scratch) {
         let pixels = std::mem::take(&mut scratch.rectified);
         self.rectified = Some(rotation.apply(self.original(), window, pixels));
     }
 
-    /// The target as it is in the frame.
+    /// The view with the target as it is in the frame.
     pub fn original(&self) -> &GrayFrame {
-        self.coarse.as_ref().unwrap_or(self.frame)
+        self.downsampled.as_ref().unwrap_or(self.frame)
     }
 
-    /// The target as it was first, upright.
+    /// The view with the target upright, as in the first frame.
     pub fn rectified(&self) -> &GrayFrame {
         self.rectified.as_ref().unwrap_or_else(|| self.original())
     }
 
-    /// Gives the memory back.
+    /// Returns the memory to `scratch`.
     pub fn give_back(self, scratch: &mut Scratch) {
-        if let Some(coarse) = self.coarse {
-            scratch.coarse = coarse.into_pixels();
+        if let Some(downsampled) = self.downsampled {
+            scratch.downsampled = downsampled.into_pixels();
         }
         if let Some(rectified) = self.rectified {
             scratch.rectified = rectified.into_pixels();

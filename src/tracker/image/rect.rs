@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A box: top-left corner and size in pixels. May reach over the edge of the frame.
 ///
 /// Pixel `(0, 0)` covers the square from `(0.0, 0.0)` to `(1.0, 1.0)`. Annotations that count pixels from 1,
-/// as those of the OTB benchmark do, need 1 taken from `x` and `y`.
+/// as those of the OTB benchmark do, need 1 subtracted from `x` and `y`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rect {
     /// Left edge.
@@ -56,9 +56,15 @@ impl Rect {
 
     /// The area, in square pixels, that both boxes cover.
     pub fn intersection(&self, other: &Self) -> f64 {
-        let width = (self.x + self.width).min(other.x + other.width) - self.x.max(other.x);
-        let height = (self.y + self.height).min(other.y + other.height) - self.y.max(other.y);
-        width.max(0.0) * height.max(0.0)
+        self.common(other).area()
+    }
+
+    /// The part that both boxes cover; without width or height where there is none.
+    pub(crate) fn common(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
+        let width = (self.x + self.width).min(other.x + other.width) - x;
+        let height = (self.y + self.height).min(other.y + other.height) - y;
+        Self::new(x, y, width.max(0.0), height.max(0.0))
     }
 
     /// Intersection over union, in [0, 1]; 0 if either box has no area.
@@ -79,7 +85,7 @@ impl Rect {
         (x - other_x).hypot(y - other_y)
     }
 
-    /// The same box where x is stretched by `horizontal` and y by `vertical`.
+    /// The same box with x multiplied by `horizontal` and y by `vertical`.
     pub fn scaled(&self, horizontal: f64, vertical: f64) -> Self {
         Self::new(
             self.x * horizontal,

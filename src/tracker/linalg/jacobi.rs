@@ -1,8 +1,10 @@
-//! Eigenvalues and eigenvectors of a small symmetric matrix, by cyclic Jacobi rotations: the method with the smallest relative
-//! errors on positive semidefinite matrices, and one that always ends.
+//! Eigenvalues and eigenvectors of a small symmetric matrix, by cyclic Jacobi rotations: the method with the smallest
+//! relative errors on positive semidefinite matrices, and one that always ends.
 //!
-//! Own code: nalgebra's decomposition allocates on each call, which a step must not. It takes 1.6 times as long for 3 rows,
-//! 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a microsecond.
+//! Own code: nalgebra's decomposition of a matrix of any size allocates on each call, which a step must not. It takes 1.6
+//! times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a microsecond.
+
+use nalgebra::{SMatrix, SVector};
 
 /// Cyclic Jacobi needs four to six sweeps at these sizes; the bound ends it on NaN.
 const MAX_SWEEPS: usize = 16;
@@ -10,21 +12,36 @@ const MAX_SWEEPS: usize = 16;
 /// An off-diagonal element below this share of the trace is rounding.
 const NEGLIGIBLE: f64 = 1e-16;
 
+/// Without eigenvectors, an off-diagonal element is also rounding if its square is below this share of the product of the
+/// two diagonal elements: it changes these by at most √ of this share, and only where they are nearly equal.
+const NEGLIGIBLE_SQUARED: f64 = 1e-16;
+
 /// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle is read.
 /// Leaves the eigenvalues on its diagonal, in no order, and in row `j` of `vectors` the eigenvector of the `j`-th of them.
+/// An empty `vectors` asks for the eigenvalues alone, to eight digits.
 #[inline(always)]
 fn diagonalize(matrix: &mut [f64], vectors: &mut [f64], dim: usize) {
-    vectors.fill(0.0);
     let mut floor = 0.0;
     for j in 0..dim {
-        vectors[j * dim + j] = 1.0;
         floor += matrix[j * dim + j] * NEGLIGIBLE;
     }
+    let relative = if vectors.is_empty() {
+        NEGLIGIBLE_SQUARED
+    } else {
+        0.0
+    };
+    vectors.fill(0.0);
+    vectors
+        .iter_mut()
+        .step_by(dim + 1)
+        .for_each(|one| *one = 1.0);
     for _ in 0..MAX_SWEEPS {
         let mut rotated = false;
         for p in 0..dim {
             for q in p + 1..dim {
-                if matrix[p * dim + q].abs() > floor {
+                let off = matrix[p * dim + q];
+                let share = relative * matrix[p * dim + p] * matrix[q * dim + q];
+                if off.abs() > floor && off * off > share {
                     rotated = true;
                     rotate(matrix, vectors, dim, p, q);
                 }
@@ -56,7 +73,7 @@ fn rotate(matrix: &mut [f64], vectors: &mut [f64], dim: usize, p: usize, q: usiz
         let rq = r.min(q) * dim + r.max(q);
         rotate_pair(matrix, rp, rq, cosine, sine);
     }
-    for r in 0..dim {
+    for r in 0..dim.min(vectors.len()) {
         rotate_pair(vectors, p * dim + r, q * dim + r, cosine, sine);
     }
 }
@@ -66,6 +83,34 @@ fn rotate_pair(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
     let (at_p, at_q) = (values[p], values[q]);
     values[p] = cosine * at_p - sine * at_q;
     values[q] = sine * at_p + cosine * at_q;
+}
+
+/// The eigenvalues of a symmetric positive semidefinite matrix, largest first, and their eigenvectors as columns.
+#[inline(always)]
+pub(crate) fn eigenpairs<const M: usize>(
+    mut matrix: SMatrix<f64, M, M>,
+) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
+    let mut vectors = SMatrix::<f64, M, M>::zeros();
+    // The matrix is symmetric, so that the order of rows and columns does not matter; rows of vectors become columns.
+    diagonalize(matrix.as_mut_slice(), vectors.as_mut_slice(), M);
+    for j in 0..M {
+        for other in j + 1..M {
+            if matrix[(other, other)] > matrix[(j, j)] {
+                matrix.swap((j, j), (other, other));
+                vectors.swap_columns(j, other);
+            }
+        }
+    }
+    (matrix.diagonal(), vectors)
+}
+
+/// The eigenvalues of a symmetric positive semidefinite matrix, largest first, to 1e-16 of its trace or to eight digits.
+#[inline(always)]
+pub(crate) fn eigenvalues<const N: usize>(mut matrix: SMatrix<f64, N, N>) -> [f64; N] {
+    diagonalize(matrix.as_mut_slice(), &mut [], N);
+    let mut values: [f64; N] = std::array::from_fn(|j| matrix[(j, j)]);
+    values.sort_unstable_by(|a, b| b.total_cmp(a));
+    values
 }
 
 /// The eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix. Keeps its buffers.
@@ -148,6 +193,28 @@ mod tests {
                 }
                 assert!((rebuilt - &expected).norm() < 1e-13 * expected.norm().max(1e-300));
                 assert!(pairs.windows(2).all(|pair| pair[0].0 >= pair[1].0));
+            }
+        }
+    }
+
+    #[test]
+    fn matrices_of_fixed_size_have_the_same_eigenpairs() {
+        for rank in 1..=6 {
+            let given = matrix(6, rank, rank);
+            let (values, vectors) =
+                super::eigenpairs(SMatrix::<f64, 6, 6>::from_fn(|i, j| given[(i, j)]));
+            let alone = eigenvalues(SMatrix::<f64, 6, 6>::from_fn(|i, j| given[(i, j)]));
+            let largest = values[0];
+            for (j, (expected, vector)) in eigenpairs(given.as_slice(), 6).iter().enumerate() {
+                assert!(
+                    (values[j] - expected).abs() < 1e-15 * largest,
+                    "{rank}, {j}"
+                );
+                assert!((alone[j] - expected).abs() < 1e-7 * expected + 1e-15 * largest);
+                if *expected > 1e-14 * largest {
+                    let cosine: f64 = (0..6).map(|i| vectors[(i, j)] * vector[i]).sum();
+                    assert!((cosine.abs() - 1.0).abs() < 1e-12, "{rank}, {j}: {cosine}");
+                }
             }
         }
     }

@@ -6,6 +6,7 @@
 //! | `combinations` | linear combinations of f32 vectors |
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
+//! | `scratch` | nothing: the buffers of the others |
 //! | `exp`, `acos` | e^x and arccos² of many numbers at once, f64 |
 //!
 //! In and out: plain slices. A set of n vectors of length D is one slice of n D values, one vector after the other; a
@@ -23,4 +24,5 @@ pub(crate) mod combinations;
 pub(crate) mod exp;
 pub(crate) mod gemm;
 pub(crate) mod jacobi;
+pub(crate) mod scratch;
 pub(crate) mod vector_ops;

@@ -1,5 +1,12 @@
-//! TODO-doc
+//! The parameters of a tracker: one table of fields and ranges, two presets, and the limits on products of sizes.
+//!
+//! - `table`: [`Params`](table::Params), with each parameter's meaning, type and range said once.
+//! - `presets`: the paper's printed settings and the default.
+//! - `limits`: what several sizes may cost together.
+//!
+//! Nothing goes in but numbers. A parameter out of its range, or sizes that cost too much together, give a
+//! [`ParamsError`](table::ParamsError) that names the parameter, its value and what is allowed.
 
+pub(crate) mod limits;
 pub(crate) mod presets;
 pub(crate) mod table;
-pub(crate) mod validate;

@@ -46,11 +46,6 @@ pub(crate) fn params(params: &Params) -> Params {
     }
 }
 
-/// The ratio of a pyramid's largest area to its middle, along a side.
-pub(crate) fn largest() -> f64 {
-    (STEP * MIDDLE as f64).exp()
-}
-
 /// Writes the areas of the pyramid around `center` to `out`, smallest first.
 pub(crate) fn areas(center: &Particle, out: &mut Vec<Particle>) {
     out.clear();
@@ -118,5 +113,16 @@ impl Scratch {
         let spectrum = &mut self.spectrum;
         combinations::assign_combinations(simd, spectrum, &FOURIER.windowed, &self.features, len);
         len
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::features::extractor::PYRAMID_MARGIN;
+
+    #[test]
+    fn the_window_of_a_frame_holds_the_largest_level() {
+        assert_eq!((STEP * MIDDLE as f64).exp(), PYRAMID_MARGIN);
     }
 }

@@ -8,92 +8,129 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::linalg::exp;
 
-/// Entries whose sums are kept together.
-const BLOCK: usize = 16;
-
-/// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equations 10 and 11) of `distances`, which hold for each candidate its
-/// distance to each of `entries` entries; the result in the same order. Each entry's sum over the candidates is 1.
-pub(crate) fn normalized(distances: &[f64], entries: usize, sigma: f64, out: &mut Vec<f64>) {
-    out.clear();
-    out.extend_from_slice(distances);
-    Arch::new().dispatch(Normalize {
-        values: out,
-        entries,
-        sigma,
-    });
+/// The likelihoods of a frame's particles; keeps its buffers.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Likelihoods {
+    /// p̂(Aᵢ | B\[k\]): for each particle its likelihood for each entry.
+    values: Vec<f64>,
+    /// For each entry the least distance, and then the sum over the particles.
+    entries: Vec<f64>,
 }
 
-/// [`normalized`] in place, to be compiled for the instructions that this machine has.
-struct Normalize<'a> {
-    values: &'a mut [f64],
-    entries: usize,
+/// [`Likelihoods::weigh`], compiled for this machine's instructions.
+struct Weigh<'a> {
+    likelihoods: &'a mut Likelihoods,
+    distances: &'a [f64],
     sigma: f64,
+    pinned: (usize, f64),
+    weights: &'a mut [f64],
 }
 
-impl WithSimd for Normalize<'_> {
+impl WithSimd for Weigh<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self {
-            values,
-            entries,
-            sigma,
-        } = self;
-        for first in (0..entries).step_by(BLOCK) {
-            let block = first..entries.min(first + BLOCK);
-            let mut least = [f64::INFINITY; BLOCK];
-            for row in values.chunks_exact(entries) {
-                for (least, &value) in least.iter_mut().zip(&row[block.clone()]) {
-                    *least = if value < *least { value } else { *least };
-                }
-            }
-            for row in values.chunks_exact_mut(entries) {
-                for (value, least) in row[block.clone()].iter_mut().zip(&least) {
-                    *value = (least - *value) / sigma;
-                }
-            }
-        }
-        exp::exp(values);
-        for first in (0..entries).step_by(BLOCK) {
-            let block = first..entries.min(first + BLOCK);
-            let mut sums = [0.0; BLOCK];
-            for row in values.chunks_exact(entries) {
-                for (sum, value) in sums.iter_mut().zip(&row[block.clone()]) {
-                    *sum += value;
-                }
-            }
-            for row in values.chunks_exact_mut(entries) {
-                for (value, sum) in row[block.clone()].iter_mut().zip(&sums) {
-                    *value /= sum;
-                }
-            }
-        }
+        let entries = self.distances.len() / self.weights.len();
+        let likelihoods = self.likelihoods;
+        likelihoods.normalize(self.distances, entries, self.sigma);
+        exp::exp(self.weights);
+        likelihoods.sum_rule(entries, self.pinned, self.weights);
     }
 }
 
-/// The weight of each particle: the sum of its likelihoods over the bag (equation 9), the first `pinned` entries
-/// counting `pinned_weight` times, scaled so that the weights sum to 1.
-pub(crate) fn sum_rule(
-    likelihoods: &[f64],
-    entries: usize,
-    (pinned, pinned_weight): (usize, f64),
-    out: &mut Vec<f64>,
-) {
-    let pinned = pinned.min(entries);
-    // Entries that all weigh nothing would be no likelihood at all.
-    let pinned_weight = if pinned == entries {
-        1.0
-    } else {
-        pinned_weight
-    };
-    let total = pinned_weight * pinned as f64 + (entries - pinned) as f64;
-    out.clear();
-    out.extend(likelihoods.chunks_exact(entries).map(|row| {
-        let (first, others) = row.split_at(pinned);
-        let first = pinned_weight * first.iter().sum::<f64>();
-        (first + others.iter().sum::<f64>()) / total
-    }));
+impl Likelihoods {
+    /// Makes room for so many particles and entries of the bag.
+    pub fn reserve(&mut self, particles: usize, entries: usize) {
+        self.values.clear();
+        self.values.reserve(particles * entries);
+        self.entries.clear();
+        self.entries.reserve(entries);
+    }
+
+    /// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and
+    /// from them `weights`, one for each particle.
+    ///
+    /// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential
+    /// of that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the
+    /// sum the first `pinned.0` entries count `pinned.1` times.
+    pub fn weigh(
+        &mut self,
+        distances: &[f64],
+        sigma: f64,
+        pinned: (usize, f64),
+        weights: &mut [f64],
+    ) {
+        Arch::new().dispatch(Weigh {
+            likelihoods: self,
+            distances,
+            sigma,
+            pinned,
+            weights,
+        });
+    }
+
+    /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equation 10), in the order of the distances. Each entry's sum over
+    /// the particles is 1.
+    pub fn normalized(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Equations 11 and 10.
+    #[inline(always)]
+    fn normalize(&mut self, distances: &[f64], entries: usize, sigma: f64) {
+        let Self {
+            values,
+            entries: of_entries,
+        } = self;
+        of_entries.clear();
+        of_entries.resize(entries, f64::INFINITY);
+        for row in distances.chunks_exact(entries) {
+            for (least, &distance) in of_entries.iter_mut().zip(row) {
+                *least = if distance < *least { distance } else { *least };
+            }
+        }
+        values.clear();
+        let share = 1.0 / sigma;
+        for row in distances.chunks_exact(entries) {
+            let exponents = row.iter().zip(of_entries.iter());
+            values.extend(exponents.map(|(distance, least)| (least - distance) * share));
+        }
+        exp::exp(values);
+        let sums = of_entries;
+        sums.fill(0.0);
+        for row in values.chunks_exact(entries) {
+            for (sum, likelihood) in sums.iter_mut().zip(row) {
+                *sum += likelihood;
+            }
+        }
+        for row in values.chunks_exact_mut(entries) {
+            for (likelihood, sum) in row.iter_mut().zip(sums.iter()) {
+                *likelihood /= sum;
+            }
+        }
+    }
+
+    /// Equation 9, times what `weights` hold.
+    #[inline(always)]
+    fn sum_rule(&self, entries: usize, (pinned, pinned_weight): (usize, f64), weights: &mut [f64]) {
+        // Entries that all weigh nothing would be no likelihood at all.
+        let pinned = if pinned < entries { pinned } else { 0 };
+        let mut total = 0.0;
+        for (weight, row) in weights.iter_mut().zip(self.values.chunks_exact(entries)) {
+            let (first, others) = row.split_at(pinned);
+            let first = pinned_weight * first.iter().sum::<f64>();
+            *weight *= first + others.iter().sum::<f64>();
+            total += *weight;
+        }
+        if total > 0.0 {
+            weights.iter_mut().for_each(|weight| *weight /= total);
+        } else {
+            // Every product underflowed: nothing is known to be better.
+            let equal = 1.0 / weights.len() as f64;
+            weights.fill(equal);
+        }
+    }
 }
 
 /// The particle with the greatest weight (equation 12), the first of equals.
@@ -111,41 +148,66 @@ pub(crate) fn arg_max(weights: &[f64]) -> usize {
 mod tests {
     use super::*;
 
+    fn weigh(distances: &[f64], pinned: (usize, f64), exponents: &[f64]) -> Vec<f64> {
+        let mut weights = exponents.to_vec();
+        Likelihoods::default().weigh(distances, 0.01, pinned, &mut weights);
+        weights
+    }
+
+    #[test]
+    fn weights_are_those_of_the_printed_equations_times_an_exponential() {
+        let (particles, entries) = (23, 3);
+        let distance = |i: usize, k: usize| 0.2 + ((3 * i + k).pow(2) % 37) as f64 * 0.003;
+        let distances: Vec<f64> = (0..particles * entries)
+            .map(|at| distance(at / entries, at % entries))
+            .collect();
+        let exponents: Vec<f64> = (0..particles).map(|i| -0.1 * (i % 5) as f64).collect();
+        for pinned in [(0, 1.0), (1, 3.0), (3, 0.0), (1, 0.0)] {
+            let expected: Vec<f64> = (0..particles)
+                .map(|i| {
+                    let likelihood = |k| {
+                        let plain = |i| f64::exp(-distance(i, k) / 0.01);
+                        let weight = if k < pinned.0 && pinned.0 < entries {
+                            pinned.1
+                        } else {
+                            1.0
+                        };
+                        weight * plain(i) / (0..particles).map(plain).sum::<f64>()
+                    };
+                    exponents[i].exp() * (0..entries).map(likelihood).sum::<f64>()
+                })
+                .collect();
+            let total: f64 = expected.iter().sum();
+            let found = weigh(&distances, pinned, &exponents);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found - expected / total).abs() < 1e-14);
+            }
+        }
+    }
+
     #[test]
     fn equal_distances_give_equal_weights() {
-        let (mut likelihoods, mut weights) = (Vec::new(), Vec::new());
-        normalized(&[0.3; 12], 3, 0.01, &mut likelihoods);
-        sum_rule(&likelihoods, 3, (0, 1.0), &mut weights);
+        let weights = weigh(&[0.3; 12], (0, 1.0), &[0.0; 4]);
         assert!(weights.iter().all(|weight| (weight - 0.25).abs() < 1e-15));
         assert_eq!(arg_max(&weights), 0);
     }
 
     #[test]
-    fn a_pinned_entry_counts_as_often_as_it_weighs() {
-        let mut weights = Vec::new();
-        sum_rule(&[0.9, 0.2, 0.1, 0.8], 2, (1, 3.0), &mut weights);
-        assert!((weights[0] - 2.9 / 4.0).abs() < 1e-15);
-        assert!((weights[1] - 1.1 / 4.0).abs() < 1e-15);
-        sum_rule(&[0.9, 0.1], 1, (1, 0.0), &mut weights);
-        assert_eq!(weights, [0.9, 0.1]);
+    fn exponents_that_all_underflow_give_equal_weights() {
+        assert_eq!(weigh(&[0.1, 0.2], (0, 1.0), &[-900.0; 2]), [0.5; 2]);
     }
 
     #[test]
     fn a_common_offset_changes_nothing_even_where_exp_underflows() {
         let near = [0.01, 0.02, 0.015, 0.05];
         let far = near.map(|distance| distance + 50.0);
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        normalized(&near, 1, 0.01, &mut a);
-        normalized(&far, 1, 0.01, &mut b);
-        let plain: Vec<f64> = near
-            .iter()
-            .map(|distance| (-distance / 0.01).exp())
-            .collect();
-        let sum: f64 = plain.iter().sum();
-        for i in 0..near.len() {
-            assert!((a[i] - plain[i] / sum).abs() < 1e-14);
-            assert!((a[i] - b[i]).abs() < 1e-11);
+        let (near, far) = (
+            weigh(&near, (0, 1.0), &[0.0; 4]),
+            weigh(&far, (0, 1.0), &[0.0; 4]),
+        );
+        for (near, far) in near.iter().zip(&far) {
+            assert!((near - far).abs() < 1e-11);
         }
-        assert_eq!(arg_max(&a), 0);
+        assert_eq!(arg_max(&far), 0);
     }
 }

@@ -1,0 +1,13 @@
+//! Parts of the OpenAPI document that no type of the interface gives by itself.
+//!
+//! The document is generated from the handlers and from the types that they parse and send. Handlers take these shared
+//! parts from here: [the problem responses](problem_responses), [the bodies](request_bodies) with frames and settings,
+//! and [the tracker's parameters](params_schema).
+//!
+//! What can go wrong: the document says something else than the parsers do. So the bodies are made from the
+//! [`Settings`](super::upload::settings::Settings) type that the parsers read, the problem responses from the problems
+//! that the handlers answer, and the parameters from the tracker's own.
+
+pub mod params_schema;
+pub mod problem_responses;
+pub mod request_bodies;

@@ -1,0 +1,102 @@
+//! The problems that the errors of the other modules are.
+
+use super::kind::Kind;
+use super::problem::Problem;
+use crate::ingest::IngestError;
+use crate::sessions::{
+    QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions, WorkLost,
+};
+use crate::tracker::TrackerError;
+use std::sync::Arc;
+
+impl From<ReplayError> for Problem {
+    fn from(error: ReplayError) -> Self {
+        match error {
+            ReplayError::OutOfOrder { got, expected } => {
+                let detail =
+                    format!("This session expects frame {expected}, and frame {got} was sent.");
+                Self::new(Kind::FrameOutOfOrder, detail).expecting_frame(expected)
+            }
+            ReplayError::Differs { got, expected } => {
+                let detail = format!(
+                    "Frame {got} was answered for other bytes; a new frame has the number {expected}."
+                );
+                Self::new(Kind::FrameDiffers, detail).expecting_frame(expected)
+            }
+        }
+    }
+}
+
+impl From<IngestError> for Problem {
+    fn from(error: IngestError) -> Self {
+        match error {
+            IngestError::UnknownFormat => {
+                let detail = "The type is taken from the bytes; send a JPEG, PNG or WebP image.";
+                Self::new(Kind::UnsupportedImage, detail)
+            }
+            IngestError::TooLarge(limit) => Self::new(
+                Kind::FrameTooLarge,
+                format!("{limit}. Send a smaller frame."),
+            ),
+            damaged => {
+                let detail = format!("{damaged}. Send the whole file again.");
+                Self::new(Kind::FrameDamaged, detail)
+            }
+        }
+    }
+}
+
+impl From<TrackerError> for Problem {
+    fn from(error: TrackerError) -> Self {
+        match error {
+            TrackerError::Params(error) => Self::invalid_parameter(error.to_string()),
+            TrackerError::Target(_) => Self::new(Kind::InvalidBox, format!("{error}.")),
+            TrackerError::FrameSize { .. } => {
+                let detail = format!("{error}. Open a new session for frames of another size.");
+                Self::new(Kind::FrameSizeMismatch, detail)
+            }
+            other => Self::internal(Arc::new(other)),
+        }
+    }
+}
+
+impl From<SnapshotError> for Problem {
+    fn from(error: SnapshotError) -> Self {
+        let detail = format!("{error}. Send the bytes of GET /sessions/{{id}}/snapshot unchanged.");
+        Self::new(Kind::InvalidSnapshot, detail).caused_by(Arc::new(error))
+    }
+}
+
+impl From<QueueFull> for Problem {
+    fn from(_: QueueFull) -> Self {
+        let detail = "Try again after the time in `Retry-After`. Nothing was changed.";
+        Self::new(Kind::QueueFull, detail)
+    }
+}
+
+impl From<TooManySessions> for Problem {
+    fn from(_: TooManySessions) -> Self {
+        let detail =
+            "Delete sessions that have ended, or try again after the time in `Retry-After`.";
+        Self::new(Kind::TooManySessions, detail)
+    }
+}
+
+impl From<SessionBusy> for Problem {
+    fn from(_: SessionBusy) -> Self {
+        let detail = "Wait for the answers to the frames already sent. The session is unchanged.";
+        Self::new(Kind::SessionBusy, detail)
+    }
+}
+
+impl From<SessionClosed> for Problem {
+    fn from(_: SessionClosed) -> Self {
+        Self::session_not_found()
+    }
+}
+
+impl From<WorkLost> for Problem {
+    fn from(error: WorkLost) -> Self {
+        Self::internal(Arc::new(error))
+    }
+}

@@ -1,0 +1,182 @@
+//! What went wrong with a request: one small constructor for each kind of problem that a handler finds itself.
+
+use super::kind::Kind;
+use axum::response::{IntoResponse, Response};
+use std::error::Error;
+use std::sync::Arc;
+
+/// What went wrong with a request.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    kind: Kind,
+    detail: String,
+    /// The number of the next frame, where a frame number was wrong.
+    expected_frame: Option<u64>,
+    /// Which frame of the request is meant, counted from 0.
+    index: Option<usize>,
+    /// The cause, for the log only.
+    cause: Option<Arc<dyn Error + Send + Sync>>,
+}
+
+impl Problem {
+    pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
+        Self {
+            kind,
+            detail: detail.into(),
+            expected_frame: None,
+            index: None,
+            cause: None,
+        }
+    }
+
+    /// The request cannot be read; `detail` says why and what would do.
+    pub fn malformed(detail: impl Into<String>) -> Self {
+        Self::new(Kind::MalformedRequest, detail)
+    }
+
+    /// No frame came.
+    pub fn missing_frame() -> Self {
+        let detail = "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON \
+            field `frame`.";
+        Self::new(Kind::MissingFrame, detail)
+    }
+
+    /// No box came.
+    pub fn missing_box() -> Self {
+        let detail = "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query \
+            or as a field.";
+        Self::new(Kind::MissingBox, detail)
+    }
+
+    /// No route has this path.
+    pub fn route_not_found() -> Self {
+        Self::new(Kind::RouteNotFound, "See /docs for the paths there are.")
+    }
+
+    /// No live session has this id.
+    pub fn session_not_found() -> Self {
+        let detail = "The session was never opened here, was deleted or has expired; open a new one with POST \
+            /sessions.";
+        Self::new(Kind::SessionNotFound, detail)
+    }
+
+    /// The route has other methods.
+    pub fn method_not_allowed() -> Self {
+        Self::new(
+            Kind::MethodNotAllowed,
+            "The header `Allow` lists the methods there are.",
+        )
+    }
+
+    /// The body did not arrive in time.
+    pub fn body_timeout() -> Self {
+        let detail = "Send the whole body faster, or a smaller frame. The session is unchanged.";
+        Self::new(Kind::BodyTimeout, detail)
+    }
+
+    /// The body has more bytes than it may.
+    pub fn body_too_large(limit: usize) -> Self {
+        let detail =
+            format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
+        Self::new(Kind::BodyTooLarge, detail)
+    }
+
+    /// The request has more frames than it may.
+    pub fn too_many_frames(limit: usize) -> Self {
+        let detail = format!(
+            "A request may have at most {limit} frames here; send the rest in another one."
+        );
+        Self::new(Kind::TooManyFrames, detail)
+    }
+
+    /// A parameter is unknown, has the wrong type or is out of its range.
+    pub fn invalid_parameter(detail: impl Into<String>) -> Self {
+        Self::new(Kind::InvalidParameter, detail)
+    }
+
+    /// The work took too long.
+    pub fn work_timeout() -> Self {
+        let detail = "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is \
+            never tracked twice.";
+        Self::new(Kind::WorkTimeout, detail)
+    }
+
+    /// The service is about to end.
+    pub fn not_ready() -> Self {
+        Self::new(Kind::NotReady, "Send requests to another instance.")
+    }
+
+    /// The service failed.
+    pub fn internal(cause: Arc<dyn Error + Send + Sync>) -> Self {
+        Self::panicked().caused_by(cause)
+    }
+
+    /// The service failed, and the log already has the cause.
+    pub fn panicked() -> Self {
+        let detail = "The fault is the service's. The log has the cause under this request id.";
+        Self::new(Kind::Internal, detail)
+    }
+
+    /// Says which of `count` frames is meant.
+    pub fn of_frame(mut self, index: usize, count: usize) -> Self {
+        if count > 1 {
+            self.detail = format!(
+                "Frame {} of {count} in this request: {} None of them was tracked.",
+                index + 1,
+                self.detail
+            );
+            self.index = Some(index);
+        }
+        self
+    }
+
+    pub(super) fn caused_by(mut self, cause: Arc<dyn Error + Send + Sync>) -> Self {
+        self.cause = Some(cause);
+        self
+    }
+
+    pub(super) fn expecting_frame(mut self, number: u64) -> Self {
+        self.expected_frame = Some(number);
+        self
+    }
+
+    /// Its kind.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What happened this time, and what to do.
+    pub fn detail(&self) -> &str {
+        &self.detail
+    }
+
+    /// The number of the next frame, where a frame number was wrong.
+    pub fn expected_frame(&self) -> Option<u64> {
+        self.expected_frame
+    }
+
+    /// Which frame of the request is meant, counted from 0.
+    pub fn index(&self) -> Option<usize> {
+        self.index
+    }
+
+    /// The cause and its causes, for the log.
+    pub fn cause(&self) -> Option<String> {
+        let mut error: &dyn Error = self.cause.as_deref()?;
+        let mut text = error.to_string();
+        while let Some(source) = error.source() {
+            text = format!("{text}: {source}");
+            error = source;
+        }
+        Some(text)
+    }
+}
+
+impl IntoResponse for Problem {
+    /// The status alone: an outer layer writes the document, since it knows the request.
+    fn into_response(self) -> Response {
+        let mut response = self.kind.status().into_response();
+        response.extensions_mut().insert(self);
+        response
+    }
+}

@@ -1,0 +1,89 @@
+//! A preset with single parameters set otherwise.
+
+use crate::http::problems::problem::Problem;
+use crate::tracker::{Params, Preset};
+use serde::de::{Deserialize, Deserializer, Error};
+use serde_json::{Map, Value};
+use std::borrow::Cow;
+
+/// Seeds drawn here are below this, so that JSON numbers hold them exactly in every language.
+const SEED_END: u64 = 1 << 53;
+
+/// A named set of the tracker's parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = Preset)]
+#[serde(rename_all = "snake_case")]
+pub enum PresetName {
+    /// The equations and numbers of the paper.
+    Paper,
+    /// The default: extended where the printed equations lose the object.
+    Robust,
+}
+
+impl From<PresetName> for Preset {
+    fn from(name: PresetName) -> Self {
+        match name {
+            PresetName::Paper => Self::Paper,
+            PresetName::Robust => Self::Robust,
+        }
+    }
+}
+
+/// Single parameters by their names.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ParamOverrides(Map<String, Value>);
+
+impl<'de> Deserialize<'de> for ParamOverrides {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = Cow::<str>::deserialize(deserializer)?;
+        serde_json::from_str(&text).map(Self).map_err(|_| {
+            D::Error::custom("`params` must be a JSON object of parameters, like {\"seed\": 7}")
+        })
+    }
+}
+
+impl ParamOverrides {
+    /// The parameters of `preset`, with `seed` (a random one when there is none) and these overrides.
+    ///
+    /// # Errors
+    /// A parameter is unknown or has the wrong type, or the seed is given twice.
+    pub fn resolve(self, preset: Preset, seed: Option<u64>) -> Result<Params, Problem> {
+        let mut params = preset.params();
+        params.seed = seed.unwrap_or_else(|| rand::random_range(0..SEED_END));
+        if seed.is_some() && self.0.contains_key("seed") {
+            return Err(Problem::malformed("`seed` is given twice; give it once."));
+        }
+        // One at a time, so that a value of the wrong type can be named.
+        for (name, value) in self.0 {
+            let mut known = by_name(&params);
+            if !known.contains_key(&name) {
+                return Err(unknown(&name, &known));
+            }
+            known.insert(name.clone(), value.clone());
+            params = serde_json::from_value(Value::Object(known)).map_err(|error| {
+                Problem::invalid_parameter(format!(
+                    "Parameter `{name}` cannot be {value}: {error}."
+                ))
+            })?;
+        }
+        Ok(params)
+    }
+}
+
+/// The parameters by their names.
+pub fn by_name(params: &Params) -> Map<String, Value> {
+    match serde_json::to_value(params) {
+        Ok(Value::Object(object)) => object,
+        // `Params` is a struct of numbers, booleans and names.
+        _ => unreachable!("the parameters are a JSON object"),
+    }
+}
+
+fn unknown(name: &str, known: &Map<String, Value>) -> Problem {
+    let names: Vec<String> = known.keys().map(|name| format!("`{name}`")).collect();
+    let name: String = name.chars().take(64).collect();
+    Problem::invalid_parameter(format!(
+        "There is no parameter `{name}`; the parameters are {}.",
+        names.join(", ")
+    ))
+}

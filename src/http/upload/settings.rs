@@ -1,0 +1,38 @@
+//! What the settings of a route are to the parsers and to the OpenAPI document.
+
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
+use std::borrow::Cow;
+use utoipa::{IntoParams, ToSchema};
+
+/// How many frames a route takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameCount {
+    /// Exactly one.
+    One,
+    /// One or more, up to the configured maximum.
+    Several,
+}
+
+/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` and `ToSchema` describe
+/// them in the query and in a body.
+pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
+    /// How many frames the route takes.
+    const FRAMES: FrameCount;
+    /// What the names of the schemas of its bodies begin with.
+    const SCHEMA_PREFIX: &'static str;
+}
+
+/// A whole number from 0 to 2⁶⁴ - 1, parsed from its text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WholeNumber(pub u64);
+
+impl<'de> Deserialize<'de> for WholeNumber {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = Cow::<str>::deserialize(deserializer)?;
+        text.parse().map(Self).map_err(|_| {
+            let start: String = text.chars().take(64).collect();
+            let max = u64::MAX;
+            D::Error::custom(format!("`{start}` is not a whole number from 0 to {max}"))
+        })
+    }
+}

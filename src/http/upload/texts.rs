@@ -1,0 +1,79 @@
+//! Settings as texts, before they are parsed.
+
+use super::settings::Settings;
+use crate::http::problems::problem::Problem;
+use axum::extract::Query;
+use axum::http::Uri;
+use serde_json::{Map, Value};
+
+/// Most bytes of a setting. All parameters of the tracker together take some hundred.
+const MAX_TEXT_BYTES: usize = 16 << 10;
+/// Most bytes of the name of a setting.
+const MAX_NAME_BYTES: usize = 64;
+/// Most settings of a request; no route has nearly as many.
+const MAX_SETTINGS: usize = 32;
+
+/// The texts of settings by their names, from the query and from the body.
+#[derive(Debug, Clone, Default)]
+pub struct Texts(Map<String, Value>);
+
+impl Texts {
+    /// The settings in the query, all of which `S` has.
+    ///
+    /// # Errors
+    /// The query cannot be read, or a setting is unknown, doubled or no value of its type.
+    pub fn of_query<S: Settings>(uri: &Uri) -> Result<Self, Problem> {
+        let Query(pairs) = Query::<Vec<(String, String)>>::try_from_uri(uri)
+            .map_err(|_| Problem::malformed("The query cannot be read; send name=value pairs."))?;
+        let mut texts = Self::default();
+        for (name, text) in pairs {
+            texts.add(&name, &text)?;
+        }
+        texts.clone().parse::<S>()?;
+        Ok(texts)
+    }
+
+    /// Adds one setting.
+    ///
+    /// # Errors
+    /// It was there before, it is too long, or there are too many.
+    pub fn add(&mut self, name: &str, text: &str) -> Result<(), Problem> {
+        let text = text.trim();
+        if name.len() > MAX_NAME_BYTES || self.0.len() >= MAX_SETTINGS {
+            let start: String = name.chars().take(MAX_NAME_BYTES).collect();
+            return Err(Problem::malformed(format!(
+                "There is no setting `{start}`."
+            )));
+        }
+        if text.len() > MAX_TEXT_BYTES {
+            let detail = format!("`{name}` is longer than {MAX_TEXT_BYTES} bytes.");
+            return Err(Problem::malformed(detail));
+        }
+        match self.0.insert(name.to_owned(), text.into()) {
+            None => Ok(()),
+            Some(_) => Err(Problem::malformed(format!(
+                "`{name}` is given twice; give it once."
+            ))),
+        }
+    }
+
+    /// The settings.
+    ///
+    /// # Errors
+    /// One is unknown, or its text is no value of its type.
+    pub fn parse<S: Settings>(self) -> Result<S, Problem> {
+        serde_json::from_value(Value::Object(self.0))
+            .map_err(|error| Problem::malformed(format!("The settings cannot be read: {error}.")))
+    }
+}
+
+/// Refuses any query, for calls that take none.
+///
+/// # Errors
+/// There is one.
+pub fn refuse_query(uri: &Uri) -> Result<(), Problem> {
+    match uri.query() {
+        None | Some("") => Ok(()),
+        Some(_) => Err(Problem::malformed("This call takes no query parameters.")),
+    }
+}

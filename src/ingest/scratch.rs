@@ -1,0 +1,26 @@
+//! Memory that a thread keeps from one frame to the next.
+
+/// Bytes of a buffer that a thread keeps: enough for the luma of a frame of 4096 x 4096.
+const MAX_KEPT_BYTES: usize = 16 << 20;
+
+/// Buffers that a thread fills again for each frame.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// The file as the decoder gets it.
+    pub(super) file: Vec<u8>,
+    /// Decoded values. Those behind the values of this frame are left from an earlier one.
+    pub(super) pixels: Vec<u8>,
+    /// Memory for a working image; empty while a frame has it.
+    pub(super) working: Vec<u8>,
+}
+
+impl Scratch {
+    /// Frees what an unusually large frame took.
+    pub(super) fn trim(&mut self) {
+        for buffer in [&mut self.file, &mut self.pixels] {
+            if buffer.capacity() > MAX_KEPT_BYTES {
+                *buffer = Vec::new();
+            }
+        }
+    }
+}

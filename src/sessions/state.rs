@@ -1,0 +1,115 @@
+//! What work on a session changes: the tracker, and the answers that a repeated request gets again.
+
+use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
+use super::snapshot::{SessionSnapshot, SnapshotError};
+use crate::tracker::{Estimate, GrayFrame, Rect, Tracker, TrackerError};
+
+/// The part of a session that changes from frame to frame.
+#[derive(Debug)]
+pub struct SessionState {
+    tracker: Tracker,
+    /// The answers to the last request, oldest first; at least one.
+    recent: Vec<Answered>,
+}
+
+impl SessionState {
+    /// A session that starts with `tracker`, which was made from the frame with this digest and from the box `given`.
+    pub fn new(tracker: Tracker, fingerprint: Fingerprint, given: Rect) -> Self {
+        let first = Answered {
+            fingerprint,
+            given: Some(given),
+            estimate: tracker.estimate(),
+        };
+        Self {
+            tracker,
+            recent: vec![first],
+        }
+    }
+
+    /// The session that a snapshot holds.
+    ///
+    /// # Errors
+    /// See [`SnapshotError`].
+    pub fn restore(snapshot: &[u8]) -> Result<Self, SnapshotError> {
+        let SessionSnapshot { tracker, recent } = SessionSnapshot::decode(snapshot)?;
+        Ok(Self { tracker, recent })
+    }
+
+    /// The session as bytes.
+    pub fn snapshot(&self) -> Vec<u8> {
+        SessionSnapshot::encode(&self.tracker, &self.recent)
+    }
+
+    /// The tracker.
+    pub(super) fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// Whether a request is to be processed or was answered before. `number` is what the client calls its (first)
+    /// frame; `given` is the box, where it corrects one. Without a number every request is processed. With one, a
+    /// request is a replay if its last frame is the session's last frame and all its frames are in the last request,
+    /// with the same bytes and the same box.
+    ///
+    /// # Errors
+    /// The frame number does not fit.
+    pub fn replay_decision(
+        &self,
+        number: Option<u64>,
+        posted: &[Fingerprint],
+        given: Option<Rect>,
+    ) -> Result<ReplayDecision, ReplayError> {
+        replay::decide(&self.recent, number, posted, given)
+    }
+
+    /// Tracks through `frames` in order: all of them, or none.
+    ///
+    /// # Errors
+    /// The index of the frame that the tracker refused, and why. The session is unchanged.
+    pub fn step(
+        &mut self,
+        frames: &[(Fingerprint, GrayFrame)],
+    ) -> Result<Vec<Estimate>, (usize, TrackerError)> {
+        // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
+        let before = (frames.len() > 1).then(|| self.tracker.clone());
+        let mut answered = Vec::with_capacity(frames.len());
+        for (index, (fingerprint, frame)) in frames.iter().enumerate() {
+            match self.tracker.step(frame) {
+                Ok(estimate) => answered.push(Answered {
+                    fingerprint: *fingerprint,
+                    given: None,
+                    estimate,
+                }),
+                Err(error) => {
+                    if let Some(before) = before {
+                        self.tracker = before;
+                    }
+                    return Err((index, error));
+                }
+            }
+        }
+        let estimates = answered.iter().map(|answered| answered.estimate).collect();
+        if !answered.is_empty() {
+            self.recent = answered;
+        }
+        Ok(estimates)
+    }
+
+    /// Takes the next frame with its box given by the user.
+    ///
+    /// # Errors
+    /// The tracker refused the frame or the box. The session is unchanged.
+    pub fn retarget(
+        &mut self,
+        fingerprint: Fingerprint,
+        frame: &GrayFrame,
+        given: Rect,
+    ) -> Result<Estimate, TrackerError> {
+        let estimate = self.tracker.retarget(frame, given)?;
+        self.recent = vec![Answered {
+            fingerprint,
+            given: Some(given),
+            estimate,
+        }];
+        Ok(estimate)
+    }
+}

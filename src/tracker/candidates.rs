@@ -1,0 +1,222 @@
+//! The candidates of a frame: its particles and, particle by particle, what is computed of them.
+//!
+//! They are described (B), compared with the bag (D) and weighed (equations 9 to 12), in this order, in one or more
+//! rounds: each call works on the particles that were added since the last one.
+
+use std::ops::Range;
+
+use crate::tracker::appearance::point_distance::PointDistance;
+use crate::tracker::classifier::samples::TrainingSamples;
+use crate::tracker::confidence::score::Evidence;
+use crate::tracker::features::centering::Centering;
+use crate::tracker::features::extractor::Extractor;
+use crate::tracker::grassmann::evaluation::Evaluation;
+use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::linalg::scratch::clear_and_reserve;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::motion::search;
+use crate::tracker::params::table::Params;
+use crate::tracker::state::State;
+use crate::tracker::weights::likelihood::{self, Likelihoods};
+
+/// P at most.
+const MAX_HISTORY: usize = 10;
+
+/// The particles of a frame, and all that is computed of them.
+#[derive(Debug, Default)]
+pub(crate) struct Candidates {
+    pub particles: Vec<Particle>,
+    /// The feature vectors; with single-vector candidates the background's mean is subtracted.
+    vectors: Vec<f32>,
+    /// D.
+    len: usize,
+    /// Their squared lengths.
+    squares: Vec<f32>,
+    /// What the discriminant says of them.
+    pub samples: TrainingSamples,
+    point_distance: PointDistance,
+    evaluation: Option<(Params, Evaluation)>,
+    /// For each particle, its distance to each entry of the bag.
+    distances: Vec<f64>,
+    likelihoods: Likelihoods,
+    /// The weights; they sum to 1.
+    pub weights: Vec<f64>,
+}
+
+impl Candidates {
+    /// Forgets the last frame, loads the models of `state`, and makes room for the widest search and `more` particles,
+    /// so that the first search for a lost target does not allocate.
+    pub fn begin(&mut self, state: &State, more: usize) {
+        let params = &state.params;
+        let (count, entries) = (search::max_count(params) + more, params.bag_size as usize);
+        self.len = params.feature_len();
+        let values = self.vectors.len().max(count * self.len);
+        self.vectors.resize(values, 0.0);
+        clear_and_reserve(&mut self.particles, count);
+        clear_and_reserve(&mut self.squares, count);
+        clear_and_reserve(&mut self.distances, count * entries);
+        clear_and_reserve(&mut self.weights, count);
+        self.likelihoods.reserve(count, entries);
+        let (weights, origin) = (state.discriminant.weights(), state.discriminant.origin());
+        let mean = state.background.mean();
+        self.samples.begin(weights, origin, mean, count);
+        if params.single_vector_candidate {
+            let queries = self.samples.query_vectors();
+            self.point_distance
+                .load(&state.bag, &state.background, queries, params);
+        } else {
+            self.printed_evaluation(params)
+                .set_bag(state.bag.subspaces());
+        }
+    }
+
+    /// The printed evaluation for `params`; the last one where only the seed differs.
+    fn printed_evaluation(&mut self, params: &Params) -> &mut Evaluation {
+        let is_the_same = |(last, _): &(Params, Evaluation)| {
+            let seed = last.seed;
+            *last
+                == Params {
+                    seed,
+                    ..params.clone()
+                }
+        };
+        if !self.evaluation.as_ref().is_some_and(is_the_same) {
+            self.evaluation = None;
+        }
+        let make = || (params.clone(), Evaluation::new(params));
+        &mut self.evaluation.get_or_insert_with(make).1
+    }
+
+    /// The feature vectors of the particles that were described.
+    pub fn vectors(&self) -> &[f32] {
+        &self.vectors[..self.squares.len() * self.len]
+    }
+
+    /// Describes the new particles in the channels that `extractor` computed of `image`, and compares them with the
+    /// models of `state`. The many of a wide search come in batches of the usual size: those stay in the caches.
+    pub fn describe_and_compare(
+        &mut self,
+        image: &GrayFrame,
+        extractor: &mut Extractor,
+        state: &State,
+    ) {
+        let (all, first) = search::usual_counts(&state.params);
+        let batch = first.max(all - first);
+        for start in (self.squares.len()..self.particles.len()).step_by(batch) {
+            let end = self.particles.len().min(start + batch);
+            self.describe(image, extractor, start..end, state);
+            self.compare(start..end, state);
+        }
+    }
+
+    /// (B) The vectors of a batch.
+    fn describe(
+        &mut self,
+        image: &GrayFrame,
+        extractor: &mut Extractor,
+        batch: Range<usize>,
+        state: &State,
+    ) {
+        let range = self.values_of(&batch);
+        let centering = Some(Centering {
+            mean: state.background.mean(),
+            squares: &mut self.squares,
+        });
+        let particles = &self.particles[batch];
+        let vectors = &mut self.vectors[range];
+        extractor.describe(
+            image,
+            particles,
+            &state.bounds,
+            &state.params,
+            vectors,
+            centering,
+        );
+    }
+
+    /// (D) The distances and the discriminant's scores of a batch.
+    fn compare(&mut self, batch: Range<usize>, state: &State) {
+        let vectors = &self.vectors[self.values_of(&batch)];
+        if state.params.single_vector_candidate {
+            let squares = &self.squares[batch.start..];
+            self.point_distance
+                .distances(vectors, squares, &state.params, &mut self.distances);
+            if state.discriminant.is_on() {
+                let products = self.point_distance.query_products(squares.len());
+                self.samples.push_scores(products, squares);
+            }
+            return;
+        }
+        if state.discriminant.is_on() {
+            self.samples.score_vectors(vectors);
+        }
+        let Some((_, evaluation)) = &mut self.evaluation else {
+            return;
+        };
+        evaluation.candidates_mut()[..vectors.len()].copy_from_slice(vectors);
+        let mut history = [&[][..]; MAX_HISTORY];
+        for (slice, vector) in history.iter_mut().zip(&state.history) {
+            *slice = vector;
+        }
+        let history = &history[..state.history.len()];
+        let distances = evaluation.compute_distances(batch.len(), history);
+        self.distances.extend_from_slice(distances);
+    }
+
+    /// Where the vectors of so many particles are.
+    fn values_of(&self, particles: &Range<usize>) -> Range<usize> {
+        particles.start * self.len..particles.end * self.len
+    }
+
+    /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
+    /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
+    pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
+        let mut weights = std::mem::take(&mut self.weights);
+        weights.clear();
+        weights.extend_from_slice(log_priors);
+        self.weigh_from(0, params.sigma, params, &mut weights);
+        self.weights = weights;
+        likelihood::arg_max(&self.weights)
+    }
+
+    /// The same for the particles from `first` on, with another σ: `weights` are their logarithmic priors, and become
+    /// their weights.
+    pub fn weigh_from(&mut self, first: usize, sigma: f64, params: &Params, weights: &mut [f64]) {
+        // Without a discriminant there are no scores.
+        if let Some(scores @ [_, ..]) = self.samples.scores().get(first..) {
+            let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            for (weight, score) in weights.iter_mut().zip(scores) {
+                *weight += params.discriminant_weight * f64::from(score - max);
+            }
+        }
+        let pinned = (params.pinned_entries(), params.pinned_weight);
+        let distances = &self.distances[first * self.entries()..];
+        self.likelihoods.weigh(distances, sigma, pinned, weights);
+    }
+
+    /// Forgets all particles but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        let entries = self.entries();
+        self.particles.truncate(count);
+        self.squares.truncate(count);
+        self.distances.truncate(count * entries);
+        self.samples.truncate(count);
+    }
+
+    /// What particle `index` says of itself; `lately` is the running mean of the distance to the first entry.
+    pub fn evidence(&self, index: usize, lately: f64) -> Evidence {
+        let distances = &self.distances[index * self.entries()..][..self.entries()];
+        Evidence {
+            first: distances[0],
+            lately,
+            nearest: distances.iter().copied().fold(f64::INFINITY, f64::min),
+            discriminant: self.samples.scores().get(index).copied(),
+            scale: self.particles[index].scale,
+        }
+    }
+
+    /// The number of the bag's entries.
+    fn entries(&self) -> usize {
+        self.distances.len() / self.squares.len()
+    }
+}

@@ -1,0 +1,32 @@
+//! (D) The printed comparison (section III-D): how far each candidate's affine subspace is from each entry of the bag.
+//!
+//! A candidate is a feature vector v of D gray values in \[0, 1\]. With the P previous patches H it makes the D × (P + 1)
+//! matrix V = [v, H] (equation 2). V is never decomposed. With the eigenpairs (S², W) of its Gram matrix VᵀV, which has
+//! P + 1 rows, the candidate's basis is U = V W S⁻¹, so all that the distances need is made of inner products:
+//!
+//! | step | what it makes | equation | file |
+//! |---|---|---|---|
+//! | inner products | VᵀV, and Vᵀμₖ and VᵀFₖ for each entry {μₖ, Fₖ} of the bag | | `inner_products` |
+//! | the candidate's subspace | μ as its products, U as the coefficients W S⁻¹ | 1, 2 | `candidate` |
+//! | principal angles | θ from the singular values of UᵀFₖ, an n × n matrix | 6, 7 | `principal_angles` |
+//! | distances | α γ ‖μ - μₖ‖² + (1 - α) β ‖Θ‖² | 4, 5, 8 | `distance` |
+//! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights::likelihood` |
+//!
+//! **In:** N candidates and 1 to P previous patches, each of D values; K entries of up to n basis vectors each.
+//! **Out:** N × K distances and likelihoods in \[0, 1\], N weights that sum to 1, the index of the best candidate.
+//! Nothing has a unit: gray values are shares of white.
+//!
+//! What can go wrong:
+//! - *Precision.* The singular values of V count down to [`RANK_TOLERANCE`](crate::tracker::RANK_TOLERANCE) = 1e-5 of
+//!   the largest, which is 1e-10 in the eigenvalues of VᵀV. Single precision has seven digits, so everything here is in
+//!   double precision.
+//! - *Rank.* V may have fewer than n directions (a black patch has none). U has as many columns as V has directions.
+//!   Of two bases the smaller number of columns is the n of equation 8; without any column the origins alone decide.
+//! - *Sizes.* Matrices here have fixed sizes, so that a frame allocates nothing:
+//!   [`Evaluation`](evaluation::Evaluation) picks them by P and n, and what is beyond P + 1 and n is zero.
+
+mod candidate;
+mod distance;
+pub(crate) mod evaluation;
+mod inner_products;
+mod principal_angles;

@@ -1,0 +1,121 @@
+//! The hypotheses of a frame: particles are proposed, and weighed by all that is known of them.
+
+use rand_chacha::ChaCha8Rng;
+
+use crate::tracker::features::extractor::Extractor;
+use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::motion::search::SearchContext;
+use crate::tracker::motion::{orientation, resampling};
+use crate::tracker::observe::to_original;
+use crate::tracker::params::table::Search;
+use crate::tracker::state::State;
+use crate::tracker::workspace::Workspace;
+
+impl State {
+    /// (A) Draws the first round of particles, in the channels of `image` that it computes.
+    pub fn propose(
+        &self,
+        image: &GrayFrame,
+        search: &SearchContext<'_>,
+        radius: f64,
+        draws: &mut ChaCha8Rng,
+        workspace: &mut Workspace,
+    ) {
+        let (bounds, params) = (&self.bounds, &self.params);
+        workspace.candidates.begin(self, orientation::TRIED);
+        workspace.log_priors.clear();
+        let extractor = &mut workspace.extractor;
+        let particles = &mut workspace.candidates.particles;
+        match params.search {
+            Search::Resampled => {
+                let cloud = (&self.particles[..], &self.weights[..]);
+                let sums = &mut workspace.sums;
+                resampling::resample(cloud, params, bounds, draws, sums, particles);
+                extractor.compute_channels(image, particles, radius, bounds, params);
+            }
+            Search::Answer => {
+                extractor.compute_channels(image, &[self.answer], radius, bounds, params);
+                let dense_search = &mut workspace.dense_search;
+                dense_search.run(extractor, search, &self.discriminant);
+                let cell = Extractor::cell_size(&self.answer, bounds, params);
+                search.propose(dense_search.maxima(), cell, draws, particles);
+            }
+        }
+    }
+
+    /// Draws the second round of particles, if there is one, around the best of the first.
+    pub fn refine(
+        &self,
+        search: &SearchContext<'_>,
+        draws: &mut ChaCha8Rng,
+        workspace: &mut Workspace,
+    ) -> bool {
+        let (all, first) = search.counts();
+        let candidates = &mut workspace.candidates;
+        if all > first {
+            search.refine(&candidates.weights, draws, &mut candidates.particles);
+        }
+        all > first
+    }
+
+    /// Compares the surroundings with those of the frame in which the target was last seen.
+    pub fn test_for_change(
+        &self,
+        frame: &GrayFrame,
+        search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
+        radius: f64,
+        workspace: &mut Workspace,
+    ) {
+        if self.params.static_penalty > 0.0 {
+            let displaced = to_original(search.displaced(), rotation);
+            workspace.change_test.load(frame);
+            workspace
+                .change_test
+                .compare(&self.last_seen, &displaced, radius, &self.bounds);
+        }
+    }
+
+    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`. Returns
+    /// the most likely one of all.
+    pub fn weigh(
+        &self,
+        image: &GrayFrame,
+        search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
+        workspace: &mut Workspace,
+    ) -> usize {
+        workspace
+            .candidates
+            .describe_and_compare(image, &mut workspace.extractor, self);
+        self.push_log_priors(search, rotation, workspace);
+        workspace
+            .candidates
+            .weigh(&workspace.log_priors, &self.params)
+    }
+
+    /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come there.
+    fn push_log_priors(
+        &self,
+        search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
+        workspace: &mut Workspace,
+    ) {
+        let known = workspace.log_priors.len();
+        let new = &workspace.candidates.particles[known..];
+        let log_priors = new.iter().map(|particle| search.log_prior(particle));
+        workspace.log_priors.extend(log_priors);
+        if self.params.static_penalty > 0.0 {
+            workspace.original.clear();
+            let original = new.iter().map(|&particle| to_original(particle, rotation));
+            workspace.original.extend(original);
+            workspace.change_test.penalize(
+                &workspace.original,
+                &self.bounds,
+                self.params.static_penalty,
+                &mut workspace.log_priors[known..],
+            );
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What a caller may give: boxes and frames.
+
+use crate::tracker::error::TrackerError;
+use crate::tracker::image::frame::{GrayFrame, working_size};
+use crate::tracker::image::rect::Rect;
+
+/// The shortest side of a box, in pixels of the uploaded frame.
+pub const LEAST_BOX_SIDE: f64 = 4.0;
+
+/// From uploaded to working pixels, along x and along y.
+pub(crate) fn to_working(source: (u32, u32)) -> (f64, f64) {
+    let (width, height) = working_size(source.0, source.1);
+    (
+        f64::from(width) / f64::from(source.0),
+        f64::from(height) / f64::from(source.1),
+    )
+}
+
+/// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`LEAST_BOX_SIDE`] on each
+/// side and at least one pixel of the working image, at most four times as large as the frame, and on the frame with
+/// at least one pixel of its length and height.
+pub(crate) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), TrackerError> {
+    let refuse = |reason| Err(TrackerError::Target(reason));
+    let values = [target.x, target.y, target.width, target.height];
+    if !values.iter().all(|value| value.is_finite()) {
+        return refuse("is not finite");
+    }
+    if target.width < LEAST_BOX_SIDE || target.height < LEAST_BOX_SIDE {
+        return refuse("is too small: each side must be at least 4 pixels");
+    }
+    let (horizontal, vertical) = to_working(source);
+    if target.width * horizontal < 1.0 || target.height * vertical < 1.0 {
+        return refuse("is too small: each side must be at least 1/320 of the frame's longer side");
+    }
+    let limit = max_box_side(source);
+    if target.width > limit || target.height > limit {
+        return refuse("is too large: no side may be over four times the frame's longer side");
+    }
+    // Neither pixel nor box is narrower than this.
+    let touch = 1.0_f64;
+    let (width, height) = (f64::from(source.0), f64::from(source.1));
+    let across = (target.x + target.width).min(width) - target.x.max(0.0);
+    let down = (target.y + target.height).min(height) - target.y.max(0.0);
+    if across < touch || down < touch {
+        return refuse("is outside the frame: at least one pixel of it must be inside");
+    }
+    Ok(())
+}
+
+/// The longest side of a box, in pixels of uploaded frames of size `source`: four times the frame's longer side.
+pub(crate) fn max_box_side(source: (u32, u32)) -> f64 {
+    4.0 * f64::from(source.0.max(source.1)).max(LEAST_BOX_SIDE)
+}
+
+/// Checks that `frame` has the size of the session's frames.
+pub(crate) fn check_frame(source: (u32, u32), frame: &GrayFrame) -> Result<(), TrackerError> {
+    let (got_width, got_height) = frame.source_size();
+    if (got_width, got_height) == source {
+        return Ok(());
+    }
+    Err(TrackerError::FrameSize {
+        width: source.0,
+        height: source.1,
+        got_width,
+        got_height,
+    })
+}

@@ -1,0 +1,184 @@
+//! What a session starts with: the models of the first frame, and of a frame in which the user corrects the box.
+
+use std::collections::VecDeque;
+
+use rand_chacha::ChaCha8Rng;
+
+use crate::tracker::appearance::augmentation;
+use crate::tracker::appearance::background::{self, Background};
+use crate::tracker::appearance::bag::Bag;
+use crate::tracker::classifier::ridge::{self, Discriminant};
+use crate::tracker::confidence::score::DistanceBaseline;
+use crate::tracker::confidence::update_gate::UpdateGate;
+use crate::tracker::estimate::{Estimate, Status};
+use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame_views::FrameViews;
+use crate::tracker::image::rect::Rect;
+use crate::tracker::motion::change_test::LastSeen;
+use crate::tracker::motion::global_motion::GlobalMotion;
+use crate::tracker::motion::orientation;
+use crate::tracker::motion::particles::Particle;
+use crate::tracker::motion::random::{self, Draws};
+use crate::tracker::params::table::Params;
+use crate::tracker::scale::dsst::ScaleFilter;
+use crate::tracker::state::State;
+use crate::tracker::workspace::Workspace;
+
+/// The answer to a frame whose box came from the user.
+fn given(frame: u64, target: Rect) -> Estimate {
+    Estimate {
+        frame,
+        target,
+        score: 1.0,
+        status: Status::Tracking,
+    }
+}
+
+impl State {
+    /// The state after the first frame, in which `target` (checked) is the box.
+    pub fn new(frame: &GrayFrame, target: Rect, params: Params, workspace: &mut Workspace) -> Self {
+        let source = frame.source_size();
+        let (bounds, answer) = Self::place(source, &target);
+        let global_motion = params.global_motion.then(|| GlobalMotion::new(frame));
+        let mut state = Self {
+            params,
+            source,
+            bounds,
+            estimate: given(0, target),
+            answer,
+            particles: Vec::new(),
+            weights: Vec::new(),
+            history: VecDeque::new(),
+            bag: Bag::default(),
+            background: Background::default(),
+            discriminant: Discriminant::default(),
+            global_motion,
+            scale_filter: ScaleFilter::default(),
+            last_seen: LastSeen::default(),
+            update_gate: UpdateGate::default(),
+            baseline: DistanceBaseline::default(),
+            orientation: 0.0,
+            frames_lost: 0,
+        };
+        state.reset_particles(answer);
+        state.init_models(frame, 0, workspace);
+        let learning = &mut workspace.learning;
+        let (features, bag) = (&learning.features, &mut learning.bag);
+        state
+            .bag
+            .admit(features, &state.background, &state.params, bag);
+        state.push_history(features);
+        state
+    }
+
+    /// Takes `target` (checked) as the box in `frame`, the next one.
+    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect, workspace: &mut Workspace) {
+        let number = self.estimate.frame + 1;
+        let (bounds, answer) = Self::place(self.source, &target);
+        self.bounds = bounds;
+        self.orientation = 0.0;
+        self.frames_lost = 0;
+        self.reset_particles(answer);
+        if let Some(profiles) = &mut self.global_motion {
+            *profiles = GlobalMotion::new(frame);
+        }
+        self.init_models(frame, number, workspace);
+        let learning = &mut workspace.learning;
+        let (features, bag) = (&learning.features, &mut learning.bag);
+        self.bag.rebuild(&self.background, &self.params, bag);
+        self.history.clear();
+        self.update_gate = UpdateGate::default();
+        self.bag
+            .admit_pinned(features, &self.background, &self.params, bag);
+        self.push_history(features);
+        self.estimate = given(number, target);
+    }
+
+    /// All particles at `particle`, with equal weights.
+    fn reset_particles(&mut self, particle: Particle) {
+        let count = self.params.stored_particles();
+        self.answer = particle;
+        self.particles = vec![particle; count];
+        self.weights = vec![1.0 / count.max(1) as f64; count];
+    }
+
+    /// Learns everything that a box given by the user says about the surroundings, and describes the box and its
+    /// augmented views.
+    fn init_models(&mut self, frame: &GrayFrame, number: u64, workspace: &mut Workspace) {
+        workspace.change_test.load(frame);
+        self.record_seen(workspace);
+        let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
+        if orientation::is_on(&self.params) {
+            let pixels = self.bounds.frame_width * self.bounds.frame_height;
+            workspace.views.reserve_rectified(pixels as usize);
+        }
+        let views = FrameViews::new(frame, self.downsample_factor(), &mut workspace.views);
+        let (image, answer) = (views.original(), self.answer);
+        workspace.extractor.compute_channels(
+            image,
+            &[answer],
+            everywhere,
+            &self.bounds,
+            &self.params,
+        );
+        let mut draws = random::generator(self.params.seed, number, Draws::Samples);
+        let samples = self.params.metric_samples();
+        if samples > 0 {
+            let areas = &mut workspace.learning.areas;
+            background::areas(&answer, &self.bounds, samples, &mut draws, areas);
+            self.learn_background(image, workspace);
+        }
+        if self.params.discriminant_weight > 0.0 {
+            self.init_discriminant(image, &mut draws, workspace);
+        }
+        self.scale_filter.forget();
+        self.learn_scale(image, &answer, workspace);
+        self.describe_at(image, &answer, workspace);
+        self.describe_augmented(image, workspace);
+        views.give_back(&mut workspace.views);
+    }
+
+    /// Appends the feature vectors of the augmented views of the answer. The extractor has the channels of the last of
+    /// them then.
+    fn describe_augmented(&self, image: &GrayFrame, workspace: &mut Workspace) {
+        let (answer, params) = ([self.answer], &self.params);
+        let (extractor, learning) = (&mut workspace.extractor, &mut workspace.learning);
+        for angle in augmentation::angles(params) {
+            let rotated = augmentation::rotated(image, &self.answer, angle);
+            extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
+            let view = &mut learning.view;
+            extractor.features(&rotated, &answer, &self.bounds, params, view);
+            learning.features.extend_from_slice(view);
+        }
+    }
+
+    /// Fits the discriminant to the target and to areas around it.
+    fn init_discriminant(
+        &mut self,
+        image: &GrayFrame,
+        draws: &mut ChaCha8Rng,
+        workspace: &mut Workspace,
+    ) {
+        if !self.discriminant.is_on() {
+            let mut origin = self.background.mean().to_vec();
+            origin.resize(self.params.feature_len(), 0.0);
+            self.discriminant = Discriminant::new(origin);
+        }
+        let learning = &mut workspace.learning;
+        let (areas, features, fit) = (
+            &mut learning.areas,
+            &mut learning.features,
+            &mut learning.fit,
+        );
+        ridge::first_areas(&self.answer, &self.bounds, draws, areas);
+        workspace
+            .extractor
+            .features(image, areas, &self.bounds, &self.params, features);
+        let samples = &mut workspace.candidates.samples;
+        let (weights, origin) = (self.discriminant.weights(), self.discriminant.origin());
+        samples.begin(weights, origin, &[], areas.len());
+        samples.score_vectors(features);
+        ridge::label_all(areas, &self.answer, &self.bounds, &mut fit.labels);
+        self.discriminant.begin(samples, features, fit);
+    }
+}
