@@ -3,6 +3,7 @@
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
 //! - `growth [--plot FILE]`: the time of a step against N, D, K, P and more, and of what comes before it against the
 //!   frame's size, each with the order that is expected; as a figure, too;
+//! - `kernels`: the tracker's own kernels of linear algebra against nalgebra's;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers;
 //! - `repeat step PRESET COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
@@ -14,6 +15,7 @@ mod fit;
 mod growth;
 mod growth_plot;
 mod growth_row;
+mod kernels;
 mod memory;
 mod ratios;
 #[path = "../scene/mod.rs"]
@@ -49,6 +51,7 @@ fn main() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
         ["ratios"] => ratios::print(),
+        ["kernels"] => kernels::print(),
         ["growth"] => growth::print(None),
         ["growth", "--plot", file] => growth::print(Some(file)),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
@@ -61,7 +64,7 @@ fn main() {
         [] => ratios::print(),
         _ => {
             eprintln!(
-                "tables: ratios | growth [--plot FILE] | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
+                "tables: ratios | growth [--plot FILE] | kernels | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
             );
             std::process::exit(2);
         }

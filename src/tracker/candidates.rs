@@ -12,7 +12,6 @@ use crate::tracker::features::centering::Centering;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::grassmann::evaluation::Evaluation;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
@@ -29,8 +28,7 @@ pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
     /// The feature vectors; with single-vector candidates the background's mean is subtracted.
     vectors: Vec<f32>,
-    /// Where the first of them begins, and how long each is.
-    first: usize,
+    /// D.
     len: usize,
     /// Their squared lengths.
     squares: Vec<f32>,
@@ -52,7 +50,8 @@ impl Candidates {
         let params = &state.params;
         let (count, entries) = (search::max_count(params) + more, params.bag_size as usize);
         self.len = params.feature_len();
-        self.first = gemm::reserve_aligned(&mut self.vectors, count * self.len);
+        let values = self.vectors.len().max(count * self.len);
+        self.vectors.resize(values, 0.0);
         clear_and_reserve(&mut self.particles, count);
         clear_and_reserve(&mut self.squares, count);
         clear_and_reserve(&mut self.distances, count * entries);
@@ -90,7 +89,7 @@ impl Candidates {
 
     /// The feature vectors of the particles that were described.
     pub fn vectors(&self) -> &[f32] {
-        &self.vectors[self.first..][..self.squares.len() * self.len]
+        &self.vectors[..self.squares.len() * self.len]
     }
 
     /// Describes the new particles in the channels that `extractor` computed of `image`, and compares them with the
@@ -166,7 +165,7 @@ impl Candidates {
 
     /// Where the vectors of so many particles are.
     fn values_of(&self, particles: &Range<usize>) -> Range<usize> {
-        self.first + particles.start * self.len..self.first + particles.end * self.len
+        particles.start * self.len..particles.end * self.len
     }
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as

@@ -158,9 +158,9 @@ impl State {
         };
         let center = Particle { scale, ..found };
         self.describe_pyramid(image, &center, workspace);
-        let measured = self.scale_filter.find(&mut workspace.learning.pyramid);
+        let maximum = self.scale_filter.find(&mut workspace.learning.pyramid);
         self.bounds.clamp(Particle {
-            scale: scale * measured.believed().exp(),
+            scale: scale * maximum.gated_change().exp(),
             ..found
         })
     }

@@ -5,15 +5,11 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::linalg::gemm;
 
 /// The rows, each of length D, and what is known of them beside.
 #[derive(Debug, Default)]
 pub(crate) struct BagMatrix {
     values: Vec<f32>,
-    /// Where the first row begins, and how many values the rows have.
-    first: usize,
-    len: usize,
     /// The templates of an entry.
     templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
@@ -74,10 +70,9 @@ impl BagMatrix {
         let entries = bag.entries();
         self.entries
             .extend(entries.iter().map(|entry| entry.span().0.size()));
-        self.len = (self.samples + self.subspace_rows() + queries.len()) * len;
-        self.first = gemm::reserve_aligned(&mut self.values, self.len);
-        let values = &mut self.values[self.first..][..self.len];
-        let (samples, mut rest) = values.split_at_mut(self.samples * len);
+        let count = self.samples + self.subspace_rows() + queries.len();
+        self.values.resize(count * len, 0.0);
+        let (samples, mut rest) = self.values.split_at_mut(self.samples * len);
         background.write_samples(samples);
         self.background_coordinates.clear();
         for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
@@ -96,7 +91,7 @@ impl BagMatrix {
     /// The rows, one after the other.
     #[inline(always)]
     pub fn rows(&self) -> &[f32] {
-        &self.values[self.first..][..self.len]
+        &self.values
     }
 
     /// The number of means and basis vectors.

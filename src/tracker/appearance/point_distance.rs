@@ -14,7 +14,7 @@ use crate::tracker::appearance::bag::Bag;
 use crate::tracker::appearance::bag_matrix::BagMatrix;
 use crate::tracker::appearance::span::MIN_REMAINDER;
 use crate::tracker::linalg::acos::{LANES, squared_angles};
-use crate::tracker::linalg::{gemm, vector_ops};
+use crate::tracker::linalg::{combinations, gemm};
 use crate::tracker::params::table::Params;
 
 /// Candidates are worked on in groups of this many.
@@ -106,10 +106,10 @@ impl PointDistance {
         let coordinates = &mut self.candidate_coordinates;
         coordinates.resize(samples * stride, 0.0);
         let inverse = &self.matrix.inverse;
-        vector_ops::become_triangular(simd, coordinates, inverse, of_samples, stride);
+        combinations::assign_triangular(simd, coordinates, inverse, of_samples, stride);
         let of_entries = &mut rest[..self.matrix.subspace_rows() * stride];
         let entries = &self.matrix.background_coordinates;
-        vector_ops::combine(simd, of_entries, -1.0, entries, coordinates, stride);
+        combinations::combine(simd, of_entries, -1.0, entries, coordinates, stride);
     }
 
     /// Lengths under the metric, and the factors that bring them to 1.
@@ -186,6 +186,7 @@ mod tests {
     use super::*;
     use crate::tracker::appearance::background;
     use crate::tracker::appearance::bag;
+    use crate::tracker::linalg::vector_ops;
     use crate::tracker::params::presets::Preset;
     use crate::tracker::params::table::Features;
     use nalgebra::{DMatrix, DVector};

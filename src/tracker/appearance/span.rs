@@ -10,6 +10,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::subspace;
 use crate::tracker::features::quantized::QuantizedVector;
+use crate::tracker::linalg::combinations;
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::jacobi::Spectrum;
 use crate::tracker::linalg::vector_ops;
@@ -223,6 +224,6 @@ impl Span {
         for (look, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
             look.write(background.mean(), vector);
         }
-        vector_ops::become_combinations(simd, out, &self.coefficients, scratch, len);
+        combinations::assign_combinations(simd, out, &self.coefficients, scratch, len);
     }
 }

@@ -15,9 +15,9 @@ pub(crate) struct Centering<'a> {
 impl Centering<'_> {
     /// Centers one vector.
     #[inline(always)]
-    pub fn apply<S: Simd>(&mut self, simd: S, vector: &mut [f32]) {
+    pub fn apply<S: Simd>(&mut self, _: S, vector: &mut [f32]) {
         vector_ops::add(vector, -1.0, self.mean);
-        self.squares.push(vector_ops::product(simd, vector, vector));
+        self.squares.push(vector_ops::dot(vector, vector));
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
-use crate::tracker::linalg::gemm;
+use crate::tracker::linalg::{gemm, scratch};
 use crate::tracker::params::table::Params;
 
 /// Values in a cache line. Vectors begin at one, and lie an extra one apart: 1024 values (8 KB) after another vector, a
@@ -59,8 +59,7 @@ impl InnerProducts {
         if bag.len() != self.entries {
             self.entries = bag.len();
             let values = (self.columns() + BATCH) * self.stride;
-            self.first = gemm::align(&mut self.vectors, values);
-            self.vectors.resize(self.first + values, 0.0);
+            self.first = scratch::aligned_zeros(&mut self.vectors, values);
             let rows = self.patches + self.candidates;
             self.products.resize(rows * self.columns(), 0.0);
         }

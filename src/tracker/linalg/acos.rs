@@ -1,15 +1,17 @@
-//! (D) Principal angles from their cosines, several at a time, in double precision.
+//! Principal angles from their cosines, several at a time.
 //!
-//! What equation 8 needs is θ² where cos²θ is known. By way of `acos` that would be one call for each of some
-//! thousand angles a frame; as a polynomial it is a few vector instructions. Near θ = 0, where most angles are, `acos` of a
-//! square root would lose half of the digits as well.
+//! Equation 8 needs θ², and cos²θ is known. `acos` of its root loses half of the digits near θ = 0, where most angles are,
+//! and is a call for each of some thousand angles a frame; this polynomial compiles to vector instructions.
+//!
+//! Own code: no crate vectorises it for the machine it runs on, and `acos` takes 4.5 times as long
+//! (`cargo bench --bench tables -- kernels`, AVX-512).
 
 use std::f64::consts::FRAC_PI_2;
 
-/// How many angles are computed together.
+/// The number of angles that are computed together.
 pub(crate) const LANES: usize = 8;
 
-/// A number for each of them.
+/// One number for each of them.
 pub(crate) type Lanes = [f64; LANES];
 
 /// arcsin²(√y) / y on [0, 1/2], lowest power first: the Chebyshev fit of degree 16, off by less than 3e-15 (mpmath's
@@ -34,19 +36,20 @@ const ARCSIN_SQUARED: [f64; 17] = [
     1.7084255909903134,
 ];
 
-/// θ² in [0, π²/4] of cos²θ; what rounding has put outside [0, 1] counts as its nearer end.
+/// θ² in [0, π²/4] from cos²θ, which is clamped to [0, 1] against rounding.
 #[inline(always)]
 pub(crate) fn squared_angles(squared_cosines: &Lanes) -> Lanes {
     let mut angles = [0.0; LANES];
     for lane in 0..LANES {
+        // The squares of all three.
         let cosine = squared_cosines[lane].clamp(0.0, 1.0);
         let sine = 1.0 - cosine;
-        let lesser = if cosine < sine { cosine } else { sine };
+        let smaller = if cosine < sine { cosine } else { sine };
         let mut ratio = 0.0;
         for coefficient in ARCSIN_SQUARED.iter().rev() {
-            ratio = ratio * lesser + coefficient;
+            ratio = ratio * smaller + coefficient;
         }
-        let squared = ratio * lesser;
+        let squared = ratio * smaller;
         // arccos x is arcsin √(1 - x²), and π/2 - arcsin x.
         let complement = FRAC_PI_2 - squared.sqrt();
         angles[lane] = if cosine < sine {

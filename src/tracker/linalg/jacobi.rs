@@ -1,22 +1,25 @@
-//! Eigenvalues and eigenvectors of a tiny symmetric matrix, by Jacobi rotations: what loses fewest digits on positive
-//! semidefinite matrices, and cannot fail to converge.
+//! Eigenvalues and eigenvectors of a small symmetric matrix, by cyclic Jacobi rotations: the method with the smallest
+//! relative errors on positive semidefinite matrices, and one that always ends.
+//!
+//! Own code: nalgebra's decomposition of a matrix of any size allocates on each call, which a step must not. It takes 1.6
+//! times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a microsecond.
 
 use nalgebra::{SMatrix, SVector};
 
-/// Cyclic Jacobi needs four to six sweeps at these sizes; the bound only guards against a NaN.
+/// Cyclic Jacobi needs four to six sweeps at these sizes; the bound ends it on NaN.
 const MAX_SWEEPS: usize = 16;
 
 /// An off-diagonal element below this share of the trace is rounding.
 const NEGLIGIBLE: f64 = 1e-16;
 
-/// Where eigenvalues alone are asked for, so is one whose square is below this share of the product of the two diagonal
-/// elements. That moves the two by 1e-6 of themselves at most, and only where they are nearly the same; never their
-/// sum.
+/// Without eigenvectors, an off-diagonal element is also rounding if its square is below this share of the product of
+/// the two diagonal elements. That moves the two by 1e-6 of themselves at most, and only where they are nearly equal;
+/// never their sum.
 const NEGLIGIBLE_SQUARED: f64 = 1e-12;
 
-/// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle
-/// counts. Its diagonal ends as the eigenvalues, in no order, and `vectors` with the eigenvector of the `j`-th diagonal
-/// element in its `j`-th row. Without room for `vectors` there are none, and the eigenvalues have six digits.
+/// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle is
+/// read. Leaves the eigenvalues on its diagonal, in no order, and in row `j` of `vectors` the eigenvector of the `j`-th
+/// of them. An empty `vectors` asks for the eigenvalues alone, to six digits.
 #[inline(always)]
 fn diagonalize(matrix: &mut [f64], vectors: &mut [f64], dim: usize) {
     let mut floor = 0.0;
@@ -51,7 +54,7 @@ fn diagonalize(matrix: &mut [f64], vectors: &mut [f64], dim: usize) {
     }
 }
 
-/// Zeroes element (p, q), p < q.
+/// Zeroes element (p, q), p < q, by a rotation.
 #[inline(always)]
 fn rotate(matrix: &mut [f64], vectors: &mut [f64], dim: usize, p: usize, q: usize) {
     let (pp, qq, pq) = (p * dim + p, q * dim + q, p * dim + q);
@@ -69,15 +72,15 @@ fn rotate(matrix: &mut [f64], vectors: &mut [f64], dim: usize, p: usize, q: usiz
     for r in (0..dim).filter(|&r| r != p && r != q) {
         let rp = r.min(p) * dim + r.max(p);
         let rq = r.min(q) * dim + r.max(q);
-        turn(matrix, rp, rq, cosine, sine);
+        rotate_pair(matrix, rp, rq, cosine, sine);
     }
     for r in 0..dim.min(vectors.len()) {
-        turn(vectors, p * dim + r, q * dim + r, cosine, sine);
+        rotate_pair(vectors, p * dim + r, q * dim + r, cosine, sine);
     }
 }
 
 #[inline(always)]
-fn turn(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
+fn rotate_pair(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
     let (at_p, at_q) = (values[p], values[q]);
     values[p] = cosine * at_p - sine * at_q;
     values[q] = sine * at_p + cosine * at_q;
@@ -111,18 +114,18 @@ pub(crate) fn eigenvalues<const N: usize>(mut matrix: SMatrix<f64, N, N>) -> [f6
     values
 }
 
-/// The eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix; keeps its room.
+/// The eigenvalues, largest first, and eigenvectors of one symmetric positive semidefinite matrix. Keeps its buffers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectrum {
     dim: usize,
     matrix: Vec<f64>,
     vectors: Vec<f64>,
-    /// From the place among the eigenvalues to that on the diagonal.
+    /// For each eigenvalue, largest first, its index on the diagonal.
     order: Vec<usize>,
 }
 
 impl Spectrum {
-    /// Solves the matrix of `dim` rows whose element (i, j), j >= i, is `element(i, j)`.
+    /// Decomposes the matrix of `dim` rows whose element (i, j), j >= i, is `element(i, j)`.
     #[inline(always)]
     pub fn solve(&mut self, dim: usize, element: impl Fn(usize, usize) -> f64) {
         self.dim = dim;
@@ -147,9 +150,9 @@ impl Spectrum {
         self.order.iter().map(|&j| self.matrix[j * self.dim + j])
     }
 
-    /// Component `index` of the eigenvector of the eigenvalue at `place`.
-    pub fn weight(&self, place: usize, index: usize) -> f64 {
-        self.vectors[self.order[place] * self.dim + index]
+    /// Component `index` of the eigenvector of the `rank`-th largest eigenvalue.
+    pub fn weight(&self, rank: usize, index: usize) -> f64 {
+        self.vectors[self.order[rank] * self.dim + index]
     }
 }
 
@@ -164,7 +167,7 @@ mod tests {
         spectrum.solve(dim, |i, j| matrix[i * dim + j]);
         let values = spectrum.values().enumerate();
         values
-            .map(|(place, value)| (value, (0..dim).map(|i| spectrum.weight(place, i)).collect()))
+            .map(|(rank, value)| (value, (0..dim).map(|i| spectrum.weight(rank, i)).collect()))
             .collect()
     }
 
@@ -218,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_becomes_nan() {
+    fn equal_elements_give_finite_numbers() {
         for value in [0.0, 1.0, 1e-300, 1e8] {
             for (eigenvalue, vector) in eigenpairs(&[value; 9], 3) {
                 assert!(eigenvalue.is_finite() && vector.iter().all(|v| v.is_finite()));

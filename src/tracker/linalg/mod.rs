@@ -1,9 +1,28 @@
-//! TODO-doc
+//! The few kernels of linear algebra that run in every frame.
+//!
+//! | file | computes |
+//! |---|---|
+//! | `gemm` | all inner products of two sets of vectors, f32 or f64 |
+//! | `combinations` | linear combinations of f32 vectors |
+//! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
+//! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
+//! | `scratch` | nothing: the buffers of the others |
+//! | `exp`, `acos` | e^x and arccos² of many numbers at once, f64 |
+//!
+//! In and out: plain slices. A set of n vectors of length D is one slice of n D values, one vector after the other; a
+//! matrix is a slice in row order. Nothing has a unit, and nothing is allocated but by buffers that grow.
+//!
+//! What takes `simd: S` is compiled for the vector instructions of its caller; its namesake without is the entry
+//! that detects those of this machine once. Rounding depends on the width of the vector registers, so results are
+//! the same bit for bit on machines of one kind only.
+//!
+//! What can go wrong: slices whose lengths do not fit panic. Infinities and NaN pass through as IEEE 754 says; `jacobi`
+//! ends on them after a fixed number of sweeps.
 
 pub(crate) mod acos;
+pub(crate) mod combinations;
 pub(crate) mod exp;
 pub(crate) mod gemm;
 pub(crate) mod jacobi;
-pub(crate) mod reduce;
 pub(crate) mod scratch;
 pub(crate) mod vector_ops;

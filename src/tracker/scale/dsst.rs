@@ -1,134 +1,72 @@
-//! How large the target is, once its place is known.
+//! The scale filter of Danelljan, Häger, Khan and Felsberg, *Accurate Scale Estimation for Robust Visual Tracking*, 2014.
 //!
-//! Particles tell the scale poorly: areas a few hundredths larger or smaller look nearly alike, and the rim shows what is
-//! behind the target, which grows as the camera nears it whatever the target does. So a *pyramid* is looked at, areas of
-//! the box alone around the place found, each a step larger than the one before, and a correlation filter along the
-//! scale says how far along it the target is (Danelljan, Häger, Khan and Felsberg, *Accurate Scale Estimation for
-//! Robust Visual Tracking*, 2014):
+//! Particles estimate the scale poorly: areas a few percent larger or smaller look nearly alike, and their rim shows the
+//! background, which grows as the camera approaches whatever the target does. A correlation filter along the scale, over
+//! a pyramid of areas of the box alone, is more exact:
 //!
 //! y = F⁻¹(Σ conj(Aᵢ) Zᵢ / (B + λ)),  Aᵢ ← (1 - η) Aᵢ + η conj(G) Fᵢ,  B ← (1 - η) B + η Σ |Fᵢ|²
 //!
-//! with the transforms along the scale Zᵢ and Fᵢ of feature i of the pyramid that is looked at and of the one that is
-//! learned, and G that of the response that is wanted, a bell at the middle.
+//! with the Fourier transforms along the scale Zᵢ and Fᵢ of feature i of the pyramid that is searched and of the one that
+//! is learned, and G that of the desired response, a Gaussian at the middle.
 //!
-//! The height of the response y tells how sure that is: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
-//! covered, turned or missed. There the scale stays, or it would wander off within a few frames.
+//! The maximum of the response y measures the certainty: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
+//! covered, turned or missed. There the scale stays, or it would drift within a few frames.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
-use crate::tracker::scale::pyramid::{self, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch, WAVES};
+use crate::tracker::scale::pyramid::{self, FOURIER, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch};
 
-/// λ, against energies of about 1: it only keeps flat pyramids from dividing by nothing.
-const DAMPING: f32 = 0.01;
-/// The greatest change of the logarithm of the scale in a frame: what is seen further off is mostly a neighbour.
+/// λ, against energies of about 1: it only keeps flat pyramids from a division by zero.
+const LAMBDA: f32 = 0.01;
+/// The largest change of the logarithm of the scale in a frame: a maximum further off is mostly a neighbouring object.
 const MAX_CHANGE: f64 = 0.06;
-/// The share of a change that is taken, so that noise evens out.
+/// The share of a change that is applied, so that noise averages out.
 const GAIN: f64 = 0.75;
-/// Responses that say nothing, and that are believed whole.
-const DOUBTFUL: f64 = 0.3;
-const CERTAIN: f64 = 0.6;
+/// Maxima of the response of which none of the change is applied, and from which on all of it.
+const MIN_RESPONSE: f64 = 0.3;
+const FULL_RESPONSE: f64 = 0.6;
 
-/// The filter's state; without numbers it is off, or has not learned yet.
+/// The filter's state: empty while it is off or has not learned yet.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct ScaleFilter {
-    /// A: for each frequency the real parts for all features, then the imaginary parts.
+    /// A: for each frequency the real parts of all features, then the imaginary parts.
     numerators: Vec<f32>,
     /// B, for each frequency.
     energies: Vec<f32>,
 }
 
-/// What a pyramid says.
+/// The maximum of the filter's response.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Found {
-    /// The logarithm of the scale against that of the pyramid's middle.
+pub(crate) struct Maximum {
+    /// The logarithm of the scale there against that of the pyramid's middle.
     pub change: f64,
-    /// The height of the response there.
+    /// y there.
     pub response: f64,
 }
 
-/// [`ScaleFilter::learn`], to be compiled for the instructions that this machine has.
-struct Learn<'a> {
-    filter: &'a mut ScaleFilter,
-    scratch: &'a mut Scratch,
-    rate: f64,
-}
-
-impl WithSimd for Learn<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        self.filter.learn_all(simd, self.scratch, self.rate);
-    }
-}
-
-/// [`ScaleFilter::respond`], to be compiled for the instructions that this machine has.
-struct Respond<'a> {
-    filter: &'a ScaleFilter,
-    scratch: &'a mut Scratch,
-}
-
-impl WithSimd for Respond<'_> {
-    type Output = [f64; LEVELS];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> [f64; LEVELS] {
-        self.filter.respond_all(simd, self.scratch)
-    }
-}
-
 impl ScaleFilter {
-    /// Whether there is something to find by.
+    /// Whether the filter can measure a scale.
     pub fn has_learned(&self) -> bool {
         !self.energies.is_empty()
     }
 
-    /// Forgets everything: the next pyramid is learned whole.
+    /// Forgets everything: the next pyramid is learned with η = 1.
     pub fn forget(&mut self) {
         self.numerators.clear();
         self.energies.clear();
     }
 
-    /// Learns the pyramid in `scratch`, whose middle is the target; `rate` is the share η of it.
+    /// Learns the pyramid in `scratch`, whose middle is the target, with the learning rate η.
     pub fn learn(&mut self, scratch: &mut Scratch, rate: f64) {
-        Arch::new().dispatch(Learn {
-            filter: self,
-            scratch,
-            rate,
-        });
+        learn(self, scratch, rate);
     }
 
-    #[inline(always)]
-    fn learn_all<S: Simd>(&mut self, simd: S, scratch: &mut Scratch, rate: f64) {
-        let len = scratch.transform(simd);
-        let rate = if self.has_learned() { rate as f32 } else { 1.0 };
-        self.numerators.resize(FREQUENCIES * 2 * len, 0.0);
-        self.energies.resize(FREQUENCIES, 0.0);
-        let numerators = self.numerators.chunks_exact_mut(2 * len);
-        let spectrum = scratch.spectrum.chunks_exact(2 * len);
-        for (frequency, ((numerator, energy), parts)) in
-            numerators.zip(&mut self.energies).zip(spectrum).enumerate()
-        {
-            let (real, imaginary) = parts.split_at(len);
-            let total = vector_ops::product(simd, parts, parts);
-            *energy += rate * (total - *energy);
-            let (wanted_real, wanted_imaginary) = WAVES.wanted[frequency];
-            let (cos, sin) = (wanted_real as f32 * rate, wanted_imaginary as f32 * rate);
-            numerator.iter_mut().for_each(|value| *value *= 1.0 - rate);
-            let (to_real, to_imaginary) = numerator.split_at_mut(len);
-            vector_ops::add(to_real, cos, real);
-            vector_ops::add(to_real, sin, imaginary);
-            vector_ops::add(to_imaginary, cos, imaginary);
-            vector_ops::add(to_imaginary, -sin, real);
-        }
-    }
-
-    /// Where along the pyramid in `scratch` the target is.
-    pub fn find(&self, scratch: &mut Scratch) -> Found {
-        let response = self.respond(scratch);
+    /// Measures the scale of the target in the pyramid in `scratch`.
+    pub fn find(&self, scratch: &mut Scratch) -> Maximum {
+        let response = respond(self, scratch);
         let mut best = 0;
         for (level, height) in response.iter().enumerate() {
             if *height > response[best] {
@@ -137,96 +75,118 @@ impl ScaleFilter {
         }
         let mut at = best as f64 - MIDDLE as f64;
         if (1..LEVELS - 1).contains(&best) {
-            // The top of the parabola through three levels.
+            // The vertex of the parabola through three levels.
             let (left, right) = (response[best - 1], response[best + 1]);
-            let bend = left - 2.0 * response[best] + right;
-            if bend < 0.0 {
-                at += (0.5 * (left - right) / bend).clamp(-0.5, 0.5);
+            let curvature = left - 2.0 * response[best] + right;
+            if curvature < 0.0 {
+                at += (0.5 * (left - right) / curvature).clamp(-0.5, 0.5);
             }
         }
-        Found {
+        Maximum {
             change: STEP * at,
             response: response[best],
         }
     }
 
-    fn respond(&self, scratch: &mut Scratch) -> [f64; LEVELS] {
-        Arch::new().dispatch(Respond {
-            filter: self,
-            scratch,
-        })
-    }
-
-    #[inline(always)]
-    fn respond_all<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [f64; LEVELS] {
-        let len = scratch.transform(simd);
-        let mut spectrum = [(0.0, 0.0); FREQUENCIES];
-        let numerators = self.numerators.chunks_exact(2 * len);
-        let seen = scratch.spectrum.chunks_exact(2 * len);
-        for (((product, numerator), seen), energy) in spectrum
-            .iter_mut()
-            .zip(numerators)
-            .zip(seen)
-            .zip(&self.energies)
-        {
-            let (real, imaginary) = numerator.split_at(len);
-            let (seen_real, seen_imaginary) = seen.split_at(len);
-            let energy = f64::from(energy + DAMPING);
-            *product = (
-                f64::from(vector_ops::product(simd, numerator, seen)) / energy,
-                f64::from(
-                    vector_ops::product(simd, real, seen_imaginary)
-                        - vector_ops::product(simd, imaginary, seen_real),
-                ) / energy,
-            );
-        }
-        std::array::from_fn(|level| {
-            let term = |(frequency, (real, imaginary)): (usize, &(f64, f64))| {
-                let (cos, sin) = WAVES.turns[frequency][level];
-                // All frequencies but 0 stand for their mirror image, too.
-                let twice = if frequency == 0 { 1.0 } else { 2.0 };
-                twice * (real * cos + imaginary * sin)
-            };
-            spectrum.iter().enumerate().map(term).sum::<f64>() / LEVELS as f64
-        })
-    }
-
-    /// Whether this may be the filter of a tracker with `params`.
-    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
-        let (numbers, energies) = if params.scale_learning_rate > 0.0 {
-            let len = pyramid::params(params).feature_len();
-            (FREQUENCIES * 2 * len, FREQUENCIES)
+    /// Whether this may be the filter of a tracker with `params`, all numbers at most `max` in size.
+    pub fn is_valid_for(&self, params: &Params, max: f32) -> bool {
+        let frequencies = if params.scale_learning_rate > 0.0 {
+            FREQUENCIES
         } else {
-            (0, 0)
+            0
         };
-        self.numerators.len() == numbers
-            && self.energies.len() == energies
-            && self.numerators.iter().all(|value| value.abs() <= greatest)
-            && self
-                .energies
-                .iter()
-                .all(|energy| (0.0..=greatest).contains(energy))
+        let len = pyramid::params(params).feature_len();
+        self.numerators.len() == frequencies * 2 * len
+            && self.energies.len() == frequencies
+            && self.numerators.iter().all(|value| value.abs() <= max)
+            && self.energies.iter().all(|b| (0.0..=max).contains(b))
     }
 }
 
-impl Found {
-    /// The logarithm of how much larger the target is than the pyramid's middle, as far as that is certain.
-    pub fn believed(&self) -> f64 {
-        let certainty = (self.response - DOUBTFUL) / (CERTAIN - DOUBTFUL);
+impl Maximum {
+    /// The change of the logarithm of the scale to apply: bounded, damped, and none where the response is low.
+    pub fn gated_change(&self) -> f64 {
+        let certainty = (self.response - MIN_RESPONSE) / (FULL_RESPONSE - MIN_RESPONSE);
         let change = self.change.clamp(-MAX_CHANGE, MAX_CHANGE);
         GAIN * certainty.clamp(0.0, 1.0) * change
     }
 }
 
+/// The updates of A and B.
+#[pulp::with_simd(learn = Arch::new())]
+#[inline(always)]
+fn learn_simd<S: Simd>(simd: S, filter: &mut ScaleFilter, scratch: &mut Scratch, rate: f64) {
+    let len = scratch.transform(simd);
+    let rate = if filter.has_learned() {
+        rate as f32
+    } else {
+        1.0
+    };
+    filter.numerators.resize(FREQUENCIES * 2 * len, 0.0);
+    filter.energies.resize(FREQUENCIES, 0.0);
+    let numerators = filter.numerators.chunks_exact_mut(2 * len);
+    let spectrum = scratch.spectrum.chunks_exact(2 * len);
+    for (((a, b), f), g) in numerators
+        .zip(&mut filter.energies)
+        .zip(spectrum)
+        .zip(&FOURIER.desired)
+    {
+        *b += rate * (vector_ops::dot(f, f) - *b);
+        a.iter_mut().for_each(|value| *value *= 1.0 - rate);
+        let (g_real, g_imaginary) = (g.0 as f32 * rate, g.1 as f32 * rate);
+        let (f_real, f_imaginary) = f.split_at(len);
+        let (a_real, a_imaginary) = a.split_at_mut(len);
+        vector_ops::add(a_real, g_real, f_real);
+        vector_ops::add(a_real, g_imaginary, f_imaginary);
+        vector_ops::add(a_imaginary, g_real, f_imaginary);
+        vector_ops::add(a_imaginary, -g_imaginary, f_real);
+    }
+}
+
+/// The response y at each level.
+#[pulp::with_simd(respond = Arch::new())]
+#[inline(always)]
+fn respond_simd<S: Simd>(simd: S, filter: &ScaleFilter, scratch: &mut Scratch) -> [f64; LEVELS] {
+    let len = scratch.transform(simd);
+    let numerators = filter.numerators.chunks_exact(2 * len);
+    let spectrum = scratch.spectrum.chunks_exact(2 * len);
+    let mut quotients = [(0.0, 0.0); FREQUENCIES];
+    for (((quotient, a), z), b) in quotients
+        .iter_mut()
+        .zip(numerators)
+        .zip(spectrum)
+        .zip(&filter.energies)
+    {
+        let (a_real, a_imaginary) = a.split_at(len);
+        let (z_real, z_imaginary) = z.split_at(len);
+        let real = vector_ops::dot(a, z);
+        let imaginary = vector_ops::dot(a_real, z_imaginary) - vector_ops::dot(a_imaginary, z_real);
+        let denominator = f64::from(b + LAMBDA);
+        *quotient = (
+            f64::from(real) / denominator,
+            f64::from(imaginary) / denominator,
+        );
+    }
+    std::array::from_fn(|level| {
+        let term = |(frequency, (real, imaginary)): (usize, &(f64, f64))| {
+            let (cos, minus_sin) = FOURIER.twiddles[frequency][level];
+            // Each frequency but 0 stands for its negative too, whose term is the conjugate.
+            let count = if frequency == 0 { 1.0 } else { 2.0 };
+            count * (real * cos + imaginary * minus_sin)
+        };
+        quotients.iter().enumerate().map(term).sum::<f64>() / LEVELS as f64
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::scale::pyramid::BELL;
+    use crate::tracker::scale::pyramid::RESPONSE_STD;
     use std::f64::consts::TAU;
 
     const LEN: usize = 40;
 
-    /// A pyramid of a smooth random picture whose target is `off` levels above the middle.
+    /// The pyramid of a smooth random image whose target is `off` levels above the middle.
     fn pyramid(off: f64) -> Scratch {
         let value = |level: usize, i: usize| {
             let at = level as f64 - off;
@@ -250,8 +210,8 @@ mod tests {
     fn the_response_is_that_of_the_printed_filter() {
         let filter = learned();
         let mut seen = pyramid(1.0);
-        let found = filter.respond(&mut seen);
-        // The same by definition, with complex sums over all frequencies.
+        let found = respond(&filter, &mut seen);
+        // The same by the definition, with complex sums over all frequencies.
         let mut learned = pyramid(0.0);
         learned.transform(pulp::Scalar);
         seen = pyramid(1.0);
@@ -265,12 +225,12 @@ mod tests {
                 (sum.0 + value * angle.cos(), sum.1 + value * angle.sin())
             })
         };
-        let bell = |level: usize| (-0.5 * ((level as f64 - 8.0) / BELL).powi(2)).exp();
+        let gaussian = |level: usize| (-0.5 * ((level as f64 - 8.0) / RESPONSE_STD).powi(2)).exp();
         for (level, found) in found.iter().enumerate() {
             let mut expected = 0.0;
             for frequency in 0..LEVELS {
-                let g = fourier(&bell, frequency);
-                let (mut product, mut energy) = ((0.0, 0.0), f64::from(DAMPING));
+                let g = fourier(&gaussian, frequency);
+                let (mut product, mut energy) = ((0.0, 0.0), f64::from(LAMBDA));
                 for i in 0..LEN {
                     let of = |scratch: &Scratch| {
                         let value = |level: usize| {
@@ -299,25 +259,25 @@ mod tests {
     #[test]
     fn a_target_that_grew_or_shrank_is_found_there() {
         let filter = learned();
-        // The window draws what is found towards the middle.
+        // The window pulls the maximum towards the middle.
         for off in [-2.0, -1.0, -0.4, 0.4, 1.0, 2.0] {
             let found = filter.find(&mut pyramid(off));
             let share = found.change / STEP / off;
             assert!((0.5..1.2).contains(&share), "{off}: {found:?}");
-            assert!(found.response > CERTAIN, "{off}: {found:?}");
+            assert!(found.response > FULL_RESPONSE, "{off}: {found:?}");
         }
     }
 
     #[test]
-    fn what_was_never_seen_changes_nothing() {
+    fn an_unknown_image_changes_nothing() {
         let filter = learned();
         let mut other = pyramid(0.0);
         for (i, value) in other.features.iter_mut().enumerate() {
             *value = ((i * i * 7919 + i * 104_729) % 1000) as f32 - 500.0;
         }
         let found = filter.find(&mut other);
-        assert!(found.response < DOUBTFUL, "{found:?}");
-        assert_eq!(found.believed(), 0.0);
+        assert!(found.response < MIN_RESPONSE, "{found:?}");
+        assert_eq!(found.gated_change(), 0.0);
     }
 
     #[test]
