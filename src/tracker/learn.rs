@@ -4,7 +4,7 @@
 
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::classifier::ridge;
+use crate::tracker::classifier::labels;
 use crate::tracker::confidence::update_gate;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
@@ -55,7 +55,8 @@ impl State {
     /// Records that the target is at the answer in the frame that the change test has loaded.
     pub fn record_seen(&mut self, workspace: &Workspace) {
         if self.params.static_penalty > 0.0 {
-            self.last_seen.record(self.answer, &workspace.change_test);
+            self.last_seen
+                .record(self.answer, workspace.change_test.image());
         }
     }
 
@@ -125,7 +126,7 @@ impl State {
     fn learn_discriminant(&mut self, at: &Particle, workspace: &mut Workspace) {
         if self.discriminant.is_on() {
             let (candidates, fit) = (&workspace.candidates, &mut workspace.learning.fit);
-            ridge::label_all(&candidates.particles, at, &self.bounds, &mut fit.labels);
+            labels::label_all(&candidates.particles, at, &self.bounds, &mut fit.labels);
             self.discriminant
                 .learn(&candidates.samples, candidates.vectors(), fit);
         }

@@ -7,15 +7,16 @@ use rand_chacha::ChaCha8Rng;
 use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::classifier::ridge::{self, Discriminant};
+use crate::tracker::classifier::labels;
+use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::estimate::{Estimate, Status};
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
-use crate::tracker::motion::change_test::LastSeen;
 use crate::tracker::motion::global_motion::GlobalMotion;
+use crate::tracker::motion::last_seen::LastSeen;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
@@ -170,7 +171,7 @@ impl State {
             &mut learning.features,
             &mut learning.fit,
         );
-        ridge::first_areas(&self.answer, &self.bounds, draws, areas);
+        labels::first_areas(&self.answer, &self.bounds, draws, areas);
         workspace
             .extractor
             .features(image, areas, &self.bounds, &self.params, features);
@@ -178,7 +179,7 @@ impl State {
         let (weights, origin) = (self.discriminant.weights(), self.discriminant.origin());
         samples.begin(weights, origin, &[], areas.len());
         samples.score_vectors(features);
-        ridge::label_all(areas, &self.answer, &self.bounds, &mut fit.labels);
+        labels::label_all(areas, &self.answer, &self.bounds, &mut fit.labels);
         self.discriminant.begin(samples, features, fit);
     }
 }

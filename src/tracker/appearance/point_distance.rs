@@ -184,8 +184,8 @@ impl PointDistance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::appearance::background;
-    use crate::tracker::appearance::bag;
+    use crate::tracker::appearance::{background, bag};
+    use crate::tracker::features::quantized::QuantizedVector;
     use crate::tracker::linalg::vector_ops;
     use crate::tracker::params::presets::Preset;
     use crate::tracker::params::table::Features;
@@ -201,13 +201,13 @@ mod tests {
         DMatrix::from_column_slice(20, vectors.len() / 20, vectors).cast()
     }
 
-    /// What becomes of vectors that are kept in a byte a value.
+    /// What becomes of vectors that are quantised to a byte a value.
     fn kept(vectors: &[f32]) -> DMatrix<f64> {
         let mut out = vec![0.0; vectors.len()];
         for (vector, out) in vectors.chunks(20).zip(out.chunks_mut(20)) {
-            let mut look = crate::tracker::features::quantized::QuantizedVector::default();
-            look.set(vector);
-            look.add_to(out, 1.0);
+            let mut quantized = QuantizedVector::default();
+            quantized.set(vector);
+            quantized.add_to(out, 1.0);
         }
         columns(&out)
     }
@@ -237,10 +237,8 @@ mod tests {
             for candidate in candidates.chunks_exact_mut(20) {
                 vector_ops::add(candidate, -1.0, background.mean());
             }
-            let squares: Vec<f32> = candidates
-                .chunks(20)
-                .map(|c| vector_ops::dot(c, c))
-                .collect();
+            let squares = candidates.chunks(20).map(|c| vector_ops::dot(c, c));
+            let squares: Vec<f32> = squares.collect();
             let mut point_distance = PointDistance::default();
             let query_products = [vectors(1, 5), vectors(1, 6)];
             let queries = [&query_products[0][..], &query_products[1]];
@@ -259,9 +257,8 @@ mod tests {
                 _ => kept(&samples).column_mean(),
             };
             let centered = |mut vectors: DMatrix<f64>| {
-                vectors
-                    .column_iter_mut()
-                    .for_each(|mut column| column -= &mean);
+                let columns = vectors.column_iter_mut();
+                columns.for_each(|mut column| column -= &mean);
                 vectors
             };
             let mut whitening = DMatrix::identity(20, 20);
@@ -288,11 +285,8 @@ mod tests {
                     let v = compared(kept(templates));
                     let origin = (candidate - &v.column_mean()).norm_squared() * params.gamma();
                     let svd = v.svd(true, false);
-                    let basis = svd
-                        .u
-                        .expect("query_products for")
-                        .columns(0, 3)
-                        .into_owned();
+                    let u = svd.u.expect("it was asked for");
+                    let basis = u.columns(0, 3);
                     let cosine = (basis.transpose() * candidate).norm() / candidate.norm();
                     let geodesic = 4.0 / (PI * PI) * cosine.min(1.0).acos().powi(2);
                     let expected = 0.3 * origin + 0.7 * geodesic;

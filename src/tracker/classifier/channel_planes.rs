@@ -1,4 +1,4 @@
-//! A grid of cells with each channel in lines of its own, so that windows side by side are worked on together, one a lane.
+//! A grid of cells with each channel in lines of its own, so that a vector register holds neighbouring windows.
 
 use pulp::Simd;
 
@@ -7,8 +7,8 @@ use crate::tracker::features::extractor::Grid;
 
 /// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
 pub(crate) const MAX_OFFSET: usize = 24;
-/// After the directions and the gray values: energies of the directions, gray values and their squares, summed over as
-/// many cells to the right as a window is wide.
+/// The channels after the directions and the gray values: energies of the directions, gray values and their squares,
+/// each summed over as many cells to the right as a window is wide.
 const WIDE: usize = GRAY + 1;
 const WIDE_COUNT: usize = 3;
 const PLANES: usize = WIDE + WIDE_COUNT;
@@ -16,23 +16,23 @@ const PLANES: usize = WIDE + WIDE_COUNT;
 /// The lines of a grid, those of a row of cells one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct ChannelPlanes {
-    /// From one line to the next: a register may begin at any cell. What is beyond the cells is of no account.
+    /// From one line to the next. A register may begin at any cell, so lines end with unused values.
     stride: usize,
     lines: Vec<f32>,
-    /// What is summed, of one row.
+    /// The energies and squares of one row.
     energies: Vec<f32>,
     squares: Vec<f32>,
 }
 
 impl ChannelPlanes {
-    /// Takes the cells of `grid`, for windows of so many columns and rows; with room for the most that a scan looks at.
+    /// Loads the cells of `grid`, for windows of so many columns and rows; makes room for the widest dense search.
     #[inline(always)]
     pub fn load(&mut self, grid: &Grid, (width, height): (usize, usize)) {
-        let most_columns = width + 2 * MAX_OFFSET + LANES;
-        let most = most_columns * (height + 2 * MAX_OFFSET) * PLANES;
-        reserve(&mut self.lines, most);
-        reserve(&mut self.energies, most_columns);
-        reserve(&mut self.squares, most_columns);
+        let max_columns = width + 2 * MAX_OFFSET + LANES;
+        let max = max_columns * (height + 2 * MAX_OFFSET) * PLANES;
+        reserve(&mut self.lines, max);
+        reserve(&mut self.energies, max_columns);
+        reserve(&mut self.squares, max_columns);
         self.stride = grid.columns + LANES;
         let cells = grid.values.chunks_exact(grid.columns * CHANNELS);
         let rows = cells.zip(grid.grays.chunks_exact(grid.columns));
@@ -93,7 +93,7 @@ impl ChannelPlanes {
     }
 }
 
-/// Makes `values` hold at least `count` of them, whatever they are.
+/// Makes `values` at least `count` long.
 fn reserve(values: &mut Vec<f32>, count: usize) {
     if values.len() < count {
         values.resize(count, 0.0);

@@ -1,8 +1,8 @@
-//! What the discriminant sees of a frame's areas.
+//! The training samples of a frame: the areas that were compared, as the discriminant scores them.
 //!
-//! An example is the unit vector u = (x - origin) / ‖x - origin‖ of a feature vector x. It is not written out: with the
-//! inner products of x with the weights and with the origin, its length and its score follow, and sums over examples
-//! are sums over vectors. The vectors may have a mean taken off, if the origin has it taken off as well.
+//! A sample is the unit vector u = (x - origin) / ‖x - origin‖ of a feature vector x. It is not written out: its length
+//! and its score follow from the inner products of x with the weights and with the origin, and sums over samples are
+//! sums over vectors. A mean may be subtracted from the vectors, if it is subtracted from the origin as well.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -10,12 +10,12 @@ use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::linalg::vector_ops;
 
-/// What is left of a squared length below this share of it is rounding: the vector is the origin.
+/// A squared distance from the origin below this share of the squared lengths is rounding: the vector is the origin.
 const MIN_REMAINDER: f32 = 1e-6;
 /// Vectors of a sum that are worked on together, while they are in the cache.
 const GROUP: usize = 8;
 
-/// The origin, and of each example its scale and its score.
+/// The origin, and of each sample its scale and its score.
 #[derive(Debug, Default)]
 pub(crate) struct TrainingSamples {
     /// The weights and the origin, as the vectors see them.
@@ -28,8 +28,8 @@ pub(crate) struct TrainingSamples {
 }
 
 impl TrainingSamples {
-    /// Forgets the last examples and takes `discriminant`, for vectors that have `mean` (or, where that is empty,
-    /// nothing) taken off; with room for `most` examples.
+    /// Forgets the last samples and loads the discriminant's `weights` and `origin`, for vectors from which `mean` is
+    /// subtracted (nothing, where it is empty); makes room for `max` samples.
     pub fn begin(&mut self, weights: &[f32], origin: &[f32], mean: &[f32], max: usize) {
         self.weights.clear();
         self.weights.extend_from_slice(weights);
@@ -40,12 +40,12 @@ impl TrainingSamples {
         clear_and_reserve(&mut self.scores, max);
     }
 
-    /// The vectors whose products are asked for: the weights and the origin.
+    /// The vectors whose products [`push_scores`](Self::push_scores) needs: the weights and the origin.
     pub fn query_vectors(&self) -> [&[f32]; 2] {
         [&self.weights, &self.origin]
     }
 
-    /// Takes further examples: their products with the weights and with the origin, and the squares of their vectors.
+    /// Appends samples: their products with the weights and with the origin, and the squares of their vectors.
     pub fn push_scores(&mut self, [of_weights, of_origin]: [&[f32]; 2], squares: &[f32]) {
         let origin_score = vector_ops::dot(&self.origin, &self.weights);
         let origin_square = vector_ops::dot(&self.origin, &self.origin);
@@ -77,7 +77,7 @@ impl TrainingSamples {
         self.scratch = scratch;
     }
 
-    /// Forgets all examples but the first `count`.
+    /// Forgets all samples but the first `count`.
     pub fn truncate(&mut self, count: usize) {
         self.scales.truncate(count);
         self.scores.truncate(count);
@@ -91,7 +91,7 @@ impl TrainingSamples {
     /// Adds Σ cᵢ uᵢ to `sum`.
     pub fn add_sum(&self, vectors: &[f32], coefficients: &[f32], sum: &mut [f32]) {
         Arch::new().dispatch(Sum {
-            examples: self,
+            samples: self,
             vectors,
             coefficients: Coefficients::Given(coefficients),
             sum,
@@ -101,7 +101,7 @@ impl TrainingSamples {
     /// Σ (uᵢ · d)².
     pub fn energy(&self, vectors: &[f32], direction: &[f32]) -> f32 {
         Arch::new().dispatch(Energy {
-            examples: self,
+            samples: self,
             vectors,
             direction,
         })
@@ -110,7 +110,7 @@ impl TrainingSamples {
     /// Adds Σ (uᵢ · d) uᵢ to `sum`.
     pub fn add_products(&self, vectors: &[f32], direction: &[f32], sum: &mut [f32]) {
         Arch::new().dispatch(Sum {
-            examples: self,
+            samples: self,
             vectors,
             coefficients: Coefficients::ProductsWith(direction),
             sum,
@@ -118,9 +118,9 @@ impl TrainingSamples {
     }
 }
 
-/// [`TrainingSamples::energy`], to be compiled for the instructions that this machine has.
+/// [`TrainingSamples::energy`], compiled for this machine's instructions.
 struct Energy<'a> {
-    examples: &'a TrainingSamples,
+    samples: &'a TrainingSamples,
     vectors: &'a [f32],
     direction: &'a [f32],
 }
@@ -130,8 +130,8 @@ impl WithSimd for Energy<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f32 {
-        let (len, scales) = (self.direction.len(), &self.examples.scales);
-        let of_origin = vector_ops::dot(&self.examples.origin, self.direction);
+        let (len, scales) = (self.direction.len(), &self.samples.scales);
+        let of_origin = vector_ops::dot(&self.samples.origin, self.direction);
         let mut energy = 0.0;
         for first in (0..scales.len()).step_by(GROUP) {
             let mut group = [self.vectors; GROUP];
@@ -154,9 +154,9 @@ enum Coefficients<'a> {
     ProductsWith(&'a [f32]),
 }
 
-/// A sum over all examples, to be compiled for the instructions that this machine has.
+/// A sum over all samples, compiled for this machine's instructions.
 struct Sum<'a> {
-    examples: &'a TrainingSamples,
+    samples: &'a TrainingSamples,
     vectors: &'a [f32],
     coefficients: Coefficients<'a>,
     sum: &'a mut [f32],
@@ -168,7 +168,7 @@ impl WithSimd for Sum<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self {
-            examples,
+            samples,
             vectors,
             coefficients,
             sum,
@@ -176,9 +176,9 @@ impl WithSimd for Sum<'_> {
         let len = sum.len();
         let of_origin = match coefficients {
             Coefficients::Given(_) => 0.0,
-            Coefficients::ProductsWith(direction) => vector_ops::dot(&examples.origin, direction),
+            Coefficients::ProductsWith(direction) => vector_ops::dot(&samples.origin, direction),
         };
-        let count = examples.scales.len();
+        let count = samples.scales.len();
         let mut total = 0.0;
         for first in (0..count).step_by(GROUP) {
             let mut group = [vectors; GROUP];
@@ -194,19 +194,19 @@ impl WithSimd for Sum<'_> {
                 }
                 Coefficients::ProductsWith(direction) => {
                     let products = gemm::tile(simd, group, [direction]);
-                    let scales = &examples.scales[first..];
+                    let scales = &samples.scales[first..];
                     for ((factor, [product]), scale) in factors.iter_mut().zip(products).zip(scales)
                     {
                         *factor = scale * (product - of_origin);
                     }
                 }
             }
-            for (factor, scale) in factors.iter_mut().zip(&examples.scales[first..]) {
+            for (factor, scale) in factors.iter_mut().zip(&samples.scales[first..]) {
                 *factor *= scale;
                 total += *factor;
             }
             vector_ops::add_all(simd, sum, factors, group);
         }
-        vector_ops::add(sum, -total, &examples.origin);
+        vector_ops::add(sum, -total, &samples.origin);
     }
 }

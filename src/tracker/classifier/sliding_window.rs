@@ -1,34 +1,28 @@
 //! The discriminant's scores of all windows of a grid of cells.
 //!
-//! A window's directions are as they are on the grid, so their products with the weights are a correlation. Its gray
-//! values have its own mean taken off and are divided by its own deviation; both follow from sums, as does the length
-//! that the discriminant divides by ([`examples`](crate::tracker::classifier::samples)).
-//!
-//! Windows side by side are worked on together, one a lane: so each channel of the grid is brought into a line of its own
-//! first ([`planes`](crate::tracker::classifier::channel_planes)).
+//! The products of a window's cells with the weights are a correlation on the grid; what the window's own mean,
+//! deviation and length change follows from sums ([`Scorer`]). Windows side by side are worked on together, one a lane,
+//! so each channel of the grid is brought into a line of its own first ([`ChannelPlanes`]).
 
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, GRAY_WEIGHT, Lanes};
+use crate::tracker::classifier::window_score::{Products, Scorer};
+use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::features::hog_cells::MIN_CONTRAST;
-use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
 /// Rows of windows whose sums are in registers at a time.
 const ROWS: usize = 4;
-/// What is left of a squared length below this share of it is rounding, as for examples.
-const MIN_REMAINDER: f32 = 1e-6;
 
-/// Room for the scores of a grid.
+/// The buffers for the scores of a grid.
 #[derive(Debug, Default)]
 pub(crate) struct SlidingWindow {
     planes: ChannelPlanes,
 }
 
-/// [`SlidingWindow::scores`], to be compiled for the instructions that this machine has.
+/// [`SlidingWindow::scores`], compiled for this machine's instructions.
 struct Scores<'a> {
     sliding_window: &'a mut SlidingWindow,
     grid: &'a Grid,
@@ -96,15 +90,6 @@ impl SlidingWindow {
     }
 }
 
-/// The products of windows with the weights and with the origin, one window a lane.
-#[derive(Clone, Copy)]
-struct Products<S: Simd> {
-    /// Of the directions.
-    directions: [S::f32s; 2],
-    /// Of the gray values as they are on the grid.
-    grays: [S::f32s; 2],
-}
-
 /// The products of the windows from column `first` on in each of `rows`. Of windows that are not on the grid they mean
 /// nothing.
 #[inline(always)]
@@ -168,79 +153,15 @@ fn add_products<S: Simd>(
     }
 }
 
-/// What scores are made with, beside the sums over windows.
-struct Scorer {
-    /// The sums of the gray channel of the weights and of the origin.
-    grays: [f32; 2],
-    /// w · origin and ‖origin‖².
-    origin_score: f32,
-    origin_square: f32,
-    /// Cells of a window.
-    count: f32,
-    least_deviation: f32,
-}
-
-impl Scorer {
-    #[inline(always)]
-    fn new(discriminant: &Discriminant, cell_pixels: f32) -> Self {
-        let (weights, origin) = (discriminant.weights(), discriminant.origin());
-        let grays = |vector: &[f32]| -> f32 {
-            let cells = vector.as_chunks::<CHANNELS>().0.iter();
-            cells.map(|cell| cell[GRAY]).sum()
-        };
-        Self {
-            grays: [grays(weights), grays(origin)],
-            origin_score: vector_ops::dot(weights, origin),
-            origin_square: vector_ops::dot(origin, origin),
-            count: (weights.len() / CHANNELS) as f32,
-            least_deviation: MIN_CONTRAST * cell_pixels,
-        }
-    }
-
-    /// The scores of windows, from their products and their sums of energies, gray values and squares of these.
-    #[inline(always)]
-    fn score<S: Simd>(
-        &self,
-        simd: S,
-        products: Products<S>,
-        [energy, gray, square]: [S::f32s; 3],
-    ) -> S::f32s {
-        let zero = simd.splat_f32s(0.0);
-        let (count, share) = (
-            simd.splat_f32s(self.count),
-            simd.splat_f32s(1.0 / self.count),
-        );
-        // The gray values of an area have its own mean and deviation.
-        let mean = simd.mul_f32s(gray, share);
-        let variance = simd.sub_f32s(simd.mul_f32s(square, share), simd.mul_f32s(mean, mean));
-        let variance = simd.max_f32s(variance, zero);
-        let least_deviation = simd.splat_f32s(self.least_deviation);
-        let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
-        let scale = simd.div_f32s(simd.splat_f32s(GRAY_WEIGHT), deviation);
-        let mut whole = products.directions;
-        for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
-            let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
-            *whole = simd.mul_add_e_f32s(scale, simd.sub_f32s(grays, shift), *whole);
-        }
-        let [of_weights, of_origin] = whole;
-        let contrast = simd.mul_f32s(simd.mul_f32s(scale, scale), variance);
-        let square = simd.mul_add_e_f32s(contrast, count, energy);
-        let both = simd.add_f32s(square, simd.splat_f32s(self.origin_square));
-        let left = simd.sub_f32s(both, simd.add_f32s(of_origin, of_origin));
-        let is_left =
-            simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(MIN_REMAINDER)), left);
-        let above = simd.sub_f32s(of_weights, simd.splat_f32s(self.origin_score));
-        let score = simd.div_f32s(above, simd.sqrt_f32s(left));
-        simd.select_f32s(is_left, score, zero)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tracker::classifier::channel_planes::MAX_OFFSET;
+    use crate::tracker::features::channels::GRAY_WEIGHT;
     use crate::tracker::features::extractor::Extractor;
+    use crate::tracker::features::hog_cells::MIN_CONTRAST;
     use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::linalg::vector_ops;
     use crate::tracker::motion::particles::{Particle, StateBounds};
     use crate::tracker::params::presets::Preset;
 

@@ -7,17 +7,12 @@
 //! The test errs on the side of the particle: where light or camera changed the place, and where the last box covered
 //! it, it says nothing.
 
-use serde::{Deserialize, Serialize};
-
-use crate::tracker::image::downsample::downsample;
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::motion::joint_integral::JointIntegral;
+use crate::tracker::motion::last_seen::{CELL, LastSeen, SmallImage, small_box};
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
-/// Working pixels, along x and along y, that are one of the small image: noise is averaged away, and a small target
-/// still has some.
-const CELL: usize = 4;
 /// A part of fewer pixels of the small image says nothing.
 const MIN_PIXELS: u32 = 6;
 /// A correlation up to this is chance: any two places of a scene share slopes of light.
@@ -25,60 +20,27 @@ const CHANCE_CORRELATION: f64 = 0.4;
 /// Variance of noise, in squared gray values: added to that of each place.
 const NOISE: f64 = 10.0;
 
-/// The frame in which the target was last seen, as a small image, and where the target was.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct LastSeen {
-    /// The small image, row by row, and its width.
-    pixels: Vec<u8>,
-    width: u32,
-    /// None before the first frame.
-    target: Option<Particle>,
-}
-
 /// The small images of the present frame and of the last one, compared.
 #[derive(Debug, Default)]
 pub(crate) struct ChangeTest {
-    pixels: Vec<u8>,
-    width: usize,
+    image: SmallImage,
     integral: JointIntegral,
     /// Where the target was then, in pixels of the present small image; none where nothing is compared.
     last_box: Option<Rect>,
 }
 
-/// The box of `particle` in pixels of the small image.
-fn small_box(particle: &Particle, bounds: &StateBounds) -> Rect {
-    bounds.area(particle).in_pixels_of(CELL as f64)
-}
-
-impl LastSeen {
-    /// Records that the target is at `target` in the frame that `test` has loaded.
-    pub fn record(&mut self, target: Particle, test: &ChangeTest) {
-        self.pixels.clone_from(&test.pixels);
-        self.width = test.width as u32;
-        self.target = Some(target);
-    }
-
-    /// Whether this may be what a tracker of working images of this size has last seen, if it keeps that.
-    pub fn is_valid_for(&self, (width, height): (u32, u32), is_kept: bool) -> bool {
-        let (columns, rows) = (width as usize / CELL, height as usize / CELL);
-        let fits = self.width as usize == columns && self.pixels.len() == columns * rows;
-        let is_bounded = |target: &Particle| {
-            let values = [target.x, target.y, target.scale];
-            values.iter().all(|value| value.abs() <= 1e6)
-        };
-        match &self.target {
-            Some(target) => is_kept && fits && is_bounded(target),
-            None => !is_kept && *self == Self::default(),
-        }
-    }
-}
-
 impl ChangeTest {
+    /// The small image of the present frame.
+    pub fn image(&self) -> &SmallImage {
+        &self.image
+    }
+
     /// Makes the small image of `frame`.
     pub fn load(&mut self, frame: &GrayFrame) {
         self.last_box = None;
-        self.width = downsample(frame, CELL, &mut self.pixels);
-        self.integral.reserve(self.pixels.len() + self.width);
+        self.image.load(frame);
+        self.integral
+            .reserve(self.image.pixels.len() + self.image.width());
     }
 
     /// Compares the small image with the last one, `radius` working pixels around the box of `displaced`, which is where
@@ -91,10 +53,11 @@ impl ChangeTest {
         bounds: &StateBounds,
     ) {
         let Some(target) = &last.target else { return };
-        if self.width == 0 || last.pixels.len() != self.pixels.len() {
+        let (width, pixels) = (self.image.width(), &self.image.pixels);
+        if width == 0 || last.image.pixels.len() != pixels.len() {
             return;
         }
-        let height = self.pixels.len() / self.width;
+        let height = pixels.len() / width;
         let (cell, radius) = (CELL as f64, radius / CELL as f64);
         let [across, down] = [displaced.x - target.x, displaced.y - target.y]
             .map(|shift| (shift / cell).round() as isize);
@@ -107,7 +70,7 @@ impl ChangeTest {
             (first < end).then_some((first as usize, end as usize))
         };
         let now = small_box(displaced, bounds);
-        let columns = span(now.x, now.width, self.width, across);
+        let columns = span(now.x, now.width, width, across);
         let rows = span(now.y, now.height, height, down);
         let (Some((left, right)), Some((top, bottom))) = (columns, rows) else {
             return;
@@ -118,14 +81,14 @@ impl ChangeTest {
             y: then.y + down as f64,
             ..then
         });
-        let (width, columns, pixels) = (self.width, right - left, &self.pixels);
+        let columns = right - left;
         let rows = (top..bottom).map(|row| {
             let now = &pixels[row * width + left..][..columns];
             let (row, left) = (
                 row.strict_add_signed(-down),
                 left.strict_add_signed(-across),
             );
-            (now, &last.pixels[row * width + left..][..columns])
+            (now, &last.image.pixels[row * width + left..][..columns])
         });
         self.integral.compute((left, top), columns, rows);
     }
@@ -207,7 +170,7 @@ mod tests {
     fn compared(from: Particle, to: Particle, shift: usize) -> ChangeTest {
         let (mut test, mut last) = (ChangeTest::default(), LastSeen::default());
         test.load(&frame(0, &from));
-        last.record(from, &test);
+        last.record(from, test.image());
         test.load(&frame(shift, &to));
         let displaced = particle(from.x + shift as f64, from.y);
         test.compare(&last, &displaced, 60.0, &BOUNDS);
@@ -256,9 +219,9 @@ mod tests {
         let (mut sums, mut beside) = ([0.0; 5], 0.0);
         // Compared is what is within 60 pixels of a box 30 wide around 52: up to pixel 32.
         for index in 0..last.len() {
-            let (x, y) = (index % test.width, index / test.width);
+            let (x, y) = (index % test.image.width(), index / test.image.width());
             if (3..32).contains(&x) && within(now, x, y) && !within(was, x, y) {
-                let (a, b) = (test.pixels[index], last[index - 3]);
+                let (a, b) = (test.image.pixels[index], last[index - 3]);
                 let (a, b) = (f64::from(a), f64::from(b));
                 for (sum, value) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
                     *sum += value;
@@ -298,7 +261,7 @@ mod tests {
         test.penalize(&particles, &BOUNDS, 6.0, &mut log_priors);
         let mut different = 0;
         for (i, particle) in particles.iter().enumerate() {
-            let unchanged = plain(&test, &last.pixels, particle);
+            let unchanged = plain(&test, &last.image.pixels, particle);
             let off = log_priors[i] - (before[i] - 6.0 * unchanged);
             assert!(off.abs() < 1e-12, "{particle:?}");
             different += u32::from(unchanged > 0.0);
@@ -319,7 +282,7 @@ mod tests {
             let frame = frame.expect("a frame of this size");
             let mut last = LastSeen::default();
             test.load(&frame);
-            last.record(particle(1.0, 1.0), &test);
+            last.record(particle(1.0, 1.0), test.image());
             assert!(last.is_valid_for((width as u32, height as u32), true));
             test.load(&frame);
             test.compare(&last, &particle(1.0, 1.0), 60.0, &BOUNDS);

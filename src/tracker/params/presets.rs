@@ -25,6 +25,12 @@ impl Preset {
     }
 }
 
+impl Default for Params {
+    fn default() -> Self {
+        Preset::default().params()
+    }
+}
+
 /// Section IV of the paper; every extension is off.
 const PAPER: Params = Params {
     particles: 100,

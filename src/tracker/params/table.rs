@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::params::presets::Preset;
-
 /// Values of a cell with [`Features::Gradients`]: nine directions and the gray value.
 pub(crate) const CELL_VALUES: usize = 10;
 
@@ -175,12 +173,6 @@ parameters! {
 
     /// Seed of all random draws: the same seed and frames give the same boxes.
     seed: u64;
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Preset::default().params()
-    }
 }
 
 impl Params {
