@@ -25,7 +25,7 @@ const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
 const MAX_FEATURE: f32 = 1e3;
-/// How far single precision may leave UᵀU from the identity.
+/// The greatest difference of UᵀU from the identity that single precision leaves.
 const ORTHONORMAL: f64 = 1e-3;
 /// Frame numbers are below: 2^53 can also be said exactly in JSON.
 const FRAMES: u64 = 1 << 53;
@@ -69,7 +69,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
     }
 }
 
-/// Makes what a snapshot does not carry.
+/// Computes what a snapshot does not carry.
 fn restore(state: &mut State) {
     workspace::with(|workspace| {
         let learning = &mut workspace.learning;
@@ -83,19 +83,19 @@ fn restore(state: &mut State) {
 
 fn check(state: &State) -> Result<(), TrackerError> {
     state.params.validate()?;
-    let sound = check_numbers(state)
+    let is_valid = check_numbers(state)
         && check_particles(state)
         && check_history(state)
         && check_bag(&state.bag, &state.params)
         && check_extensions(state);
-    if sound {
+    if is_valid {
         Ok(())
     } else {
         Err(TrackerError::Snapshot("holds a state that cannot be"))
     }
 }
 
-/// Sizes, reach and the last answer.
+/// Sizes, bounds and the last answer.
 fn check_numbers(state: &State) -> bool {
     let (width, height) = state.source;
     if width == 0 || height == 0 {
@@ -146,8 +146,8 @@ fn check_particles(state: &State) -> bool {
             .all(|particle| is_clamped(particle, state))
 }
 
-/// Whether a particle is where it may be. Those of a new box may be where a moved one may not: by a pixel. The mean of
-/// scales at a limit may be rounded beyond it.
+/// Whether a particle is within its bounds: to two pixels, for a box that the user gave may lie a pixel beyond, and to
+/// the rounding of the scale.
 fn is_clamped(particle: &Particle, state: &State) -> bool {
     let held = state.bounds.clamp(*particle);
     (held.x - particle.x).abs() <= 2.0
@@ -155,7 +155,7 @@ fn is_clamped(particle: &Particle, state: &State) -> bool {
         && (held.scale - particle.scale).abs() <= 1e-9
 }
 
-/// What only some parameters need: there when they ask for it, and not otherwise.
+/// The models of the extensions: there when their parameters ask for them, and not otherwise.
 fn check_extensions(state: &State) -> bool {
     let params = &state.params;
     let (width, height) = working_size(state.source.0, state.source.1);
@@ -191,7 +191,7 @@ fn check_bag(bag: &Bag, params: &Params) -> bool {
             .iter()
             .all(|entry| entry.is_valid_for(params, MAX_FEATURE))
         && bag.subspaces().all(|entry| {
-            // Where candidates stand alone a subspace is what follows from its looks.
+            // With single-vector candidates a subspace follows from its templates.
             let len = if params.single_vector_candidate {
                 0
             } else {

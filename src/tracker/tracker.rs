@@ -51,7 +51,7 @@ impl Tracker {
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
-    /// The bag keeps what it knew and gains the new look; history and particles restart at the box.
+    /// The bag keeps its entries and gains one for the new box; history and particles restart at the box.
     ///
     /// # Errors
     /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).

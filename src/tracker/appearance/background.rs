@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ const REFRESH_EVERY: u64 = 10;
 /// that lies among the samples keeps one part in D of its squared length.
 const RIDGE: f64 = 1.0;
 /// The share of the samples that a refresh replaces.
-const RENEWED: f64 = 0.2;
+const REFRESHED: f64 = 0.2;
 
 /// Vectors of areas beside the target, and what follows from them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -42,27 +42,17 @@ pub(crate) struct Background {
     metric: Metric,
 }
 
-/// Room for learning from samples.
+/// Buffers for learning from samples.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     vectors: Vec<f32>,
     metric: mahalanobis::Scratch,
 }
 
-/// [`Background::learn`], to be compiled for the instructions that this machine has.
-struct Learn<'a> {
-    background: &'a mut Background,
-    params: &'a Params,
-    scratch: &'a mut Scratch,
-}
-
-impl WithSimd for Learn<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.background.learn_all(self.params, self.scratch);
-    }
+#[pulp::with_simd(learn = Arch::new())]
+#[inline(always)]
+fn learn_simd<S: Simd>(_: S, background: &mut Background, params: &Params, scratch: &mut Scratch) {
+    background.learn_all(params, scratch);
 }
 
 impl Background {
@@ -72,31 +62,31 @@ impl Background {
         if number == 0 {
             all
         } else if number.is_multiple_of(REFRESH_EVERY) {
-            (all as f64 * RENEWED).ceil() as usize
+            (all as f64 * REFRESHED).ceil() as usize
         } else {
             0
         }
     }
 
-    /// Takes new samples, vectors of length D one after the other; the oldest leave.
+    /// Appends new samples, vectors of length D one after the other; the oldest leave.
     pub fn rebuild(&mut self, vectors: &[f32], params: &Params, scratch: &mut Scratch) {
         for vector in vectors.chunks_exact(params.feature_len()) {
-            let full = self.samples.len() >= params.metric_samples();
-            let oldest = if full { self.samples.pop_front() } else { None };
-            let mut look = oldest.unwrap_or_default();
-            look.set(vector);
-            self.samples.push_back(look);
+            let is_full = self.samples.len() >= params.metric_samples();
+            let oldest = if is_full {
+                self.samples.pop_front()
+            } else {
+                None
+            };
+            let mut sample = oldest.unwrap_or_default();
+            sample.set(vector);
+            self.samples.push_back(sample);
         }
         self.learn(params, scratch);
     }
 
     /// Learns what follows from the samples.
     pub fn learn(&mut self, params: &Params, scratch: &mut Scratch) {
-        Arch::new().dispatch(Learn {
-            background: self,
-            params,
-            scratch,
-        });
+        learn(self, params, scratch);
     }
 
     #[inline(always)]
@@ -108,15 +98,15 @@ impl Background {
             return;
         }
         self.mean.resize(len, 0.0);
-        for look in &self.samples {
-            look.add_to(&mut self.mean, 1.0 / count as f32);
+        for sample in &self.samples {
+            sample.add_to(&mut self.mean, 1.0 / count as f32);
         }
         self.samples_into(&mut scratch.vectors);
         self.metric
             .fit(&scratch.vectors, len, RIDGE, &mut scratch.metric);
     }
 
-    /// Makes `out` the samples, with the mean taken off: none where there is no metric.
+    /// Makes `out` the samples, with the mean subtracted: none where there is no metric.
     #[inline(always)]
     pub fn samples_into(&self, out: &mut Vec<f32>) {
         out.resize(self.samples_len(), 0.0);
@@ -133,19 +123,19 @@ impl Background {
         }
     }
 
-    /// Writes the samples, with the mean taken off, to `out`, which is as long as they are.
+    /// Writes the samples, with the mean subtracted, to `out`, which is as long as they are.
     #[inline(always)]
     pub fn write_samples(&self, out: &mut [f32]) {
         if self.mean.is_empty() {
             return;
         }
         let vectors = out.chunks_exact_mut(self.mean.len());
-        for (look, vector) in self.samples.iter().zip(vectors) {
-            look.write(&self.mean, vector);
+        for (sample, vector) in self.samples.iter().zip(vectors) {
+            sample.write(&self.mean, vector);
         }
     }
 
-    /// The mean of the samples: empty where there is no metric.
+    /// The mean of the samples; empty without samples.
     pub fn mean(&self) -> &[f32] {
         &self.mean
     }
@@ -156,12 +146,12 @@ impl Background {
     }
 
     /// Whether the samples may be those of a tracker with `params`.
-    pub fn is_valid_for(&self, params: &Params, greatest: f32) -> bool {
+    pub fn is_valid_for(&self, params: &Params, max: f32) -> bool {
         self.samples.len() == params.metric_samples()
             && self
                 .samples
                 .iter()
-                .all(|look| look.is_valid_for(params.feature_len(), greatest))
+                .all(|sample| sample.is_valid_for(params.feature_len(), max))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the single-vector candidates of a frame are multiplied by, as the rows of one matrix: the background's samples,
 //! for each entry of the bag its mean and basis vectors, and the vectors that the discriminant asks for.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
@@ -21,36 +21,24 @@ pub(crate) struct BagMatrix {
     pub background_coordinates: Vec<f32>,
 }
 
-/// [`BagMatrix::load`], compiled for this machine's instructions.
-struct Load<'a> {
-    matrix: &'a mut BagMatrix,
-    bag: &'a Bag,
-    background: &'a Background,
-    queries: [&'a [f32]; 2],
+#[pulp::with_simd(load = Arch::new())]
+#[inline(always)]
+fn load_simd<S: Simd>(
+    simd: S,
+    matrix: &mut BagMatrix,
+    bag: &Bag,
+    background: &Background,
+    queries: [&[f32]; 2],
     len: usize,
-}
-
-impl WithSimd for Load<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        self.matrix
-            .load_all(simd, self.bag, self.background, self.queries, self.len);
-    }
+) {
+    matrix.load_all(simd, bag, background, queries, len);
 }
 
 impl BagMatrix {
     /// Loads the bag and the background's metric, for vectors of length `len`, and two vectors whose products are
     /// asked for as well (each of that length, or empty).
     pub fn load(&mut self, bag: &Bag, background: &Background, queries: [&[f32]; 2], len: usize) {
-        Arch::new().dispatch(Load {
-            matrix: self,
-            bag,
-            background,
-            queries,
-            len,
-        });
+        load(self, bag, background, queries, len);
     }
 
     #[inline(always)]

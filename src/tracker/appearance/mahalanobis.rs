@@ -1,13 +1,13 @@
-//! The background's metric by inner products: ⟨x, y⟩ = xᵀ (I + C / ridge)⁻¹ y for x and y with the mean taken off.
+//! The background's metric by inner products: ⟨x, y⟩ = xᵀ (I + C / ridge)⁻¹ y, for x and y with the mean subtracted.
 //!
 //! Whitened vectors are compared by their inner products alone, so the root of the covariance is not needed. With the
 //! n centred samples as the rows of S, C = SᵀS / n, and by Woodbury's identity
 //!
 //! (I + C / ridge)⁻¹ = I - Sᵀ (n ridge I + SSᵀ)⁻¹ S = I - (L⁻¹S)ᵀ (L⁻¹S), LLᵀ = n ridge I + SSᵀ,
 //!
-//! so that ⟨x, y⟩ = x · y - z · w with the *shadows* z = L⁻¹Sx and w = L⁻¹Sy: n numbers a vector. L is small, and
-//! positive definite whatever the samples are. The difference loses digits as a vector comes to lie among the samples,
-//! at most as many as the ridge leaves of it: with a ridge of 1, log₁₀ of D.
+//! so that ⟨x, y⟩ = x · y - z · w with the *background coordinates* z = L⁻¹Sx and w = L⁻¹Sy: n numbers a vector. LLᵀ is
+//! small, and positive definite whatever the samples are. The difference loses digits where a vector lies in the span of
+//! the samples: with a ridge of 1, at most log₁₀ of D.
 
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::vector_ops;
@@ -21,7 +21,7 @@ pub(crate) struct Metric {
     inverse: Vec<f32>,
 }
 
-/// Room for making a metric.
+/// Buffers for fitting a metric.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     products: Vec<f32>,
@@ -43,7 +43,7 @@ impl Metric {
         let ridge = ridge * trace.sum::<f64>() / len as f64;
         self.inverse.clear();
         self.inverse.resize(count * count, 0.0);
-        // Samples that are all alike say nothing: no shadow. What is this small would overflow as a divisor.
+        // Equal samples have no covariance. A ridge this small would overflow as a divisor.
         if ridge.is_nan() || ridge <= 1e-20 {
             return;
         }
@@ -73,7 +73,7 @@ impl Metric {
         &self.inverse
     }
 
-    /// The shadow of a vector, of length n, from its inner products with the samples.
+    /// The background coordinates of a vector, n of them, from its inner products with the samples.
     #[inline(always)]
     pub fn background_coordinates_of(&self, products: &[f32], out: &mut [f32]) {
         let rows = self.inverse.chunks_exact(self.count.max(1));
@@ -94,7 +94,7 @@ fn factorize(matrix: &mut [f64], count: usize, least: f64) {
         for value in &mut pivot[k..] {
             *value *= scale;
         }
-        // What is not exact here is less than rounding: the pivot's own root.
+        // The pivot's own root, exact but for rounding.
         pivot[k] = 1.0 / scale;
         for (i, row) in rest.chunks_exact_mut(count).enumerate() {
             let i = k + 1 + i;
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_or_tiny_samples_cast_no_shadow_that_is_not_finite() {
+    fn equal_or_tiny_samples_give_no_background_coordinate_that_is_not_finite() {
         for value in [0.0, 1e-30, 1e-12, 1e-6] {
             let samples: Vec<f32> = vectors(9, 16, 3).iter().map(|v| v * value).collect();
             let mut metric = Metric::default();

@@ -1,11 +1,11 @@
-//! An affine subspace as combinations of the looks that it is made of.
+//! An affine subspace as coefficients of the templates that it is made of.
 //!
-//! The mean and the basis of equation 1 lie in the span of a few looks, and a candidate that stands alone is compared
-//! with them by inner products only. So neither is ever written out as whitened vectors: the background's metric gives the
-//! looks' Gram matrix, its eigenvectors the coefficients, and with the shadows of the combinations (see
-//! [`metric`](crate::tracker::appearance::mahalanobis)) a change of the background costs small matrices.
+//! The mean and the basis of equation 1 lie in the span of a few vectors, the templates, and a single-vector candidate is
+//! compared with them by inner products only. So they are never written out under the background's metric: that metric
+//! gives the Gram matrix of the templates, whose eigenvectors give the coefficients. When the background changes, only
+//! small matrices change (see [`mahalanobis`](crate::tracker::appearance::mahalanobis) for the background coordinates).
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::subspace;
@@ -16,7 +16,7 @@ use crate::tracker::linalg::jacobi::Spectrum;
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
-/// What is left of a squared length below this share of it is rounding.
+/// A squared length under the metric below this share of the plain one is rounding.
 pub(crate) const MIN_REMAINDER: f32 = 1e-6;
 
 /// The mean, then the basis vectors, of an affine subspace.
@@ -24,80 +24,103 @@ pub(crate) const MIN_REMAINDER: f32 = 1e-6;
 pub(crate) struct Span {
     /// ‖μ‖².
     norm: f64,
-    /// For the mean and for each basis vector, the coefficients of the looks.
+    /// For the mean and for each basis vector, the coefficients of the templates.
     coefficients: Vec<f32>,
-    /// For each of them its shadow.
+    /// For the mean and for each basis vector, its background coordinates.
     background_coordinates: Vec<f32>,
     /// The number of basis vectors.
     dim: usize,
 }
 
-/// Room for making combinations.
+/// Buffers for fitting subspaces.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    /// The background's samples, with their mean taken off.
+    /// The background's samples, with their mean subtracted.
     samples: Vec<f32>,
-    /// The looks, with that mean taken off.
+    /// The templates, with that mean subtracted.
     vectors: Vec<f32>,
     products: Vec<f32>,
     background_coordinates: Vec<f32>,
     gram: Vec<f32>,
+    /// The factors that bring the templates to unit length.
     scales: Vec<f32>,
     spectrum: Spectrum,
 }
 
-/// [`Scratch::take`], to be compiled for the instructions that this machine has.
-struct Take<'a> {
-    scratch: &'a mut Scratch,
-    background: &'a Background,
-}
-
-impl WithSimd for Take<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.background.samples_into(&mut self.scratch.samples);
+impl Scratch {
+    /// Loads the samples of `background`, under whose metric all subspaces are fitted from here on.
+    pub fn load(&mut self, background: &Background) {
+        load_samples(&mut self.samples, background);
     }
 }
 
-/// [`Span::fit`], to be compiled for the instructions that this machine has.
-struct Fit<'a> {
-    combination: &'a mut Span,
-    templates: &'a [QuantizedVector],
-    background: &'a Background,
-    params: &'a Params,
-    scratch: &'a mut Scratch,
+#[pulp::with_simd(load_samples = Arch::new())]
+#[inline(always)]
+fn load_samples_simd<S: Simd>(_: S, samples: &mut Vec<f32>, background: &Background) {
+    background.samples_into(samples);
 }
 
-impl WithSimd for Fit<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            combination,
-            templates,
-            background,
-            params,
-            scratch,
-        } = self;
-        combination.fit_all(simd, templates, background, params, scratch);
-    }
+#[pulp::with_simd(compare_templates = Arch::new())]
+#[inline(always)]
+fn compare_templates_simd<S: Simd>(
+    simd: S,
+    templates: &[QuantizedVector],
+    background: &Background,
+    len: usize,
+    scratch: &mut Scratch,
+) {
+    scratch.compare(simd, templates, background, len);
 }
 
 impl Scratch {
-    /// Takes the samples of `background`, which all combinations are made with from here on.
-    pub fn load(&mut self, background: &Background) {
-        Arch::new().dispatch(Take {
-            scratch: self,
-            background,
-        });
+    /// The background coordinates of the templates, and their Gram matrix under the metric.
+    #[inline(always)]
+    fn compare<S: Simd>(
+        &mut self,
+        simd: S,
+        templates: &[QuantizedVector],
+        background: &Background,
+        len: usize,
+    ) {
+        let (metric, count) = (background.metric(), templates.len());
+        let samples = metric.count();
+        self.vectors.resize(count * len, 0.0);
+        for (template, vector) in templates.iter().zip(self.vectors.chunks_exact_mut(len)) {
+            template.write(background.mean(), vector);
+        }
+        let (vectors, products) = (&self.vectors, &mut self.products);
+        products.resize(count * samples, 0.0);
+        gemm::multiply(simd, vectors, &self.samples, len, samples, products);
+        self.gram.resize(count * count, 0.0);
+        gemm::multiply(simd, vectors, vectors, len, count, &mut self.gram);
+        self.background_coordinates.resize(count * samples, 0.0);
+        let row = |i: usize| i * samples..(i + 1) * samples;
+        for i in 0..count {
+            let out = &mut self.background_coordinates[row(i)];
+            metric.background_coordinates_of(&self.products[row(i)], out);
+        }
+        let coordinates = &self.background_coordinates;
+        self.scales.clear();
+        for i in 0..count {
+            for j in 0..count {
+                let plain = self.gram[i * count + j];
+                let product = plain - vector_ops::dot(&coordinates[row(i)], &coordinates[row(j)]);
+                let is_left = i != j || product > plain * MIN_REMAINDER;
+                self.gram[i * count + j] = if is_left { product } else { 0.0 };
+            }
+            let square = self.gram[i * count + i];
+            let scale = if square > 0.0 {
+                1.0 / square.sqrt()
+            } else {
+                0.0
+            };
+            self.scales.push(scale);
+        }
     }
 }
 
 impl Span {
-    /// Becomes the subspace of `templates` as the metric of `background`, the one that `scratch` has taken, sees them.
+    /// Becomes the subspace of `templates` under the metric of `background`, which `scratch` has loaded.
     pub fn fit(
         &mut self,
         templates: &[QuantizedVector],
@@ -105,80 +128,22 @@ impl Span {
         params: &Params,
         scratch: &mut Scratch,
     ) {
-        Arch::new().dispatch(Fit {
-            combination: self,
-            templates,
-            background,
-            params,
-            scratch,
-        });
-    }
-
-    #[inline(always)]
-    fn fit_all<S: Simd>(
-        &mut self,
-        simd: S,
-        templates: &[QuantizedVector],
-        background: &Background,
-        params: &Params,
-        scratch: &mut Scratch,
-    ) {
-        let (len, count) = (params.feature_len(), templates.len());
-        let metric = background.metric();
-        let samples = metric.count();
-        scratch.vectors.resize(count * len, 0.0);
-        for (look, vector) in templates.iter().zip(scratch.vectors.chunks_exact_mut(len)) {
-            look.write(background.mean(), vector);
-        }
-        let (vectors, products) = (&scratch.vectors, &mut scratch.products);
-        products.resize(count * samples, 0.0);
-        gemm::multiply(simd, vectors, &scratch.samples, len, samples, products);
-        scratch.background_coordinates.resize(count * samples, 0.0);
-        scratch.gram.resize(count * count, 0.0);
-        gemm::multiply(simd, vectors, vectors, len, count, &mut scratch.gram);
-        let background_coordinates_of = |i: usize| i * samples..(i + 1) * samples;
-        for i in 0..count {
-            metric.background_coordinates_of(
-                &scratch.products[background_coordinates_of(i)],
-                &mut scratch.background_coordinates[background_coordinates_of(i)],
-            );
-        }
-        scratch.scales.clear();
-        for i in 0..count {
-            for j in 0..count {
-                let of_shadows = vector_ops::dot(
-                    &scratch.background_coordinates[background_coordinates_of(i)],
-                    &scratch.background_coordinates[background_coordinates_of(j)],
-                );
-                let plain = scratch.gram[i * count + j];
-                let product = plain - of_shadows;
-                let is_left = i != j || product > plain * MIN_REMAINDER;
-                scratch.gram[i * count + j] = if is_left { product } else { 0.0 };
-            }
-            let square = scratch.gram[i * count + i];
-            scratch.scales.push(if square > 0.0 {
-                1.0 / square.sqrt()
-            } else {
-                0.0
-            });
-        }
+        let (count, samples) = (templates.len(), background.metric().count());
+        compare_templates(templates, background, params.feature_len(), scratch);
         self.combine(count, params.basis_dim as usize, scratch);
         self.background_coordinates.clear();
-        for row in self.coefficients.chunks_exact(count) {
+        for coefficients in self.coefficients.chunks_exact(count) {
             let first = self.background_coordinates.len();
             self.background_coordinates.resize(first + samples, 0.0);
-            for (i, coefficient) in row.iter().enumerate() {
-                let target = &mut self.background_coordinates[first..];
-                vector_ops::add(
-                    target,
-                    *coefficient,
-                    &scratch.background_coordinates[background_coordinates_of(i)],
-                );
+            let out = &mut self.background_coordinates[first..];
+            for (i, &coefficient) in coefficients.iter().enumerate() {
+                let of_template = &scratch.background_coordinates[i * samples..][..samples];
+                vector_ops::add(out, coefficient, of_template);
             }
         }
     }
 
-    /// The coefficients, from the Gram matrix of `count` looks and the factors that bring them to their length.
+    /// The coefficients, from the Gram matrix of `count` templates and the factors that bring them to unit length.
     fn combine(&mut self, count: usize, basis_dim: usize, scratch: &mut Scratch) {
         let scale = |i: usize| f64::from(scratch.scales[i]);
         let gram =
@@ -203,13 +168,13 @@ impl Span {
         (self.norm, self.dim)
     }
 
-    /// The shadows of the mean and of the basis vectors.
+    /// The background coordinates of the mean and of the basis vectors.
     pub fn background_coordinates(&self) -> &[f32] {
         &self.background_coordinates
     }
 
-    /// Writes the mean and the basis vectors, before the metric, to `out`, which is as long as they are. `templates` are those
-    /// that this was made of; `scratch` is room for them.
+    /// Writes the mean and the basis vectors, as plain vectors, to `out`, which is as long as they are. `templates` are
+    /// those that this was fitted to; `scratch` is a buffer for them.
     #[inline(always)]
     pub fn write_to<S: Simd>(
         &self,
@@ -221,8 +186,8 @@ impl Span {
     ) {
         let len = out.len() / (1 + self.dim);
         scratch.resize(templates.len() * len, 0.0);
-        for (look, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
-            look.write(background.mean(), vector);
+        for (template, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
+            template.write(background.mean(), vector);
         }
         combinations::assign_combinations(simd, out, &self.coefficients, scratch, len);
     }

@@ -17,7 +17,7 @@ pub struct AffineSubspace {
     pub(crate) basis: Vec<f32>,
 }
 
-/// [`AffineSubspace::fit`], to be compiled for the instructions that this machine has.
+/// [`AffineSubspace::fit`], compiled for this machine's instructions.
 struct Fit<'a> {
     subspace: &'a mut AffineSubspace,
     vectors: &'a [&'a [f32]],
@@ -48,7 +48,7 @@ impl AffineSubspace {
         subspace
     }
 
-    /// Becomes [`of`](Self::of) these vectors, in the room that it has.
+    /// Becomes the subspace [`of`](Self::of) these vectors, in its present memory.
     pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
         Arch::new().dispatch(Fit {
             subspace: self,

@@ -5,11 +5,10 @@
 //! saw it), the running mean of that distance, since misses last, and how much larger or smaller than the first box the
 //! answer is (does the box still fit). It estimates the chance that the box overlaps the target by half or more.
 //!
-//! Without one, as in the preset `paper`, the score is **not calibrated**: an honest order, not a chance. The distance
+//! Without one, as in the preset `paper`, the score is **not calibrated**: it orders frames, but is no probability. The distance
 //! of the chosen candidate to the nearest entry of the bag is small while the target looks as it did, but what is small
-//! differs from video to video. So it is compared with what this session has seen while it was tracking: a running
-//! mean of that distance. The score is 1 / (1 + (r / 3)²) of the ratio r, so that a usual frame has 0.9, and three
-//! times the usual distance 0.5.
+//! differs from video to video. So it is divided by its running mean over the frames of this session that were tracked. The score is 1 / (1 + (r / 3)²) of this ratio r: 0.9 at the mean, 0.5 at three
+//! times the mean.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +22,7 @@ pub const PREDICTORS: [&str; 4] = [
     "|ln scale|",
 ];
 
-/// The greatest score of a target that is out of sight: nothing of it is in the box.
+/// The highest score of a target that is lost: nothing of it is in the box.
 const MAX_LOST: f64 = 0.1;
 
 /// A ratio at which the score is a half.
@@ -36,7 +35,7 @@ const LOST_BELOW: f64 = 0.2;
 /// The share of the newest frame in the running mean.
 const RENEWAL: f64 = 0.05;
 
-/// The least usual distance: a still picture must not make the first flicker a loss.
+/// The least mean distance: after still frames the first flicker must not count as a loss.
 const MIN_USUAL: f64 = 1e-3;
 
 /// What the score of one frame is made of: the tracker's answer, measured by the tracker itself.
@@ -101,7 +100,7 @@ impl ScoreModel {
     }
 }
 
-/// What distances have been usual while tracking.
+/// The running mean of the distance to the nearest entry, over the frames that were tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct DistanceBaseline {
     /// The running mean; none before the first frame that was tracked.
@@ -109,7 +108,7 @@ pub(crate) struct DistanceBaseline {
 }
 
 impl DistanceBaseline {
-    /// The score in [0, 1] and the status of an answer; `lost` when the target is out of sight, `trusted` when the
+    /// The score in [0, 1] and the status of an answer; `lost` when the target is lost, `trusted` when the
     /// frame may be learned from. The frame counts for those to come if it was tracked.
     pub fn judge(&mut self, evidence: &Evidence, lost: bool, trusted: bool) -> (f32, Status) {
         let Some(predictors) = evidence.predictors() else {

@@ -1,40 +1,39 @@
-//! Whether a frame may teach the tracker.
+//! The update gate: whether the target is lost, and whether a frame may update the models.
 //!
-//! What is learned while something covers the target is the thing that covers it. The look that the user pointed at
-//! does not change, so the distance of the answer to the bag's first subspace tells: it jumps when the target is
-//! covered, and creeps when the target turns. A frame is trusted while that distance is below a multiple of what is
-//! usual. What is usual follows slowly in frames that are not trusted, too, so that a lasting change is accepted in
-//! the end.
+//! What is learned while something covers the target is the cover. The first box's subspace does not change, so the
+//! distance of the answer to it tells: it jumps when the target is covered, and creeps when the target turns. A frame
+//! passes while that distance is below a multiple of its running mean. The mean follows slowly in frames that do not
+//! pass, too, so a lasting change is accepted in the end.
 //!
-//! Where such a jump is usual the score tells: a frame is learned from only if its box is rather right than not.
+//! Where such jumps are usual the score tells: a frame passes only if its box is more likely right than wrong.
 
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::params::table::Params;
 
-/// A running mean needs some frames before anything can be compared with it; a target that changes fast from the start
-/// would never be learned otherwise.
-const UNTIL_USUAL: u64 = 20;
-/// What counts as usual before anything was seen, and what is always trusted: distances are at most 1, and these are
-/// those of a look that shares about half with the first.
-const FIRST_USUAL: f64 = 0.25;
-const ALWAYS_TRUSTED: f64 = 0.3;
-/// A target that has hardly changed so far may have changed this much when it comes back.
-const MIN_USUAL: f64 = 0.15;
+/// Frames before the running mean means anything. All of them pass, or a target that changes fast from the start would
+/// never be learned.
+const WARM_UP: u64 = 20;
+/// The running mean before the first frame, and a distance that always passes. Distances are at most 1; these are
+/// typical of a patch that shares about half with the first.
+const INITIAL_MEAN: f64 = 0.25;
+const ALWAYS_ACCEPTED: f64 = 0.3;
+/// The least mean against which a target that was lost is recognised, also if it has hardly changed so far.
+const MIN_MEAN: f64 = 0.15;
 /// How much better than the lost threshold the discriminant must score a target that is found again.
 const FOUND_MARGIN: f64 = 0.2;
-/// The share of the newest frame in the running mean, when trusted and when not.
-const RENEWAL: f64 = 0.1;
-const RENEWAL_UNTRUSTED: f64 = 0.02;
+/// The share of the newest frame in the running mean, where it passes and where it does not.
+const RATE: f64 = 0.1;
+const RATE_REJECTED: f64 = 0.02;
 
-/// Whether frame `number`, whose answer overlaps the target by half or more with the chance `score`, may be learned from. A
-/// box that is half off is learned as what the target looks like otherwise, and the next one is further off.
+/// Whether frame `number` may update the models; `score` is the probability that its box overlaps the target by half or
+/// more. A box that is half off would be learned as the target, and the next one would be further off.
 pub(crate) fn passes(score: f64, number: u64, params: &Params) -> bool {
-    number < UNTIL_USUAL || score >= params.update_min_score
+    number < WARM_UP || score >= params.update_min_score
 }
 
-/// What distances to the first subspace have been usual.
+/// The running mean of the answers' distances to the first subspace.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UpdateGate {
     pub mean_distance: f64,
@@ -43,15 +42,15 @@ pub(crate) struct UpdateGate {
 impl Default for UpdateGate {
     fn default() -> Self {
         Self {
-            mean_distance: FIRST_USUAL,
+            mean_distance: INITIAL_MEAN,
         }
     }
 }
 
 impl UpdateGate {
-    /// Whether the best particle is not the target; `frames_lost` tells for how many frames it has been lost, and `spread`
-    /// how many times as wide as usual the search was. A wide search finds more that looks a little like the target, so
-    /// to be found again takes a better score, and a distance that is recognised.
+    /// Whether the best particle is not the target. The target has been lost for `frames_lost` frames, and the search
+    /// was `spread` times as wide as usual. A wide search finds more that resembles the target a little, so a target
+    /// that is found again needs a better score and a recognised distance.
     pub fn is_lost(
         &self,
         evidence: &Evidence,
@@ -69,28 +68,24 @@ impl UpdateGate {
             || !self.recognizes(evidence.first_distance, spread, params)
     }
 
-    /// Whether `distance` from the first subspace is not far beyond what is usual.
-    fn accepts(&self, distance: f64, params: &Params) -> bool {
-        let limit = (params.update_distance_ratio * self.mean_distance).max(ALWAYS_TRUSTED);
+    /// Whether what is found at `distance` from the first subspace is the target that was lost. A search that is hardly
+    /// wider than usual finds what it lost a frame or two before, and the usual limit holds. A wide search returns the
+    /// nearest look-alike, so the limit falls to the mean itself.
+    fn recognizes(&self, distance: f64, spread: f64, params: &Params) -> bool {
+        let factor = 1.0 + (params.update_distance_ratio - 1.0) / spread;
+        let limit = self.mean_distance.max(MIN_MEAN) * factor;
         params.update_distance_ratio <= 0.0 || distance < limit
     }
 
-    /// Whether what is found at `distance` from the first subspace, after the target was out of sight, is the target. The
-    /// search was `search_scale` times as wide as usual: one that is hardly wider finds what it lost a frame or two before, and
-    /// that is trusted as ever; a wide one finds the likest of all things, so it must look as much like the first look
-    /// as is usual.
-    pub fn recognizes(&self, distance: f64, search_scale: f64, params: &Params) -> bool {
-        let limit = self.mean_distance.max(MIN_USUAL)
-            * (1.0 + (params.update_distance_ratio - 1.0) / search_scale);
-        params.update_distance_ratio <= 0.0 || distance < limit
-    }
-
-    /// Whether frame `number`, whose answer is at `distance` from the first subspace, may be learned from.
+    /// Whether frame `number`, whose answer is at `distance` from the first subspace, may update the models as far as
+    /// the distance tells; updates the running mean.
     pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
-        let trusted = number < UNTIL_USUAL || self.accepts(distance, params);
-        let renewal = if trusted { RENEWAL } else { RENEWAL_UNTRUSTED };
-        self.mean_distance += renewal * (distance - self.mean_distance);
-        trusted
+        let limit = (params.update_distance_ratio * self.mean_distance).max(ALWAYS_ACCEPTED);
+        let accepted = params.update_distance_ratio <= 0.0 || distance < limit;
+        let passes = number < WARM_UP || accepted;
+        let rate = if passes { RATE } else { RATE_REJECTED };
+        self.mean_distance += rate * (distance - self.mean_distance);
+        passes
     }
 }
 
@@ -100,44 +95,40 @@ mod tests {
     use crate::tracker::params::presets::Preset;
 
     #[test]
-    fn a_jump_is_not_trusted_until_it_has_lasted() {
+    fn a_jump_does_not_pass_until_it_has_lasted() {
         let params = Preset::Robust.params();
-        let mut update_gate = UpdateGate::default();
-        assert!((1..50).all(|number| update_gate.judge(0.2, number, &params)));
-        let untrusted = (50..500).take_while(|&number| !update_gate.judge(0.6, number, &params));
-        let untrusted = untrusted.count();
-        assert!((10..100).contains(&untrusted), "{untrusted}");
+        let mut gate = UpdateGate::default();
+        assert!((1..50).all(|number| gate.judge(0.2, number, &params)));
+        let rejected = (50..500).take_while(|&number| !gate.judge(0.6, number, &params));
+        let rejected = rejected.count();
+        assert!((10..100).contains(&rejected), "{rejected}");
     }
 
     #[test]
-    fn what_is_hardly_believed_is_not_learned_once_there_were_some_frames() {
+    fn a_low_score_does_not_pass_after_the_warm_up() {
         let params = Preset::Robust.params();
         let learned = |score, number| passes(score, number, &params);
-        assert!(learned(0.1, UNTIL_USUAL - 1) && learned(0.7, 500));
-        assert!(!learned(0.6, UNTIL_USUAL) && !learned(0.1, 500));
+        assert!(learned(0.1, WARM_UP - 1) && learned(0.7, 500));
+        assert!(!learned(0.6, WARM_UP) && !learned(0.1, 500));
         assert!(passes(0.0, 500, &Preset::Paper.params()));
     }
 
     /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
     #[test]
-    fn what_was_lost_just_now_is_recognised_more_easily_than_what_a_wide_search_finds() {
+    fn a_narrow_search_recognises_more_easily_than_a_wide_one() {
         let params = Preset::Robust.params();
-        let update_gate = UpdateGate {
+        let gate = UpdateGate {
             mean_distance: 0.57,
         };
-        assert!(update_gate.recognizes(0.6, 1.5, &params));
-        assert!(!update_gate.recognizes(0.6, 11.0, &params));
-        assert!(update_gate.recognizes(0.55, 11.0, &params));
+        assert!(gate.recognizes(0.6, 1.5, &params));
+        assert!(!gate.recognizes(0.6, 11.0, &params));
+        assert!(gate.recognizes(0.55, 11.0, &params));
     }
 
     #[test]
-    fn a_creeping_change_is_trusted_all_along() {
+    fn a_creeping_change_passes_all_along() {
         let params = Preset::Robust.params();
-        let mut update_gate = UpdateGate::default();
-        assert!((1..200).all(|number| update_gate.judge(
-            0.2 + number as f64 * 0.003,
-            number,
-            &params
-        )));
+        let mut gate = UpdateGate::default();
+        assert!((1..200).all(|number| gate.judge(0.2 + number as f64 * 0.003, number, &params)));
     }
 }
