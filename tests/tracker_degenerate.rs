@@ -77,9 +77,10 @@ fn equal_distances_give_the_first_particle() {
 
 #[test]
 fn equal_distances_give_equal_weights() {
-    // Of two particles the first is the answer. If the next one comes from either of them with the same chance, a step of
-    // the answer is one step of the motion, or, from the other particle, the difference of that to the answer more: its
-    // variance is 1 + 2 / 2 of that of the motion. With all weight on the first it would be 1, on the second 3.
+    // Of two particles the first is the answer. If the next one comes from either of them with the same chance, a
+    // step of the answer is one step of the motion, or, from the other particle, the difference of that to the answer
+    // more: its variance is 1 + 2 / 2 of that of the motion. With all weight on the first it would be 1, on the
+    // second 3.
     let target = Rect::new(140.0, 100.0, 40.0, 40.0);
     let frames = vec![flat(320, 240, 90); 3];
     let steps = (0..600).flat_map(|seed| {

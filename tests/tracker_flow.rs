@@ -75,7 +75,8 @@ fn a_frame_given_to_two_copies_of_one_state_gives_one_answer() {
     }
 }
 
-/// Candidates are diagonalised side by side: once those that another session had left beyond a stage's own changed bits.
+/// Candidates are diagonalised side by side: once those that another session had left beyond a stage's own changed
+/// bits.
 #[test]
 fn a_printed_search_in_two_stages_does_not_depend_on_what_the_thread_saw_before() {
     let params = Params {

@@ -87,7 +87,8 @@ fn without_a_look_at_every_place_the_leaps_lose_the_target() {
     assert!(held < 45, "{held}");
 }
 
-/// The mean distance of the answers from the target's centre in the last frames of `tilting`, in pixels that are so many times as large.
+/// The mean distance of the answers from the target's centre in the last frames of `tilting`, in pixels that are so
+/// many times as large.
 fn off_when_tilted(params: Params, zoom: usize) -> f64 {
     let (first, given) = tilting(0, zoom);
     let mut tracker = Tracker::new(&first, given, params).expect("a box inside the frame");

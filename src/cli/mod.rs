@@ -1,7 +1,7 @@
 //! The commands of the program, one file each.
 //!
-//! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1 after
-//! an error that is printed as one line on standard error, or 2 from clap on wrong usage.
+//! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1
+//! after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
 mod draw;
 mod eval;

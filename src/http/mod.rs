@@ -1,7 +1,8 @@
 //! The HTTP interface: one file for each resource, and the layers that every request passes through.
 //!
-//! In: connections. Out: JSON answers, or problem documents (RFC 9457). A request goes through the layers of the router,
-//! into an extractor that reads its upload, into its handler, which works on a session with a worker thread, and back.
+//! In: connections. Out: JSON answers, or problem documents (RFC 9457). A request goes through the layers of the
+//! router, into an extractor that reads its upload, into its handler, which works on a session with a worker thread,
+//! and back.
 //!
 //! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
 //! work than there are cores; a connection breaks after a frame was taken. [`Application`] bounds the first, [`Config`]

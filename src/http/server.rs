@@ -84,9 +84,9 @@ impl Application {
         self
     }
 
-    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once. After the configured delay no connection is
-    /// accepted any more, and open requests get the configured time to end; then they are cut off. Returns whether all
-    /// of them ended in time.
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once. After the configured delay no connection
+    /// is accepted any more, and open requests get the configured time to end; then they are cut off. Returns whether
+    /// all of them ended in time.
     pub async fn serve(self, shutdown: impl Future<Output = ()>) -> bool {
         let Self {
             listener,

@@ -12,7 +12,8 @@
 //! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
 //! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
 //! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayDecision`].
-//! - A client never ends its session. It expires when it was not used for a while, by a [`Clock`] that tests can move forward.
+//! - A client never ends its session. It expires when it was not used for a while, by a [`Clock`] that tests can move
+//!   forward.
 //! - A snapshot comes back damaged or forged. It is checked as a whole: see [`SnapshotError`].
 
 mod admission;

@@ -77,8 +77,8 @@ impl State {
         }
     }
 
-    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`. Returns
-    /// the most likely one of all.
+    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`.
+    /// Returns the most likely one of all.
     pub fn weigh(
         &self,
         image: &GrayFrame,
@@ -95,7 +95,8 @@ impl State {
             .weigh(&workspace.log_priors, &self.params)
     }
 
-    /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come there.
+    /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
+    /// there.
     fn push_log_priors(
         &self,
         search: &SearchContext<'_>,

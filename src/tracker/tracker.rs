@@ -77,9 +77,9 @@ impl Tracker {
     /// The particles of the last frame, in the order in which they were drawn: the box of each, in the pixels of the
     /// uploaded frame, and its weight. Weights are at least 0 and sum to 1; the next particles are drawn by them.
     ///
-    /// After [`new`](Self::new) and [`retarget`](Self::retarget) all are at the box given, with equal weights. There are
-    /// none with [`Search::Answer`](crate::tracker::Search::Answer): then the next particles are drawn around the answer, and
-    /// the last ones are not kept.
+    /// After [`new`](Self::new) and [`retarget`](Self::retarget) all are at the box given, with equal weights. There
+    /// are none with [`Search::Answer`](crate::tracker::Search::Answer): then the next particles are drawn around the
+    /// answer, and the last ones are not kept.
     pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
         let state = &self.state;
         let boxes = state.particles.iter().map(|it| state.target_of(it));

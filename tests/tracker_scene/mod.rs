@@ -86,7 +86,8 @@ pub fn near(t: usize, (width, height): (usize, usize)) -> (GrayFrame, Rect) {
     (frame, target)
 }
 
-/// Frame `t`, 200 x 160 pixels, and the target's box in it: over hills that stay it leaps to and fro, every fifth frame.
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: over hills that stay it leaps to and fro, every fifth
+/// frame.
 pub fn leaping(t: usize) -> (GrayFrame, Rect) {
     let (hills, _) = panned(0, (0, 0));
     let [(left, top), (next_left, next_top)] = [(88, 68), (122, 46)];
@@ -126,8 +127,8 @@ pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
     (frame, first, second)
 }
 
-/// Frame `t`, 200 x 160 pixels, and the target's box in it: the target goes away, by 0.6 % a frame, while what is behind it
-/// comes nearer by as much, as a car does before a bridge.
+/// Frame `t`, 200 x 160 pixels, and the target's box in it: the target goes away, by 0.6 % a frame, while what is
+/// behind it comes nearer by as much, as a car does before a bridge.
 pub fn receding(t: usize) -> (GrayFrame, Rect) {
     let scale = (-0.006 * t as f64).exp();
     let (middle_x, middle_y) = (100.0, 80.0);
@@ -166,8 +167,9 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
     )
 }
 
-/// Frame `t` and the target's box in it: a face under dark hair tilts to one side around the neck, by two degrees a frame up to 50,
-/// stays there, and sways; behind it are hills. From afar 200 x 160 pixels, from near (`zoom` 3) 320 x 240 of that three times as large.
+/// Frame `t` and the target's box in it: a face under dark hair tilts to one side around the neck, by two degrees a
+/// frame up to 50, stays there, and sways; behind it are hills. From afar 200 x 160 pixels, from near (`zoom` 3) 320
+/// x 240 of that three times as large.
 pub fn tilting(t: usize, zoom: usize) -> (GrayFrame, Rect) {
     let ((width, height), (left, top)) = match zoom {
         1 => ((200, 160), (0.0, 0.0)),
@@ -247,7 +249,8 @@ const EXTENSIONS_OFF: [(&str, Change); 15] = [
     ("no prior", |p| p.displacement_std = 0.0),
 ];
 
-/// Both presets, and `robust` with each extension switched off alone; the latter with few particles and samples, to be quick.
+/// Both presets, and `robust` with each extension switched off alone; the latter with few particles and samples, to
+/// be quick.
 pub fn variants(seed: u64) -> Vec<(&'static str, Params)> {
     let mut variants = vec![("paper", params(seed)), ("robust", robust(seed))];
     for (name, change) in EXTENSIONS_OFF {

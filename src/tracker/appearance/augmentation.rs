@@ -1,7 +1,7 @@
 //! Augmentation of the first box's image: copies rotated by some degrees either way.
 //!
-//! A subspace of one vector is a point. With two rotated copies the first subspace spans what the target looks like when
-//! it tilts, from the first frame on. The whole frame is rotated, so the rim shows what would be there.
+//! A subspace of one vector is a point. With two rotated copies the first subspace spans what the target looks like
+//! when it tilts, from the first frame on. The whole frame is rotated, so the rim shows what would be there.
 
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;

@@ -6,8 +6,8 @@
 //! (I + C / ridge)⁻¹ = I - Sᵀ (n ridge I + SSᵀ)⁻¹ S = I - (L⁻¹S)ᵀ (L⁻¹S), LLᵀ = n ridge I + SSᵀ,
 //!
 //! so that ⟨x, y⟩ = x · y - z · w with the *background coordinates* z = L⁻¹Sx and w = L⁻¹Sy: n numbers a vector. LLᵀ is
-//! small, and positive definite whatever the samples are. The difference loses digits where a vector lies in the span of
-//! the samples: with a ridge of 1, at most log₁₀ of D.
+//! small, and positive definite whatever the samples are. The difference loses digits where a vector lies in the span
+//! of the samples: with a ridge of 1, at most log₁₀ of D.
 
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::vector_ops;
@@ -83,8 +83,8 @@ impl Metric {
     }
 }
 
-/// Cholesky's factorisation of a matrix of `count` rows, of which the upper triangle is read: the upper triangle becomes
-/// Lᵀ. No pivot is less than `least` but by rounding.
+/// Cholesky's factorisation of a matrix of `count` rows, of which the upper triangle is read: the upper triangle
+/// becomes Lᵀ. No pivot is less than `least` but by rounding.
 #[inline(always)]
 fn factorize(matrix: &mut [f64], count: usize, least: f64) {
     for k in 0..count {

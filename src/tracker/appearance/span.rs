@@ -1,9 +1,10 @@
 //! An affine subspace as coefficients of the templates that it is made of.
 //!
-//! The mean and the basis of equation 1 lie in the span of a few vectors, the templates, and a single-vector candidate is
-//! compared with them by inner products only. So they are never written out under the background's metric: that metric
-//! gives the Gram matrix of the templates, whose eigenvectors give the coefficients. When the background changes, only
-//! small matrices change (see [`mahalanobis`](crate::tracker::appearance::mahalanobis) for the background coordinates).
+//! The mean and the basis of equation 1 lie in the span of a few vectors, the templates, and a single-vector
+//! candidate is compared with them by inner products only. So they are never written out under the background's
+//! metric: that metric gives the Gram matrix of the templates, whose eigenvectors give the coefficients. When the
+//! background changes, only small matrices change (see [`mahalanobis`](crate::tracker::appearance::mahalanobis) for
+//! the background coordinates).
 
 use pulp::{Arch, Simd};
 

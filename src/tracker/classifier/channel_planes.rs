@@ -74,8 +74,8 @@ impl ChannelPlanes {
         &self.lines[(row * PLANES + channel) * self.stride + first..][..self.stride - first]
     }
 
-    /// For the windows of `height` rows from (`first`, `row`) on, a lane each, the sums of the energies of the directions,
-    /// of the gray values and of their squares.
+    /// For the windows of `height` rows from (`first`, `row`) on, a lane each, the sums of the energies of the
+    /// directions, of the gray values and of their squares.
     #[inline(always)]
     pub fn boxes<S: Simd>(
         &self,

@@ -7,8 +7,8 @@
 //!
 //! w ← argmin  mean (w · uᵢ - yᵢ)² + damping · ‖w - w_before‖²
 //!
-//! So no sample is kept, and one frame changes w only so far. A few steps of conjugate gradients are enough: the damping
-//! makes the problem well conditioned. The unit vectors are never written out ([`TrainingSamples`]).
+//! So no sample is kept, and one frame changes w only so far. A few steps of conjugate gradients are enough: the
+//! damping makes the problem well conditioned. The unit vectors are never written out ([`TrainingSamples`]).
 
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};

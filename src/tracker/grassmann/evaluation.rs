@@ -7,7 +7,8 @@ use crate::tracker::grassmann::inner_products::InnerProducts;
 use crate::tracker::params::table::Params;
 use crate::tracker::weights::likelihood::{self, Likelihoods};
 
-/// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](crate::tracker::tracker::Tracker::step) does it.
+/// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](crate::tracker::tracker::Tracker::step)
+/// does it.
 ///
 /// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
 /// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.

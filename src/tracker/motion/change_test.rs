@@ -43,8 +43,8 @@ impl ChangeTest {
             .reserve(self.image.pixels.len() + self.image.width());
     }
 
-    /// Compares the small image with the last one, `radius` working pixels around the box of `displaced`, which is where
-    /// the last box would be had it moved with the image.
+    /// Compares the small image with the last one, `radius` working pixels around the box of `displaced`, which is
+    /// where the last box would be had it moved with the image.
     pub fn compare(
         &mut self,
         last: &LastSeen,

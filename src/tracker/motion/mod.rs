@@ -6,8 +6,8 @@
 //! - `search`: the search around the last answer: how wide, how many particles, the prior on the displacement.
 //! - `proposal`: draws around the last answer and, in a second round, around the best of the first.
 //! - `global_motion`: the displacement of the whole image between two frames.
-//! - `change_test`: whether anything has come to a place since the target was last seen. `last_seen` is the frame that it
-//!   compares with, `joint_integral` its sums.
+//! - `change_test`: whether anything has come to a place since the target was last seen. `last_seen` is the frame
+//!   that it compares with, `joint_integral` its sums.
 //! - `orientation`: the target's in-plane rotation.
 //!
 //! In: the last particles and weights, or the last answer; the frame. Out: particles, log-priors (natural logarithms,
