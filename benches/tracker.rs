@@ -1,9 +1,9 @@
-//! What a frame costs at preset `paper`, on one thread: `cargo bench --bench tracker`.
+//! Time of a frame at preset `paper`, on one thread: `cargo bench --bench tracker`.
 //!
 //! - `step`: the whole of `Tracker::step` on 320 x 240 frames of a textured target that moves over a texture.
 //! - `evaluation`: its part from feature vectors to weights, with a full bag and a full history.
 //! - `textbook`: the same part as the equations are printed, a decomposition for each candidate.
-//! - `product`: one bare double-precision product of N x D by D x 48, what the evaluation cannot do without.
+//! - `product`: one bare double-precision product of N x D by D x 48, which every evaluation needs.
 //! - `downscale`: the working image of a 1920 x 1080 upload.
 
 use std::hint::black_box;

@@ -1,5 +1,5 @@
-//! Timing on a machine that others use too: things that are compared take turns, the median counts, and time is that
-//! of the thread on its processor, without that in which others had it.
+//! Timing on a shared machine: compared actions take turns, the median is reported, and time is the thread's processor
+//! time, which excludes other processes.
 
 use rustix::time::{ClockId, Timespec, clock_gettime};
 

@@ -1,4 +1,4 @@
-//! What the benchmarks look at: a textured target that moves on a circle over a texture.
+//! The scene of the benchmarks: a textured target that moves on a circle over a texture.
 
 #![allow(dead_code)] // Each benchmark uses its part.
 
@@ -45,8 +45,8 @@ pub fn luma(t: usize, zoom: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Gray values of a picture of any size without the target: as much detail for each pixel in a large one as in a small
-/// one.
+/// Gray values of a picture of any size without the target, with the same detail per pixel at every
+/// size.
 pub fn wall(width: usize, height: usize) -> Vec<u8> {
     (0..width * height)
         .map(|i| texture(i % width, i / width, 1))

@@ -48,7 +48,7 @@ fn panel(row: &Row, area: &style::Area<'_>) -> Result<(), Box<dyn std::error::Er
     let (left, right) = (row.sizes[0], row.sizes[row.sizes.len() - 1]);
     let least = micros.iter().copied().fold(f64::INFINITY, f64::min);
     let most = micros.iter().copied().fold(0.0, f64::max);
-    // At least a decade: what is nearly constant should look so.
+    // At least a decade, so that nearly constant times look constant.
     let middle = (least * most).sqrt();
     let (bottom, top) = (
         (least / 1.3).min(middle / 10_f64.sqrt()),

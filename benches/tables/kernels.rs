@@ -26,7 +26,7 @@ mod gemm;
 mod jacobi;
 
 const ROUNDS: usize = 300;
-/// Calls that are timed together: the clock's own time does not count then.
+/// Calls per timing, so that the cost of reading the clock is negligible.
 const REPEATS: usize = 20;
 
 /// Prints the table.

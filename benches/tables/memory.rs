@@ -1,4 +1,4 @@
-//! What live sessions cost.
+//! Resident memory of live trackers.
 
 use bagtrack::tracker::{Preset, Tracker};
 
@@ -12,8 +12,8 @@ fn resident() -> u64 {
     kib.unwrap_or(0) * 1024
 }
 
-/// Prints the resident memory of up to `count` trackers with full bags, all of one preset: what another preset has
-/// freed would count as free.
+/// Prints the resident memory of up to `count` trackers with full bags, all of one preset. Memory
+/// freed by another preset would be reused and not counted.
 pub fn print(preset: Preset, count: usize) {
     println!("| live | resident MiB | KiB each |");
     println!("|---|---|---|");

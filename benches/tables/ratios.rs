@@ -1,4 +1,4 @@
-//! A step against what it is measured by.
+//! The time of a step compared with the textbook version and with one bare matrix product.
 
 use std::hint::black_box;
 
@@ -70,7 +70,7 @@ pub fn print() {
     let [step, robust_step, evaluation, product, product_double] = times[..] else {
         unreachable!("one time for each action")
     };
-    // By itself: it would leave nothing in the caches for the next in turn.
+    // Timed alone: in turns it would evict the others' data from the caches.
     let textbook = clock::medians(
         ROUNDS / 4,
         vec![Box::new(|| {
@@ -112,8 +112,8 @@ pub fn print() {
     line("the textbook version of the same", textbook, note);
 }
 
-/// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and how that compares. By itself:
-/// so many particles would empty the others' caches.
+/// Seconds of a step of `robust` while the target is out of sight, in a drawn clip; and the ratio. Timed
+/// alone, because so many particles would evict the others' data from the caches.
 fn out_of_sight(held: f64) -> (f64, String) {
     let settings = Settings {
         scene: Scene::Leaves,
@@ -133,7 +133,7 @@ fn out_of_sight(held: f64) -> (f64, String) {
     }
     let hidden = (index..clip.frames()).take_while(|&index| clip.visible(index) == 0.0);
     let hidden: Vec<GrayFrame> = hidden.map(frame).collect();
-    // Over and over: the search has become as wide as it gets.
+    // Twice through the hidden frames, so that the search reaches its full width.
     for frame in hidden.iter().chain(&hidden) {
         tracker.step(frame).expect("frames of one size");
     }

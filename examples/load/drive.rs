@@ -14,7 +14,7 @@ use crate::Outcome;
 /// A failure that can pass between tasks.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// What runs came to.
+/// The results of the runs.
 pub struct Done {
     /// Of each frame that was answered, in microseconds; in an open loop from when the frame was due.
     pub latencies: Histogram<u64>,
@@ -87,7 +87,7 @@ impl Driver {
 pub struct Clients(Vec<ClientSession>);
 
 impl Clients {
-    /// Sends `frames` frames over all sessions and adds what comes of it to `done`. With a `rate`, that many frames
+    /// Sends `frames` frames over all sessions and adds the results to `done`. With a `rate`, that many frames
     /// fall due a second; otherwise each session sends its next when the last is answered. Stops after `limit`.
     pub async fn run(
         &mut self,

@@ -1,4 +1,4 @@
-//! What the service is held against: decoding and tracking in this process, one thread, nothing else.
+//! The baseline of the service: decoding and tracking in this process, on one thread.
 
 use bagtrack::ingest::{self, Limits};
 use bagtrack::tracker::{Preset, Rect, Tracker};

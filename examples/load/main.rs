@@ -4,10 +4,10 @@
 //! - the processor time of decoding and tracking a frame in this process, one thread: of one session over and over,
 //!   all of whose data stays in the caches, and of as many sessions as are measured, in turns;
 //! - what one session and what many can get through when each sends its next frame as soon as the last is answered;
-//! - open loop: frames are due at fixed times whatever became of the frames before, and latency counts from when a
+//! - open loop: frames are due at fixed times, however late earlier answers are, and latency counts from when a
 //!   frame was due, so a stall is not hidden by sending less (percentiles from an HDR histogram);
-//! - the processor time of the server process for a frame against that of decoding and tracking. A machine that others
-//!   use is now fast and now slow, so a measurement has parts, and the two are measured in turns.
+//! - the processor time of the server process for a frame against that of decoding and tracking. The speed of a
+//!   shared machine varies, so a measurement has parts, and the two are measured in turns.
 //!
 //! With `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
 //!
@@ -118,7 +118,7 @@ struct Load {
 }
 
 impl Load {
-    /// Prints what `sessions` sessions come to; returns how many frames they get through in a second.
+    /// Measures `sessions` sessions and prints the results; returns how many frames they get through in a second.
     fn measure(&mut self, name: &str, sessions: u32, rate: Option<f64>) -> Outcome<f64> {
         let mut done = Done::new()?;
         let (mut alone, mut in_turns) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! What live sessions cost the server: resident memory with more and more of them, all with full bags.
+//! Resident memory of the server against the number of live sessions, all with full bags.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -12,7 +12,7 @@ use crate::Outcome;
 use crate::drive::{Driver, Failure};
 use crate::process::Server;
 
-/// Where memory is read; also at the end.
+/// Numbers of sessions at which memory is read, besides the last.
 const MARKS: [u32; 4] = [1000, 2000, 5000, 10_000];
 
 /// Requests at the same time.
@@ -20,8 +20,8 @@ const CLIENTS: usize = 16;
 
 /// Opens `sessions` sessions, sends each enough frames to fill its bag, and prints the table.
 ///
-/// The bag takes an entry from every frame (`update_every` = 1), not from every fifth: it is as large when it is full,
-/// a fifth of the frames fill it.
+/// The bag takes an entry from every frame (`update_every` = 1), not from every fifth. A full bag has
+/// the same size, and a fifth of the frames fill it.
 pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u32) -> Outcome<()> {
     let params = preset.params();
     let fill = Arc::new(Fill {
@@ -29,10 +29,10 @@ pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u
         create: format!("{}&params=%7B%22update_every%22%3A1%7D", driver.create),
         url: driver.url.clone(),
         pictures: driver.pictures.clone(),
-        // Twice as many as the bag and the history need: `robust` learns nothing from frames that it does not trust.
+        // Twice as many as the bag and the history need: `robust` skips frames that fail its update gate.
         frames: 2 * (params.bag_size + params.history),
     });
-    // What the first requests leave behind is no part of a session.
+    // One session first, so that memory allocated once by the first requests is not counted.
     fill.one().await.map_err(|failure| failure.to_string())?;
     let before = server.resident()?;
     println!("server: {} MiB resident with one session", before >> 20);

@@ -1,7 +1,6 @@
-//! The ablation as data: what the tracker is without each of its extensions, one row each.
+//! The ablation: a table with one row for each extension that is switched off or parameter that is changed.
 //!
-//! A row that sets nothing that the evaluated preset has not set already is not run again: it has the figures of the
-//! first row.
+//! A row whose settings equal those of the evaluated preset is not run again: it repeats the figures of the first row.
 
 use super::variant::{Variant, parse_assignment};
 

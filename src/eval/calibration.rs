@@ -1,4 +1,4 @@
-//! How well the score tells hits from misses, and how well it is a chance.
+//! How well the score separates hits from misses, and how well it is calibrated as a probability of a hit.
 //!
 //! An *outcome* is one scored frame of one run: the score that the tracker gave with its box, and whether the box was
 //! a *hit*, that is, overlapped the annotated one by at least [`HIT_OVERLAP`](super::HIT_OVERLAP). Frames without an
@@ -6,23 +6,22 @@
 //! the pooled frames of all videos and seeds, so a long video weighs more than a short one.
 //!
 //! - [`roc_auc`], the *area under the ROC curve*: the chance that a hit taken at random has a higher score than a miss
-//!   taken at random, where equal scores count half (the Mann-Whitney statistic). 0.5 is a score that says nothing,
-//!   1 one that separates the two. It sees only the order of the scores.
+//!   taken at random, where equal scores count half (the Mann-Whitney statistic). 0.5 is no better than
+//!   chance, 1 separates the two. It depends only on the order of the scores.
 //! - [`calibration_error`], the *expected calibration error*: the outcomes are sorted into [`BINS`] bins of equal
-//!   width, [0, 0.1), [0.1, 0.2) … [0.9, 1]; in each the mean score is held against the share of hits, and the
-//!   absolute differences are averaged, each bin weighted by its number of outcomes. 0 is a score that is the chance
-//!   it claims.
+//!   width, [0, 0.1), [0.1, 0.2) … [0.9, 1]; in each the mean score is compared with the share of hits, and the
+//!   absolute differences are averaged, each bin weighted by its number of outcomes. 0 is a calibrated score.
 //! - [`calibration_error_leave_one_out`], the same *leaving one video out*: for each video in turn an [isotonic
 //!   regression](Isotonic) of hit on score is fitted to the outcomes of all the *other* videos (all seeds); its value
 //!   at each score of the left-out video takes the score's place; then the calibration error is that of all videos'
-//!   outcomes pooled, with those chances as scores. It tells what a map from score to chance that is learnt from some
-//!   videos is worth on one that it has never seen; the score as it is served takes no part in it but by its order. A
-//!   video's own seeds are never split between fitting and judging.
+//!   outcomes pooled, with those chances as scores. It measures how well a map from score to probability, learnt on
+//!   some videos, holds on an unseen one; of the served score only the order matters. The seeds of one video are never
+//!   split between fitting and evaluation.
 //!
-//! What could go wrong: calibration alone is no proof of a good score. A constant that is the share of hits is
-//! calibrated, and within a bin a video that is claimed too high makes up for one that is claimed too low; so the
-//! figures are to be read together with the area under the ROC curve. With hits only or misses only there is no ROC
-//! curve, and with one video none to learn from. Those figures are None then, never a number that means nothing.
+//! What can go wrong: calibration alone does not make a good score. A constant equal to the share of hits is
+//! calibrated, and within a bin a video with too high scores offsets one with too low scores. So read the figures
+//! together with the area under the ROC curve. With only hits or only misses there is no ROC curve, and with one video
+//! there is no other to learn from; those figures are then None.
 
 use super::isotonic::Isotonic;
 use super::outcome::Outcome;

@@ -1,6 +1,6 @@
 //! The frames of a folder, in order.
 
-use super::SequenceError;
+use super::sequence_error::SequenceError;
 use std::cmp::Ordering;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
-//! What the centre errors (pixels of the uploaded frames) and the overlaps of a sequence come to: the measures of
+//! Summary measures of centre errors (pixels of the uploaded frames) and overlaps of a sequence, as defined by
 //! Wu, Lim and Yang, *Online Object Tracking: A Benchmark*, 2013.
 
-/// The radius, in pixels, at which precision is told.
+/// The radius, in pixels, of the reported precision.
 pub const PRECISION_RADIUS: f64 = 20.0;
 
 /// The share of centre errors that are at most `radius` pixels, 0 to 1.

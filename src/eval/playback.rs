@@ -1,8 +1,8 @@
 //! The way a run plays a sequence: from which frame on, and in which direction.
 //!
-//! The same pictures played backwards, or from the middle on, are further videos: other first looks, other changes to
-//! follow. What could go wrong: a run that starts where nobody drew a box has nothing to begin with; so it starts at
-//! the first frame from there on that is annotated, and a sequence that has none is refused.
+//! The same frames played backwards, or from the middle on, serve as further videos: the first image and the changes
+//! differ. What can go wrong: a run needs a box to start from. So it starts at the first annotated frame at or after
+//! the chosen one, and a sequence without such a frame is refused.
 
 use crate::tracker::Rect;
 use serde::Serialize;

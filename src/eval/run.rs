@@ -22,12 +22,12 @@ pub enum EvalError {
         /// What the tracker says.
         source: TrackerError,
     },
-    /// There is nothing to measure: the box of the first frame is given, those of others are held against.
+    /// The first frame, or every frame after it, has no annotation: there is nothing to start from or to measure.
     #[error("{0}: the first frame that is played and at least one more must be annotated")]
     NothingToScore(String),
 }
 
-/// An annotated frame of a run, held against its annotation.
+/// An annotated frame of a run, compared with its annotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoredFrame {
     /// Index of the frame in the order in which they are played, from 0; at least 1, for the first is given.
@@ -38,13 +38,13 @@ pub struct ScoredFrame {
     pub overlap: f64,
     /// The tracker's score, 0 to 1.
     pub score: f64,
-    /// What the score means.
+    /// The tracker's status in this frame.
     pub status: Status,
-    /// What it is made of.
+    /// The predictors from which the score is computed.
     pub evidence: Option<Evidence>,
 }
 
-/// What one seed gave.
+/// The result of one seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeedRun {
     /// The annotated frames after the first, in order; at least one.
@@ -53,7 +53,7 @@ pub struct SeedRun {
     pub step_ms: f64,
 }
 
-/// What all seeds gave on one sequence.
+/// The results of all seeds on one sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SequenceRuns {
     /// Name of the sequence.
@@ -121,8 +121,8 @@ impl SeedRun {
     }
 }
 
-/// Tracks through a sequence with the seeds 0 to `seeds` − 1, on `jobs` threads. Times are honest with one job only:
-/// threads share the machine.
+/// Tracks through a sequence with the seeds 0 to `seeds` − 1, on `jobs` threads. Times are reliable with
+/// one job only, because parallel jobs compete for the processor.
 ///
 /// # Errors
 /// See [`EvalError`]; of several, that of the lowest seed.

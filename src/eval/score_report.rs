@@ -12,10 +12,10 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreFitError {
-    /// The score is no logistic function then.
+    /// The score is not a logistic function with these parameters.
     #[error("there is no score to fit without a discriminant: discriminant_weight must be above 0")]
     NoDiscriminant,
-    /// Nothing tells hits from misses then.
+    /// There are only hits or only misses, so a fit cannot separate them.
     #[error(
         "there is nothing to fit: the scored frames must be hits (overlap >= 0.5) and misses, not one kind alone"
     )]

@@ -1,27 +1,12 @@
 //! A sequence in the OTB layout: `img/` with the frames and `groundtruth_rect.txt` with a box a line.
 
-use super::{Playback, frames};
+use super::frames;
+use super::playback::Playback;
+use super::sequence_error::SequenceError;
 use crate::ingest::{self, Limits};
 use crate::tracker::{GrayFrame, Rect};
 use std::fs;
-use std::path::{Path, PathBuf};
-
-/// A sequence cannot be used; the text is one line and names the folder.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: {reason}", dir.display())]
-pub struct SequenceError {
-    dir: PathBuf,
-    reason: String,
-}
-
-impl SequenceError {
-    pub(super) fn new(dir: &Path, reason: impl Into<String>) -> Self {
-        Self {
-            dir: dir.to_owned(),
-            reason: reason.into(),
-        }
-    }
-}
+use std::path::Path;
 
 /// Frames with the boxes that people drew on them, in the order in which they are played.
 #[derive(Debug, Clone)]

@@ -1,8 +1,8 @@
 //! A frame: the wall, the card, the board, each averaged over the area of a pixel; then light and sensor noise.
 
-use super::Settings;
-use super::scene::Course;
+use super::settings::Settings;
 use super::texture::{self, Color};
+use super::timeline::Timeline;
 use crate::tracker::Rect;
 use image::{Rgb, RgbImage};
 use rand::SeedableRng;
@@ -45,22 +45,22 @@ fn unit(settings: Settings) -> f64 {
 
 pub(super) fn frame(
     settings: Settings,
-    course: &Course,
+    timeline: &Timeline,
     background: &Background,
     index: u32,
 ) -> RgbImage {
     let mut pixels = background.pixels.clone();
     let (seed, unit) = (settings.seed, unit(settings));
-    let card = course.target(index);
+    let card = timeline.target(index);
     lay(&mut pixels, settings, card, |x, y| {
         texture::card((x - card.x) / card.width, (y - card.y) / card.height, seed)
     });
-    if let Some(board) = course.board(index) {
+    if let Some(board) = timeline.board(index) {
         lay(&mut pixels, settings, board, |x, y| {
             texture::board((x - board.x) / unit, (y - board.y) / unit, seed)
         });
     }
-    let light = 255.0 * course.light(index);
+    let light = 255.0 * timeline.light(index);
     // One stream of noise a frame, so that any frame can be drawn by itself.
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(u64::from(index) + 1);

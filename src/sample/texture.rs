@@ -1,7 +1,7 @@
 //! The surfaces of the clip, as functions of a point: they can be sampled anywhere, so motion by a fraction of
 //! a pixel is exact.
 
-use super::scene::smooth;
+use super::smoothstep::smoothstep;
 
 /// Red, green and blue, 0 to 1.
 pub(super) type Color = [f64; 3];
@@ -12,20 +12,28 @@ pub(super) fn card(u: f64, v: f64, seed: u64) -> Color {
     let mut color = mix([0.96, 0.72, 0.26], [0.86, 0.33, 0.20], v + grain);
     // A sun of rings, stripes under it, two dark dots: edges in all directions, at more than one scale.
     let from_sun = ((u - 0.5) / 0.8).hypot((v - 0.36) * 1.1);
-    let ring = smooth(0.5 + 6.0 * (from_sun * 25.0).cos() / 6.0);
+    let ring = smoothstep(0.5 + 6.0 * (from_sun * 25.0).cos() / 6.0);
     if from_sun < 0.38 {
         color = mix([0.99, 0.93, 0.70], [0.62, 0.14, 0.16], ring);
     }
     for dot_x in [0.2, 0.8] {
         let from_dot = ((u - dot_x) / 0.8).hypot(v - 0.72);
-        color = mix(color, [0.16, 0.13, 0.22], smooth((0.085 - from_dot) / 0.02));
+        color = mix(
+            color,
+            [0.16, 0.13, 0.22],
+            smoothstep((0.085 - from_dot) / 0.02),
+        );
     }
     if v > 0.82 {
-        let stripe = smooth(0.5 + 2.0 * ((u * 2.0 + v) * 22.0).sin());
+        let stripe = smoothstep(0.5 + 2.0 * ((u * 2.0 + v) * 22.0).sin());
         color = mix(color, [0.20, 0.22, 0.42], stripe);
     }
     let to_edge = u.min(1.0 - u).min(v).min(1.0 - v);
-    mix([0.98, 0.95, 0.88], color, smooth((to_edge - 0.03) / 0.02))
+    mix(
+        [0.98, 0.95, 0.88],
+        color,
+        smoothstep((to_edge - 0.03) / 0.02),
+    )
 }
 
 /// The wall behind, at a point in units of the frame's shorter side.
@@ -37,7 +45,7 @@ pub(super) fn wall(x: f64, y: f64, seed: u64) -> Color {
         [0.56, 0.62, 0.52],
         broad * 0.75 + fine * 0.35,
     );
-    // Patches of the card's own kind of pattern, in colder colours, on a loose grid.
+    // Distractors: patches with rings like the card's, in colder colours, one at most in each cell of a grid.
     let (column, row) = ((x / 0.42).floor(), (y / 0.42).floor());
     let chance = |salt: u64| hash(column as i64, row as i64, seed ^ salt);
     let (u, v) = (x / 0.42 - column, y / 0.42 - row);
@@ -47,9 +55,9 @@ pub(super) fn wall(x: f64, y: f64, seed: u64) -> Color {
     if chance(14) < 0.35 {
         return color;
     }
-    let ring = smooth(0.5 + (away * (45.0 + 25.0 * chance(15))).cos());
+    let ring = smoothstep(0.5 + (away * (45.0 + 25.0 * chance(15))).cos());
     let patch = mix([0.78, 0.80, 0.70], [0.24, 0.30, 0.44], ring);
-    mix(color, patch, 0.8 * smooth((radius - away) / 0.03))
+    mix(color, patch, 0.8 * smoothstep((radius - away) / 0.03))
 }
 
 /// The board that covers the card, at a point in units of the frame's shorter side from its own corner.
@@ -83,7 +91,7 @@ fn layers(x: f64, y: f64, seed: u64, octaves: u32) -> f64 {
 /// Value noise: random values on the whole-numbered grid, smoothly interpolated; 0 to 1.
 fn noise(x: f64, y: f64, seed: u64) -> f64 {
     let (column, row) = (x.floor(), y.floor());
-    let (across, down) = (smooth(x - column), smooth(y - row));
+    let (across, down) = (smoothstep(x - column), smoothstep(y - row));
     let at = |right: i64, below: i64| hash(column as i64 + right, row as i64 + below, seed);
     let upper = at(0, 0) + (at(1, 0) - at(0, 0)) * across;
     let lower = at(0, 1) + (at(1, 1) - at(0, 1)) * across;

@@ -1,6 +1,7 @@
 //! The precision plot and the success plot: shares of frames by a threshold, means over seeds and sequences.
 
-use super::Evaluated;
+use super::count::count;
+use super::evaluated::Evaluated;
 use super::style::{self, Drawn, Labels, Plane};
 use crate::eval::measures::{self, PRECISION_RADIUS, mean};
 use crate::eval::run::{ScoredFrame, SequenceRuns};
@@ -77,7 +78,7 @@ fn draw(
     curve: impl Fn(&[SequenceRuns]) -> Vec<(f64, f64)>,
 ) -> Drawn {
     style::figure(labels, plane, |chart| {
-        // The first, which the others are held against, on top.
+        // The first variant is the reference, so it is drawn last, on top.
         for (index, variant) in evaluated.iter().enumerate().rev() {
             style::line(chart, index, curve(&variant.runs))?;
         }
@@ -120,11 +121,6 @@ fn title(what: &str, evaluated: &[Evaluated]) -> String {
         count(runs.len(), "sequence"),
         count(seeds, "seed")
     )
-}
-
-/// "1 seed", "2 seeds".
-pub(super) fn count(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

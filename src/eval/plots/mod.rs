@@ -1,15 +1,21 @@
 //! Figures, drawn as SVG: the precision plot and the success plot of the benchmark (Wu, Lim and Yang 2013), with a
 //! curve for each evaluated variant, and the centre error over time, one figure a sequence.
 //!
-//! Text is set by whoever shows the picture, in its own sans-serif font: no font is read here, and labels stand where
-//! their width does not matter. What could go wrong: names that are no file names; so everything that is not a
-//! letter, a digit, `-`, `_` or `.` becomes `_`, and a name that is there twice gets a number.
+//! In: the [`Evaluated`] variants. Out: SVG files in a folder. No font is read: the viewer sets the text in its own
+//! sans-serif font, and labels stand where their width does not matter.
+//!
+//! What can go wrong ([`PlotError`]): the folder or a file in it cannot be written. A sequence's name may not be a
+//! valid file name: every character except letters, digits, `-`, `_` and `.` becomes `_`, and a repeated name gets a
+//! number.
 
+mod count;
 mod curves;
+mod evaluated;
 mod over_time;
 mod style;
 
-use super::run::SequenceRuns;
+pub use evaluated::Evaluated;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -19,15 +25,6 @@ use std::path::{Path, PathBuf};
 pub struct PlotError {
     path: PathBuf,
     reason: String,
-}
-
-/// The runs of one variant on all sequences.
-#[derive(Debug, Clone)]
-pub struct Evaluated {
-    /// What the legend calls it.
-    pub label: String,
-    /// Its runs; all variants have the same sequences in the same order.
-    pub runs: Vec<SequenceRuns>,
 }
 
 /// Makes the folder for the figures, or takes the one that is there.

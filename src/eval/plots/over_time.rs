@@ -1,16 +1,16 @@
 //! The centre error over time: for each frame the median over the seeds, and for the first variant a band from the
 //! best seed to the worst.
 
-use super::Evaluated;
-use super::curves::count;
+use super::count::count;
+use super::evaluated::Evaluated;
 use super::style::{self, Drawn, Labels, Plane};
 use crate::eval::measures::PRECISION_RADIUS;
 use crate::eval::run::SequenceRuns;
 use plotters::prelude::*;
 
-/// As many variants as can be told apart.
+/// The largest number of variants that a reader can tell apart in one figure.
 const MOST: usize = 3;
-/// Annotated frames further apart than this are not joined: nothing is known of what is between.
+/// Annotated frames further apart than this are not joined by a line: the error between them is unknown.
 const LONGEST_GAP: f64 = 10.0;
 /// The least height of the plane in pixels of error: small errors should look small.
 const LEAST_HEIGHT: f64 = 40.0;
@@ -63,7 +63,7 @@ pub(super) fn figure(evaluated: &[Evaluated], index: usize) -> Drawn {
         marks: (12, 7),
     };
     style::figure(&labels, &plane, |chart| {
-        // Up to here a frame counts for precision.
+        // The error below which a frame counts as precise.
         let limit = [(0.0, PRECISION_RADIUS), (last as f64, PRECISION_RADIUS)];
         chart.draw_series(DashedLineSeries::new(limit, 3, 4, BLACK.mix(0.45).into()))?;
         for (curve, spread) in spreads.iter().enumerate().rev() {

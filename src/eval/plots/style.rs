@@ -48,7 +48,7 @@ pub(super) struct Plane {
     pub y: f64,
     /// Digits behind the point of the numbers along the axes.
     pub digits: (usize, usize),
-    /// Number of marks along the axes, about.
+    /// Approximate number of marks along each axis (x, y).
     pub marks: (usize, usize),
 }
 
@@ -56,7 +56,7 @@ pub(super) fn color(curve: usize) -> RGBColor {
     COLORS[curve % COLORS.len()]
 }
 
-/// Whether a curve is dashed: those for which the colours come a second time.
+/// Whether a curve is dashed: in every second pass through the colours.
 pub(super) fn dashed(curve: usize) -> bool {
     curve / COLORS.len() % 2 == 1
 }

@@ -1,6 +1,7 @@
 //! The card leaves at the right edge of the frame, and comes back there.
 
-use super::{Course, smooth};
+use super::course::Course;
+use crate::sample::smoothstep::smoothstep;
 use crate::tracker::Rect;
 use std::f64::consts::{PI, TAU};
 
@@ -20,10 +21,10 @@ pub(super) fn target(course: &Course, index: u32) -> Rect {
     let ((frame_width, frame_height), (width, height)) = (course.size(), course.card(index));
     let frames_past_middle = course.frames_past_middle(index);
     let bend = |frames: f64| (PI * (frames / WAY).clamp(-0.5, 0.5)).cos();
-    // The left edge is on the frame's edge half a frame before the first frame without it and half one after the last.
+    // The card's left edge crosses the frame's edge AWAY / 2 frames before and after the middle.
     let edge = bend(AWAY / 2.0);
     let x = frame_width * (1.0 + (1.0 - START) * (bend(frames_past_middle) - edge) / edge);
-    let climbed = smooth(0.5 + frames_past_middle / CLIMB);
+    let climbed = smoothstep(0.5 + frames_past_middle / CLIMB);
     let (upper, lower) = (0.28, 0.72);
     let level = if course.phase.1 < 0.5 {
         upper + (lower - upper) * climbed

@@ -1,6 +1,7 @@
 //! The default scene: turns, a dim spell, and a board that comes up from below and covers half of the card.
 
-use super::{Course, spell};
+use super::course::Course;
+use crate::sample::smoothstep::smoothstep;
 use crate::tracker::Rect;
 use std::f64::consts::TAU;
 
@@ -41,4 +42,9 @@ pub(super) fn board(course: &Course, index: u32) -> Option<Rect> {
         width: 1.7 * card.width,
         height: course.size().1 - y,
     })
+}
+
+/// 1 inside the span and 0 outside it, with a smooth rise and fall of length `edge` inside its ends.
+fn spell(at: f64, (from, to): (f64, f64), edge: f64) -> f64 {
+    smoothstep((at - from) / edge) * smoothstep((to - at) / edge)
 }

@@ -1,6 +1,6 @@
 //! The card passes behind a post, from left to right.
 
-use super::Course;
+use super::course::Course;
 use crate::tracker::Rect;
 use std::f64::consts::{PI, TAU};
 
@@ -23,8 +23,9 @@ pub(super) fn target(course: &Course, index: u32) -> Rect {
     )
 }
 
-/// The post is just so broad that it hides the card in the frames in the middle, and in no others: each edge is half
-/// way between the card's edges in the last frame of one kind and the first of the other.
+/// The post, which hides the whole card in the [`HIDDEN`] frames in the middle and in no others. Its left edge lies
+/// half way between the card's left edges in the last frame before them and in the first of them, its right edge half
+/// way between the card's right edges in the last of them and in the first frame after them.
 pub(super) fn post(course: &Course) -> Rect {
     let first = course.settings.frames / 2 - HIDDEN / 2;
     let after = first + HIDDEN;

@@ -1,0 +1,27 @@
+//! Why a clip is refused.
+
+use std::path::PathBuf;
+
+/// Why a clip cannot be drawn or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SampleError {
+    /// There are too few frames, or a side is out of its range.
+    #[error("{name} is {value}; it must be {expected}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// The value given.
+        value: u32,
+        /// The range it must be in.
+        expected: String,
+    },
+    /// The folder or a file in it cannot be written.
+    #[error("{}: {reason}", path.display())]
+    Write {
+        /// What was being written.
+        path: PathBuf,
+        /// What went wrong.
+        reason: String,
+    },
+}
