@@ -1,9 +1,8 @@
 //! (D) The printed comparison (section III-D): how far each candidate's affine subspace is from each entry of the bag.
 //!
-//! A candidate is a feature vector v of D gray values in \[0, 1\]. With the P previous patches H it makes the D × (P
-//! + 1) matrix V = [v, H] (equation 2). V is never decomposed. With the eigenpairs (S², W) of its Gram matrix VᵀV,
-//! which has P + 1 rows, the candidate's basis is U = V W S⁻¹, so all that the distances need is made of inner
-//! products:
+//! A candidate is a feature vector v of D gray values in \[0, 1\]. With the P previous patches H it makes the
+//! D × (P + 1) matrix V = [v, H] (equation 2). V is never decomposed: its Gram matrix VᵀV, of P + 1 rows, has the
+//! eigenpairs (S², W), and the candidate's basis is U = V W S⁻¹. So all that the distances need is inner products:
 //!
 //! | step | what it makes | equation | file |
 //! |---|---|---|---|
