@@ -1,7 +1,7 @@
 //! Principal angles from their cosines, several at a time.
 //!
-//! Equation 8 needs θ², and cos²θ is known. `acos` of its root loses half of the digits near θ = 0, where most angles are,
-//! and is a call for each of some thousand angles a frame; this polynomial compiles to vector instructions.
+//! Equation 8 needs θ², and cos²θ is known. `acos` of its root loses half of the digits near θ = 0, where most angles
+//! are, and is a call for each of some thousand angles a frame; this polynomial compiles to vector instructions.
 //!
 //! Own code: no crate vectorises it for the machine it runs on, and `acos` takes 4.5 times as long
 //! (`cargo bench --bench tables -- kernels`, AVX-512).

@@ -28,8 +28,8 @@ const TAYLOR: [f64; 13] = [
     1.0,
 ];
 
-/// Replaces each of `values`, none above 700, by its exponential, to a few parts in 10^16. Inlined, so that it is compiled for
-/// the vector instructions of its caller.
+/// Replaces each of `values`, none above 700, by its exponential, to a few parts in 10^16. Inlined, so that it is
+/// compiled for the vector instructions of its caller.
 #[inline(always)]
 pub(crate) fn exp(values: &mut [f64]) {
     let (groups, rest) = values.as_chunks_mut::<16>();

@@ -1,8 +1,9 @@
 //! Eigenvalues and eigenvectors of a small symmetric matrix, by cyclic Jacobi rotations: the method with the smallest
 //! relative errors on positive semidefinite matrices, and one that always ends.
 //!
-//! Own code: nalgebra's decomposition of a matrix of any size allocates on each call, which a step must not. It takes 1.6
-//! times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a microsecond.
+//! Own code: nalgebra's decomposition of a matrix of any size allocates on each call, which a step must not. It takes
+//! 1.6 times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a
+//! microsecond.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,13 +1,14 @@
-//! The scale filter of Danelljan, Häger, Khan and Felsberg, *Accurate Scale Estimation for Robust Visual Tracking*, 2014.
+//! The scale filter of Danelljan, Häger, Khan and Felsberg, *Accurate Scale Estimation for Robust Visual Tracking*,
+//! 2014.
 //!
-//! Particles estimate the scale poorly: areas a few percent larger or smaller look nearly alike, and their rim shows the
-//! background, which grows as the camera approaches whatever the target does. A correlation filter along the scale, over
-//! a pyramid of areas of the box alone, is more exact:
+//! Particles estimate the scale poorly: areas a few percent larger or smaller look nearly alike, and their rim shows
+//! the background, which grows as the camera approaches whatever the target does. A correlation filter along the scale,
+//! over a pyramid of areas of the box alone, is more exact:
 //!
 //! y = F⁻¹(Σ conj(Aᵢ) Zᵢ / (B + λ)),  Aᵢ ← (1 - η) Aᵢ + η conj(G) Fᵢ,  B ← (1 - η) B + η Σ |Fᵢ|²
 //!
-//! with the Fourier transforms along the scale Zᵢ and Fᵢ of feature i of the pyramid that is searched and of the one that
-//! is learned, and G that of the desired response, a Gaussian at the middle.
+//! with the Fourier transforms along the scale Zᵢ and Fᵢ of feature i of the pyramid that is searched and of the one
+//! that is learned, and G that of the desired response, a Gaussian at the middle.
 //!
 //! The maximum of the response y measures the certainty: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
 //! covered, turned or missed. There the scale stays, or it would drift within a few frames.
