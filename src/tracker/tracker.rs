@@ -24,8 +24,9 @@ impl Tracker {
     /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
     ///
     /// # Errors
-    /// A parameter out of its range; a box that is not finite, has a side below [`LEAST_BOX_SIDE`] pixels (or below
-    /// one pixel of the working image) or above four times the frame's longer side, or lies outside the frame.
+    /// A parameter out of its range; a box that is not finite, has a side below
+    /// [`LEAST_BOX_SIDE`](crate::tracker::LEAST_BOX_SIDE) pixels (or below one pixel of the working image) or above
+    /// four times the frame's longer side, or lies outside the frame.
     pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
         params.validate()?;
         let source = frame.source_size();

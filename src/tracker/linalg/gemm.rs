@@ -1,12 +1,12 @@
 //! All inner products of two sets of vectors: most of the arithmetic of a frame.
 //!
-//! The sums of a tile of products stay in vector registers, and the vectors are read where they lie: nothing is
-//! packed or allocated. A few vectors of one set stay in the first-level cache while all of the other pass by. A
-//! product does not depend on where its vectors stand in their sets, to the last bit.
+//! The sums of a tile of products stay in vector registers, and the vectors are read where they lie: nothing is packed
+//! or allocated. A few vectors of one set stay in the first-level cache while all of the other pass by. A product does
+//! not depend on where its vectors stand in their sets, to the last bit.
 //!
-//! Own code: for the sizes of a step nalgebra's product takes 1.1 to 1.4 times as long, for eight vectors 2.9 times
-//! (`cargo bench --bench tables -- kernels`, AVX-512). faer 0.24 takes 0.95 to 1.02 times as long, for four vectors
-//! 1.25 times; for that it is too large a dependency, and it keeps a buffer of twice the L3 cache for each thread.
+//! Own code: for the sizes of a step nalgebra's product takes 1.1 to 1.5 times as long, for eight vectors 3 times
+//! (`cargo bench --bench tables -- kernels`, AVX-512). faer 0.24 takes 0.93 to 1.04 times as long in f32, for four
+//! vectors 1.3 times; it is a large dependency for that, and it keeps a buffer of twice the L3 cache for each thread.
 
 use std::ops::{AddAssign, Mul};
 

@@ -1,8 +1,8 @@
 //! The scale pyramid: areas around one centre, each a step larger than the one before, and their Fourier transform
 //! along the scale. The areas show the box alone, since its rim shows the background.
 //!
-//! The transform is a product with a matrix of 18 rows: for this length an FFT of each feature (realfft 3.5) takes
-//! ten times as long.
+//! The transform is a product with a matrix of 18 rows: for this length an FFT of each feature (realfft 3.5) takes ten
+//! times as long.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -32,8 +32,8 @@ pub(crate) struct Scratch {
     pub areas: Vec<Particle>,
     /// The feature vectors of a pyramid, smallest area first.
     pub features: Vec<f32>,
-    /// Their Fourier transform along the scale: for each frequency the real parts of all features, then the imaginary
-    /// parts.
+    /// Their Fourier transform along the scale: for each frequency the real parts of all features, then the
+    /// imaginary parts.
     pub spectrum: Vec<f32>,
 }
 
