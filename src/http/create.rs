@@ -2,6 +2,7 @@
 
 use super::advance;
 use super::answer::ImageSize;
+use super::openapi::param_limits;
 use super::openapi::problem_responses::{self, problem_responses};
 use super::openapi::request_bodies::{FormBody, JsonBody};
 use super::problems::kind::Kind;
@@ -125,19 +126,9 @@ impl utoipa::IntoResponses for Problems {
 }
 
 /// Open a session
-///
-/// The first frame and the target's box start the tracker. A session snapshot in the place of the frame, with
-/// nothing else, restores that session under a new id; it goes on exactly where it stood.
-///
-/// Every parameter has a range. Sizes that multiply have limits together, which bound the time and memory of a session.
-/// With F numbers in a feature vector (patch_width × patch_height, and ten times that for `gradients`), at most:
-/// particles × F, 1,100,000; (bag_size × (basis_dim + 1) + background_samples) × F, 1,000,000; background_samples ×
-/// (particles + bag_size × (history + 1)) × F, 110,000,000. And pinned is less than bag_size. A parameter out of these
-/// answers `invalid-parameter`, with the limit in its detail.
-///
-/// `curl --data-binary @first.jpg 'http://localhost:8080/sessions?box=10,20,30,40'`
 #[utoipa::path(
     post, path = "/sessions", tag = "sessions", operation_id = "createSession",
+    description = param_limits::create_description(),
     params(CreateSettings),
     request_body(
         description = "The first frame in one of three forms, or a snapshot.",

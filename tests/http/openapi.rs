@@ -1,7 +1,8 @@
 //! The OpenAPI document: committed, generated, and held to the code.
 
 use crate::application::TestApplication;
-use serde_json::Value;
+use bagtrack::tracker::{Params, Preset};
+use serde_json::{Value, json};
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
 
@@ -50,4 +51,81 @@ fn every_reference_in_the_document_leads_somewhere() {
         }
     }
     assert!(references > 10);
+}
+
+async fn served() -> Value {
+    let app = TestApplication::start().await;
+    app.get("/openapi.json").await.json().await.unwrap()
+}
+
+#[tokio::test]
+async fn the_schema_has_every_row_of_the_table_of_parameters() {
+    let document = served().await;
+    let schema = &document["components"]["schemas"]["Params"];
+    let properties = schema["properties"].as_object().unwrap();
+    let robust = serde_json::to_value(Preset::Robust.params()).unwrap();
+    for row in Params::TABLE {
+        let property = properties.get(row.name);
+        let property = property.unwrap_or_else(|| panic!("{} is missing", row.name));
+        assert_eq!(property["description"], row.description.trim());
+        let (kind, least) = match row.kind {
+            "u32" => ("integer", row.range.map(|range| range.0)),
+            "u64" => ("integer", Some(0.0)),
+            "f64" => ("number", row.range.map(|range| range.0)),
+            "bool" => ("boolean", None),
+            _ => ("string", None),
+        };
+        assert_eq!(property["type"], kind, "{}", row.name);
+        assert_eq!(property["minimum"].as_f64(), least, "{}", row.name);
+        let greatest = row.range.map(|range| range.1);
+        assert_eq!(property["maximum"].as_f64(), greatest, "{}", row.name);
+        let choices = match row.choices {
+            [] => Value::Null,
+            choices => json!(choices),
+        };
+        assert_eq!(property["enum"], choices, "{}", row.name);
+        let default = match row.name {
+            "seed" => Value::Null,
+            name => robust[name].clone(),
+        };
+        assert_eq!(property["default"], default, "{}", row.name);
+    }
+    assert_eq!(properties.len(), Params::TABLE.len());
+    assert_eq!(properties["sigma"]["minimum"], 0.0001);
+    assert_eq!(properties["particles"]["maximum"], 1000);
+    assert_eq!(properties["features"]["enum"], json!(["gray", "gradients"]));
+}
+
+#[tokio::test]
+async fn opening_a_session_tells_the_limits_that_validation_has() {
+    let document = served().await;
+    let description = &document["paths"]["/sessions"]["post"]["description"];
+    let description = description.as_str().unwrap();
+    let gray = Preset::Paper.params();
+    let beyond = |change: &dyn Fn(&mut Params)| {
+        let mut params = gray.clone();
+        (params.patch_width, params.patch_height) = (64, 64);
+        change(&mut params);
+        params.validate().unwrap_err()
+    };
+    let errors = [
+        ("particles", beyond(&|params| params.particles = 1000)),
+        (
+            "bag_size",
+            beyond(&|params| {
+                (params.bag_size, params.basis_dim, params.background_samples) = (32, 6, 256)
+            }),
+        ),
+        (
+            "background_samples",
+            beyond(&|params| (params.particles, params.background_samples) = (250, 150)),
+        ),
+    ];
+    for (name, error) in errors {
+        assert_eq!(error.name, name);
+        assert!(
+            description.contains(error.expected),
+            "{name}: {description}"
+        );
+    }
 }

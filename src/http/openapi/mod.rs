@@ -2,12 +2,14 @@
 //!
 //! The document is generated from the handlers and from the types that they parse and send. Handlers take these shared
 //! parts from here: [the problem responses](problem_responses), [the bodies](request_bodies) with frames and settings,
-//! and [the tracker's parameters](params_schema).
+//! [the tracker's parameters](params_schema) and [their limits together](param_limits).
 //!
 //! What can go wrong: the document says something else than the parsers do. So the bodies are made from the
 //! [`Settings`](super::upload::settings::Settings) type that the parsers read, the problem responses from the problems
-//! that the handlers answer, and the parameters from the tracker's own.
+//! that the handlers answer, and the parameters from the tracker's own table and
+//! errors.
 
+pub mod param_limits;
 pub mod params_schema;
 pub mod problem_responses;
 pub mod request_bodies;
