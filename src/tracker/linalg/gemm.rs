@@ -8,81 +8,12 @@
 //! (`cargo bench --bench tables -- kernels`, AVX-512). faer 0.24 takes 0.93 to 1.04 times as long in f32, for four
 //! vectors 1.3 times; it is a large dependency for that, and it keeps a buffer of twice the L3 cache for each thread.
 
-use std::ops::{AddAssign, Mul};
-
 use pulp::Simd;
+
+use crate::tracker::linalg::element::{Element, GROUP_SIZE, can_sum_each};
 
 /// Tiles of the second set that stay in the cache: eight vectors at most, of 640 single-precision values 20 KB.
 const BLOCK: usize = 2;
-
-/// A floating-point number of either precision.
-pub(crate) trait Element: Copy + Default + AddAssign + Mul<Output = Self> {
-    /// A vector register of them.
-    type Lanes<S: Simd>: Copy;
-    /// Values as registers, and those left over.
-    fn lanes<S: Simd>(values: &[Self]) -> (&[Self::Lanes<S>], &[Self]);
-    /// A register of zeros.
-    fn zeros<S: Simd>(simd: S) -> Self::Lanes<S>;
-    /// `a * b + sum`.
-    fn multiply_add<S: Simd>(
-        simd: S,
-        a: Self::Lanes<S>,
-        b: Self::Lanes<S>,
-        sum: Self::Lanes<S>,
-    ) -> Self::Lanes<S>;
-    /// The sum of a register.
-    fn sum<S: Simd>(simd: S, lanes: Self::Lanes<S>) -> Self;
-}
-
-macro_rules! element {
-    ($number:ty, $lanes:ident, $as_simd:ident, $splat:ident, $multiply_add:ident, $sum:ident) => {
-        impl Element for $number {
-            type Lanes<S: Simd> = S::$lanes;
-
-            #[inline(always)]
-            fn lanes<S: Simd>(values: &[Self]) -> (&[S::$lanes], &[Self]) {
-                S::$as_simd(values)
-            }
-
-            #[inline(always)]
-            fn zeros<S: Simd>(simd: S) -> S::$lanes {
-                simd.$splat(0.0)
-            }
-
-            #[inline(always)]
-            fn multiply_add<S: Simd>(
-                simd: S,
-                a: S::$lanes,
-                b: S::$lanes,
-                sum: S::$lanes,
-            ) -> S::$lanes {
-                simd.$multiply_add(a, b, sum)
-            }
-
-            #[inline(always)]
-            fn sum<S: Simd>(simd: S, lanes: S::$lanes) -> Self {
-                simd.$sum(lanes)
-            }
-        }
-    };
-}
-
-element!(
-    f32,
-    f32s,
-    as_simd_f32s,
-    splat_f32s,
-    mul_add_e_f32s,
-    reduce_sum_f32s
-);
-element!(
-    f64,
-    f64s,
-    as_simd_f64s,
-    splat_f64s,
-    mul_add_e_f64s,
-    reduce_sum_f64s
-);
 
 /// The inner products of each of the vectors `a` with each of the vectors `b`, all of length `len`: those of the
 /// `i`-th of `a` from `out[i * stride]` on.
@@ -120,12 +51,16 @@ fn multiply_tiles<S: Simd, T: Element, const A: usize, const B: usize>(
     for block in (0..count_b).step_by(BLOCK * B) {
         let end = (block + BLOCK * B).min(count_b);
         for i in (0..count_a).step_by(A) {
-            // A tile at the end has the last vector more than once.
-            let rows_a: [&[T]; A] =
-                std::array::from_fn(|p| &a[(i + p).min(count_a - 1) * len..][..len]);
+            let mut rows_a = [&a[..0]; A];
+            for (p, row) in rows_a.iter_mut().enumerate() {
+                // A tile at the end has the last vector more than once.
+                *row = &a[(i + p).min(count_a - 1) * len..][..len];
+            }
             for j in (block..end).step_by(B) {
-                let rows_b: [&[T]; B] =
-                    std::array::from_fn(|q| &b[(j + q).min(end - 1) * len..][..len]);
+                let mut rows_b = [&b[..0]; B];
+                for (q, row) in rows_b.iter_mut().enumerate() {
+                    *row = &b[(j + q).min(end - 1) * len..][..len];
+                }
                 let products = tile(simd, rows_a, rows_b);
                 for (p, row) in products.iter().enumerate().take(count_a - i) {
                     let out = &mut out[(i + p) * stride + j..][..B.min(end - j)];
@@ -147,9 +82,16 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
     a: [&[T]; A],
     b: [&[T]; B],
 ) -> [[T; B]; A] {
-    let count = T::lanes::<S>(a[0]).0.len();
-    let lanes_a = a.map(|row| &T::lanes::<S>(row).0[..count]);
-    let lanes_b = b.map(|row| &T::lanes::<S>(row).0[..count]);
+    let (first, _) = T::lanes::<S>(a[0]);
+    let count = first.len();
+    let mut lanes_a = [first; A];
+    for (lanes, row) in lanes_a.iter_mut().zip(a) {
+        *lanes = &T::lanes::<S>(row).0[..count];
+    }
+    let mut lanes_b = [first; B];
+    for (lanes, row) in lanes_b.iter_mut().zip(b) {
+        *lanes = &T::lanes::<S>(row).0[..count];
+    }
     let mut sums = [[T::zeros(simd); B]; A];
     for k in 0..count {
         let mut at_b = [T::zeros(simd); B];
@@ -164,10 +106,28 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
         }
     }
     let mut products = [[T::default(); B]; A];
+    if can_sum_each::<S, T>(simd) {
+        for first in (0..A * B).step_by(T::GROUP_SIZE) {
+            let mut registers = [T::zeros(simd); GROUP_SIZE];
+            for (i, register) in registers.iter_mut().enumerate().take(T::GROUP_SIZE) {
+                // A group at the end has the last sum more than once.
+                let at = (first + i).min(A * B - 1);
+                *register = sums[at / B][at % B];
+            }
+            let totals = T::sum_each(simd, registers);
+            for (i, total) in totals.iter().enumerate().take(T::GROUP_SIZE) {
+                let at = (first + i).min(A * B - 1);
+                products[at / B][at % B] = *total;
+            }
+        }
+    } else {
+        for at in 0..A * B {
+            products[at / B][at % B] = T::sum(simd, sums[at / B][at % B]);
+        }
+    }
     for p in 0..A {
         let rest_a = T::lanes::<S>(a[p]).1;
         for q in 0..B {
-            products[p][q] = T::sum(simd, sums[p][q]);
             let rest_b = T::lanes::<S>(b[q]).1;
             for (&x, &y) in rest_a.iter().zip(rest_b) {
                 products[p][q] += x * y;

@@ -3,6 +3,7 @@
 //! | file | computes |
 //! |---|---|
 //! | `gemm` | all inner products of two sets of vectors, f32 or f64 |
+//! | `element` | sums of vector registers, f32 or f64 |
 //! | `combinations` | linear combinations of f32 vectors |
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
@@ -21,6 +22,7 @@
 
 pub(crate) mod acos;
 pub(crate) mod combinations;
+pub(crate) mod element;
 pub(crate) mod exp;
 pub(crate) mod gemm;
 pub(crate) mod jacobi;
