@@ -16,6 +16,9 @@ mod acos;
 #[path = "../../src/tracker/linalg/combinations.rs"]
 mod combinations;
 #[allow(dead_code, unused_imports)]
+#[path = "../../src/tracker/linalg/element.rs"]
+mod element;
+#[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/exp.rs"]
 mod exp;
 #[allow(dead_code, unused_imports)]
@@ -66,7 +69,7 @@ fn numbers<T: RealField>(count: usize, seed: usize) -> Vec<T> {
 
 fn products<T>(precision: &str, rows: usize, columns: usize, len: usize)
 where
-    T: gemm::Element + RealField,
+    T: element::Element + RealField,
 {
     let (a, b) = (numbers::<T>(rows * len, 1), numbers::<T>(columns * len, 2));
     let [mut own, mut by_nalgebra] = [(); 2].map(|()| vec![T::default(); rows * columns]);

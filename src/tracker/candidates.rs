@@ -12,7 +12,7 @@ use crate::tracker::features::centering::Centering;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::grassmann::evaluation::Evaluation;
 use crate::tracker::image::frame::GrayFrame;
-use crate::tracker::linalg::scratch::clear_and_reserve;
+use crate::tracker::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
 use crate::tracker::params::table::Params;
@@ -27,7 +27,7 @@ const MAX_HISTORY: usize = 10;
 pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
     /// The feature vectors; with single-vector candidates the background's mean is subtracted.
-    vectors: Vec<f32>,
+    vectors: AlignedBuffer,
     /// D.
     len: usize,
     /// Their squared lengths.
@@ -50,8 +50,7 @@ impl Candidates {
         let params = &state.params;
         let (count, entries) = (search::max_count(params) + more, params.bag_size as usize);
         self.len = params.feature_len();
-        let values = self.vectors.len().max(count * self.len);
-        self.vectors.resize(values, 0.0);
+        self.vectors.resize(count * self.len);
         clear_and_reserve(&mut self.particles, count);
         clear_and_reserve(&mut self.squares, count);
         clear_and_reserve(&mut self.distances, count * entries);
@@ -89,7 +88,7 @@ impl Candidates {
 
     /// The feature vectors of the particles that were described.
     pub fn vectors(&self) -> &[f32] {
-        &self.vectors[..self.squares.len() * self.len]
+        &self.vectors.values()[..self.squares.len() * self.len]
     }
 
     /// Describes the new particles in the channels that `extractor` computed of `image`, and compares them with the
@@ -123,7 +122,7 @@ impl Candidates {
             squares: &mut self.squares,
         });
         let particles = &self.particles[batch];
-        let vectors = &mut self.vectors[range];
+        let vectors = &mut self.vectors.values_mut()[range];
         extractor.describe(
             image,
             particles,
@@ -136,7 +135,7 @@ impl Candidates {
 
     /// (D) The distances and the discriminant's scores of a batch.
     fn compare(&mut self, batch: Range<usize>, state: &State) {
-        let vectors = &self.vectors[self.values_of(&batch)];
+        let vectors = &self.vectors.values()[self.values_of(&batch)];
         if state.params.single_vector_candidate {
             let squares = &self.squares[batch.start..];
             self.point_distance

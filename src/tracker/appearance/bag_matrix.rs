@@ -5,11 +5,12 @@ use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
+use crate::tracker::linalg::scratch::AlignedBuffer;
 
 /// The rows, each of length D, and what is known of them beside.
 #[derive(Debug, Default)]
 pub(crate) struct BagMatrix {
-    values: Vec<f32>,
+    values: AlignedBuffer,
     /// The templates of an entry.
     templates: Vec<f32>,
     /// The number of samples, and L⁻¹ of the metric.
@@ -59,8 +60,8 @@ impl BagMatrix {
         self.entries
             .extend(entries.iter().map(|entry| entry.span().0.size()));
         let count = self.samples + self.subspace_rows() + queries.len();
-        self.values.resize(count * len, 0.0);
-        let (samples, mut rest) = self.values.split_at_mut(self.samples * len);
+        self.values.resize(count * len);
+        let (samples, mut rest) = self.values.values_mut().split_at_mut(self.samples * len);
         background.write_samples(samples);
         self.background_coordinates.clear();
         for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
@@ -79,7 +80,7 @@ impl BagMatrix {
     /// The rows, one after the other.
     #[inline(always)]
     pub fn rows(&self) -> &[f32] {
-        &self.values
+        self.values.values()
     }
 
     /// The number of means and basis vectors.

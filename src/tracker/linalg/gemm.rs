@@ -10,7 +10,7 @@
 
 use pulp::Simd;
 
-use crate::tracker::linalg::element::{Element, GROUP_SIZE, can_sum_each};
+use super::element::{Element, GROUP_SIZE, can_sum_each};
 
 /// Tiles of the second set that stay in the cache: eight vectors at most, of 640 single-precision values 20 KB.
 const BLOCK: usize = 2;

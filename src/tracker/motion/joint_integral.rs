@@ -47,7 +47,8 @@ impl JointIntegral {
     /// The number of pixels of the part in `area`, whose edges count to the nearest pixel, and the sums over them.
     pub fn over(&self, area: &Rect) -> (u32, Sums) {
         let corner = |value: f64, first: usize, count: usize| {
-            (value.round() - first as f64).clamp(0.0, count as f64) as usize
+            // The conversion rounds down; rounding itself would be a call.
+            (value + 0.5 - first as f64).clamp(0.0, count as f64) as usize
         };
         let left = corner(area.x, self.left, self.columns);
         let right = corner(area.x + area.width, self.left, self.columns).max(left);
