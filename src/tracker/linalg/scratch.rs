@@ -17,8 +17,8 @@ pub(crate) fn aligned_zeros(values: &mut Vec<f64>, count: usize) -> usize {
     first
 }
 
-/// A buffer of single-precision values that begins at a cache line, as the vector loads of a product should: the
-/// product of a step is a sixth faster.
+/// A buffer of single-precision values that begins at a cache line, as the vector loads of a product should: a step
+/// of `robust` is a tenth faster.
 #[derive(Debug, Default)]
 pub(crate) struct AlignedBuffer {
     values: Vec<f32>,
