@@ -57,10 +57,11 @@ fn evaluation(criterion: &mut Criterion) {
         .collect();
     let history = &slices[50..55];
 
+    let vectors = candidates.concat();
     let mut shipped = textbook::shipped(&candidates, history, &bag, &params);
     criterion.bench_function("evaluation", |bencher| {
         bencher.iter(|| {
-            shipped.compute(black_box(history));
+            shipped.compute(&vectors, black_box(history));
             shipped.best()
         })
     });

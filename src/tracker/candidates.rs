@@ -152,13 +152,12 @@ impl Candidates {
         let Some((_, evaluation)) = &mut self.evaluation else {
             return;
         };
-        evaluation.candidates_mut()[..vectors.len()].copy_from_slice(vectors);
         let mut history = [&[][..]; MAX_HISTORY];
         for (slice, vector) in history.iter_mut().zip(&state.history) {
             *slice = vector;
         }
         let history = &history[..state.history.len()];
-        let distances = evaluation.compute_distances(batch.len(), history);
+        let distances = evaluation.compute_distances(vectors, history);
         self.distances.extend_from_slice(distances);
     }
 

@@ -163,10 +163,7 @@ pub fn shipped(
 ) -> Evaluation {
     let mut evaluation = Evaluation::new(params);
     evaluation.set_bag(bag.iter());
-    for (index, candidate) in candidates.iter().enumerate() {
-        evaluation.candidate_mut(index).copy_from_slice(candidate);
-    }
-    evaluation.compute(history);
+    evaluation.compute(&candidates.concat(), history);
     evaluation
 }
 

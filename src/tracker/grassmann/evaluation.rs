@@ -1,9 +1,12 @@
 //! The candidates of a frame against the bag: distances, likelihoods, weights, the best one.
 
+use pulp::{Arch, Simd};
+
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
-use crate::tracker::grassmann::candidate::Candidate;
+use crate::tracker::grassmann::candidates::Candidates;
 use crate::tracker::grassmann::distance::{Distance, Entry};
 use crate::tracker::grassmann::inner_products::InnerProducts;
+use crate::tracker::linalg::acos::LANES;
 use crate::tracker::params::table::Params;
 use crate::tracker::weights::likelihood::{self, Likelihoods};
 
@@ -11,8 +14,7 @@ use crate::tracker::weights::likelihood::{self, Likelihoods};
 /// does it.
 ///
 /// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
-/// [`candidate_mut`](Self::candidate_mut) for each of the N candidates, [`compute`](Self::compute), then the results.
-/// The buffers are kept, so one value serves all frames.
+/// [`compute`](Self::compute), then the results. The buffers are kept, so one value serves all frames.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
     sigma: f64,
@@ -22,8 +24,6 @@ pub struct Evaluation {
     patches: usize,
     /// n.
     basis_dim: usize,
-    /// The feature vectors of the N candidates, one after the other.
-    candidates: Vec<f32>,
     entries: Vec<Entry>,
     products: InnerProducts,
     distance: Distance,
@@ -43,7 +43,6 @@ impl Evaluation {
             len: params.feature_len(),
             patches: params.history as usize,
             basis_dim: params.basis_dim as usize,
-            candidates: vec![0.0; params.particles as usize * params.feature_len()],
             distance: Distance::of(params),
             ..Self::default()
         };
@@ -61,64 +60,29 @@ impl Evaluation {
         self.products.set_bag(bag);
     }
 
-    /// The feature vector v of candidate `index`, of length D, to be filled in with finite values.
-    ///
-    /// # Panics
-    /// If `index` is N or more.
-    pub fn candidate_mut(&mut self, index: usize) -> &mut [f32] {
-        let mut candidates = self.candidates.chunks_exact_mut(self.len);
-        candidates.nth(index).expect("a candidate below N")
-    }
-
-    /// The feature vectors of all N candidates, one after the other, to be filled in with finite values.
-    pub fn candidates_mut(&mut self) -> &mut [f32] {
-        &mut self.candidates
-    }
-
-    /// Compares every candidate, together with `history` (the 1 to P previous patches, each of length D), with every
-    /// entry of the bag.
+    /// Compares `candidates` (at most N feature vectors of length D with finite values, one after the other), together
+    /// with `history` (the 1 to P previous patches, each of length D), with every entry of the bag.
     ///
     /// # Panics
     /// If no bag was set, there are more than P previous patches or none, or one of them is not of length D.
-    pub fn compute(&mut self, history: &[&[f32]]) {
-        let candidates = self.candidates.len() / self.len;
+    pub fn compute(&mut self, candidates: &[f32], history: &[&[f32]]) {
         self.compute_distances(candidates, history);
         self.weights.clear();
-        self.weights.resize(candidates, 0.0);
+        self.weights.resize(candidates.len() / self.len, 0.0);
         self.likelihoods
             .weigh(&self.distances, self.sigma, (0, 1.0), &mut self.weights);
     }
 
-    /// The first half of [`compute`](Self::compute), for the first `count` candidates: the distances alone, which it
-    /// returns.
-    pub(crate) fn compute_distances(&mut self, count: usize, history: &[&[f32]]) -> &[f64] {
-        let candidates = &self.candidates[..count * self.len];
+    /// The first half of [`compute`](Self::compute): the distances alone, which it returns.
+    pub(crate) fn compute_distances(&mut self, candidates: &[f32], history: &[&[f32]]) -> &[f64] {
         self.products.compute(candidates, history);
+        let count = candidates.len() / self.len;
         self.dims.clear();
         self.distances.clear();
+        self.distances.resize(count * self.entries.len(), 0.0);
         let columns = history.len() + 1;
-        // Matrices of the paper's size, or of the largest.
-        if self.patches <= 5 && self.basis_dim <= 3 {
-            self.compare::<6, 3>(count, columns);
-        } else {
-            self.compare::<11, 6>(count, columns);
-        }
+        compare(self, columns);
         &self.distances
-    }
-
-    /// The distances of the first `count` candidates, each with V of so many `columns`: M at most, and N basis vectors.
-    fn compare<const M: usize, const N: usize>(&mut self, count: usize, columns: usize) {
-        for i in 0..count {
-            let gram = self.products.gram::<M>(i);
-            let candidate = Candidate::<M, N>::of(gram, columns, self.basis_dim);
-            self.dims.push(candidate.dim);
-            for (k, &entry) in self.entries.iter().enumerate() {
-                let (candidate, entry) = ((i, &candidate), (k, entry));
-                let products = &self.products;
-                self.distances
-                    .push(self.distance.between(candidate, entry, products, columns));
-            }
-        }
     }
 
     fn row<'a>(&self, values: &'a [f64], index: usize) -> &'a [f64] {
@@ -148,5 +112,40 @@ impl Evaluation {
     /// The most likely candidate (equation 12).
     pub fn best(&self) -> usize {
         likelihood::arg_max(&self.weights)
+    }
+}
+
+/// Compares all candidates, each with V of so many `columns`. Compiled for this machine's instructions.
+#[pulp::with_simd(compare = Arch::new())]
+#[inline(always)]
+fn compare_simd<S: Simd>(_: S, evaluation: &mut Evaluation, columns: usize) {
+    // Matrices of the paper's size, or of the largest.
+    if evaluation.patches <= 5 && evaluation.basis_dim <= 3 {
+        evaluation.compare::<6, 3>(columns);
+    } else {
+        evaluation.compare::<11, 6>(columns);
+    }
+}
+
+impl Evaluation {
+    /// The same for V of M columns at most, and N basis vectors.
+    #[inline(always)]
+    fn compare<const M: usize, const N: usize>(&mut self, columns: usize) {
+        let entries = self.entries.len();
+        for (group, rows) in self.distances.chunks_mut(LANES * entries).enumerate() {
+            let gram = self.products.gram::<M>(group);
+            let candidates = Candidates::<M, N>::of(&gram, columns, self.basis_dim);
+            let dims = candidates.dim.0.iter().map(|&dim| dim as usize);
+            self.dims.extend(dims);
+            for (k, &entry) in self.entries.iter().enumerate() {
+                let (candidates, entry) = ((group, &candidates), (k, entry));
+                let products = &self.products;
+                let distances = self.distance.between(candidates, entry, products, columns);
+                let values = rows[k..].iter_mut().step_by(entries);
+                for (value, distance) in values.zip(distances.0) {
+                    *value = distance;
+                }
+            }
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! All inner products of a frame, in double precision, as one matrix product.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, SimdValue};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
+use crate::tracker::grassmann::Lanes;
+use crate::tracker::linalg::acos::LANES;
 use crate::tracker::linalg::{gemm, scratch};
 use crate::tracker::params::table::Params;
 
@@ -12,7 +14,7 @@ use crate::tracker::params::table::Params;
 const LINE: usize = 8;
 
 /// Candidates that are multiplied together: more would not stay in the second cache beside the bag.
-const BATCH: usize = 12;
+const BATCH: usize = 8;
 
 /// The inner products of [H, v₁, …, v_N] with [μ₁, F₁, …, μ_K, F_K, H].
 #[derive(Debug, Clone, Default)]
@@ -27,14 +29,16 @@ pub(crate) struct InnerProducts {
     per_entry: usize,
     /// K, or fewer while the bag grows.
     entries: usize,
-    /// N.
+    /// N, or more to make whole groups.
     candidates: usize,
     /// The bag, H (zero where there are fewer previous patches than P), some of the candidates.
     vectors: Vec<f64>,
     /// Where the first of them begins.
     first: usize,
-    /// A row for each of H and of the candidates, a column for each of the bag's vectors and of H.
+    /// A row for each of the bag's vectors and of H, a column for each candidate.
     products: Vec<f64>,
+    /// A row for each of H, a column for each of the bag's vectors and of H.
+    of_history: Vec<f64>,
     /// ‖v‖² of each candidate.
     squares: Vec<f64>,
 }
@@ -46,7 +50,7 @@ impl InnerProducts {
         self.stride = self.len.next_multiple_of(LINE) + LINE;
         self.patches = params.history as usize;
         self.per_entry = params.basis_dim as usize + 1;
-        self.candidates = params.particles as usize;
+        self.candidates = (params.particles as usize).next_multiple_of(LANES);
         self.entries = 0;
     }
 
@@ -60,8 +64,8 @@ impl InnerProducts {
             self.entries = bag.len();
             let values = (self.columns() + BATCH) * self.stride;
             self.first = scratch::aligned_zeros(&mut self.vectors, values);
-            let rows = self.patches + self.candidates;
-            self.products.resize(rows * self.columns(), 0.0);
+            self.products.resize(self.columns() * self.candidates, 0.0);
+            self.of_history.resize(self.patches * self.columns(), 0.0);
         }
         let rows = self.vectors[self.first..].chunks_exact_mut(self.per_entry * self.stride);
         for (entry, rows) in bag.zip(rows) {
@@ -98,68 +102,73 @@ impl InnerProducts {
                 None => row.fill(0.0),
             }
         }
-        let (of_history, of_candidates) = self.products.split_at_mut(self.patches * columns);
         let history = &all[bag * stride..];
-        gemm::inner_products(history, all, stride, columns, of_history);
+        gemm::inner_products(history, all, stride, columns, &mut self.of_history);
         self.squares.clear();
-        let products = of_candidates.chunks_mut(BATCH * columns);
-        for (candidates, products) in candidates.chunks(BATCH * self.len).zip(products) {
-            let count = candidates.len() / self.len;
-            let rows = &mut batch[..count * stride];
+        for (index, candidates) in candidates.chunks(BATCH * self.len).enumerate() {
+            let rows = &mut batch[..candidates.len() / self.len * stride];
             Arch::new().dispatch(Widen {
                 vectors: candidates,
                 len: self.len,
                 rows,
                 squares: &mut self.squares,
             });
-            gemm::inner_products(rows, all, stride, columns, products);
+            let products = &mut self.products[index * BATCH..];
+            gemm::inner_products(all, rows, stride, self.candidates, products);
         }
+        self.squares.resize(self.candidates, 0.0);
     }
 
-    /// The products of column `row` of V = [v, H] of a candidate.
-    fn of(&self, candidate: usize, row: usize) -> &[f64] {
-        let row = row.checked_sub(1).unwrap_or(self.patches + candidate);
-        &self.products[row * self.columns()..][..self.columns()]
+    /// Vᵀ x of the candidates of a group, x being vector `column` of the bag and H; zero beyond V's P + 1 columns.
+    #[inline(always)]
+    fn with<const M: usize>(&self, group: usize, column: usize) -> SVector<Lanes, M> {
+        let mut products = SVector::repeat(Lanes::splat(0.0));
+        let row = &self.products[column * self.candidates..];
+        products[0] = lanes(row, group);
+        for i in 0..self.patches {
+            products[i + 1] = Lanes::splat(self.of_history[i * self.columns() + column]);
+        }
+        products
     }
 
-    /// VᵀV of a candidate; zero beyond its P + 1 rows and columns.
-    pub fn gram<const M: usize>(&self, candidate: usize) -> SMatrix<f64, M, M> {
-        let bag = self.entries * self.per_entry;
-        let mut gram = SMatrix::zeros();
-        gram[(0, 0)] = self.squares[candidate];
-        for i in 0..=self.patches {
-            for (j, &product) in self.of(candidate, i)[bag..].iter().enumerate() {
-                gram[(i, j + 1)] = product;
-                gram[(j + 1, i)] = product;
-            }
+    /// VᵀV of the candidates of a group; zero beyond its P + 1 rows and columns.
+    #[inline(always)]
+    pub fn gram<const M: usize>(&self, group: usize) -> SMatrix<Lanes, M, M> {
+        let mut gram = SMatrix::<Lanes, M, M>::repeat(Lanes::splat(0.0));
+        gram[(0, 0)] = lanes(&self.squares, group);
+        for j in 0..self.patches {
+            let products = self.with::<M>(group, self.entries * self.per_entry + j);
+            gram[(j + 1, 0)] = products[0];
+            gram.set_column(j + 1, &products);
         }
         gram
     }
 
-    /// Vᵀμₖ of a candidate and entry `k`.
-    pub fn with_mean<const M: usize>(&self, candidate: usize, k: usize) -> SVector<f64, M> {
-        let mut products = SVector::zeros();
-        for i in 0..=self.patches {
-            products[i] = self.of(candidate, i)[k * self.per_entry];
-        }
-        products
+    /// Vᵀμₖ of the candidates of a group and entry `k`.
+    #[inline(always)]
+    pub fn with_mean<const M: usize>(&self, group: usize, k: usize) -> SVector<Lanes, M> {
+        self.with(group, k * self.per_entry)
     }
 
-    /// VᵀFₖ of a candidate and entry `k`.
+    /// VᵀFₖ of the candidates of a group and entry `k`.
+    #[inline(always)]
     pub fn with_basis<const M: usize, const N: usize>(
         &self,
-        candidate: usize,
+        group: usize,
         k: usize,
-    ) -> SMatrix<f64, M, N> {
-        let mut products = SMatrix::zeros();
-        for i in 0..=self.patches {
-            let row = &self.of(candidate, i)[k * self.per_entry..][1..self.per_entry];
-            for (j, &product) in row.iter().enumerate() {
-                products[(i, j)] = product;
-            }
+    ) -> SMatrix<Lanes, M, N> {
+        let mut products = SMatrix::<Lanes, M, N>::repeat(Lanes::splat(0.0));
+        for j in 1..self.per_entry {
+            products.set_column(j - 1, &self.with::<M>(group, k * self.per_entry + j));
         }
         products
     }
+}
+
+/// The values of the candidates of a group.
+#[inline(always)]
+fn lanes(values: &[f64], group: usize) -> Lanes {
+    Lanes::from(values.as_chunks::<LANES>().0[group])
 }
 
 /// Writes vectors of length `len` to as many rows, in double precision, and their squared lengths to `squares`;

@@ -5,18 +5,22 @@
 //! thousand a frame: nalgebra's `singular_values` takes five times as long, and stops early where singular values are
 //! small (dimforge/nalgebra issue 1172).
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SimdPartialOrd, SimdValue};
 
-use crate::tracker::linalg::jacobi;
+use crate::tracker::grassmann::Lanes;
+use crate::tracker::linalg::{acos, jacobi};
 
-/// ‖Θ‖² (equation 6) of the `dim` smallest principal angles, in radians², of bases with this product EᵀF.
-pub(crate) fn squared_norm<const N: usize>(product: &SMatrix<f64, N, N>, dim: usize) -> f64 {
-    let squared_cosines = jacobi::eigenvalues(product.tr_mul(product));
-    let angles = squared_cosines[..dim].iter().map(|square| {
-        // Rounding can put a squared cosine outside of [0, 1].
-        square.clamp(0.0, 1.0).sqrt().acos()
-    });
-    angles.map(|angle| angle * angle).sum()
+/// ‖Θ‖² (equation 6) of the `dim` smallest principal angles, in radians², of bases with these products EᵀF.
+#[inline(always)]
+pub(crate) fn squared_norm<const N: usize>(products: &SMatrix<Lanes, N, N>, dim: Lanes) -> Lanes {
+    let squared_cosines = jacobi::eigenvalues(products.tr_mul(products));
+    let mut sum = Lanes::splat(0.0);
+    for (j, squares) in squared_cosines.iter().enumerate() {
+        let squared_angles = Lanes::from(acos::squared_angles(&squares.0));
+        let is_among = dim.simd_gt(Lanes::splat(j as f64));
+        sum += squared_angles.select(is_among, Lanes::splat(0.0));
+    }
+    sum
 }
 
 #[cfg(test)]
@@ -44,7 +48,7 @@ mod tests {
             let product = left * Matrix3::from_diagonal(&cosines) * right;
             for dim in 0..=3 {
                 let expected: f64 = angles[..dim].iter().map(|angle| angle * angle).sum();
-                let found = squared_norm(&product, dim);
+                let found = squared_norm(&product.map(Lanes::splat), Lanes::splat(dim as f64)).0[7];
                 assert!(
                     (found - expected).abs() < 1e-7,
                     "{angles:?}, {dim}: {found}"
@@ -56,7 +60,8 @@ mod tests {
     #[test]
     fn zero_columns_are_right_angles_and_tiny_ones_stay_finite() {
         for value in [0.0, 1e-30, 1e-160, 1e-300] {
-            let found = squared_norm(&SMatrix::<f64, 6, 6>::repeat(value), 6);
+            let product = SMatrix::<Lanes, 6, 6>::repeat(Lanes::splat(value));
+            let found = squared_norm(&product, Lanes::splat(6.0)).0[0];
             let right = std::f64::consts::FRAC_PI_2.powi(2);
             assert!((found - 6.0 * right).abs() < 1e-7, "{value}: {found}");
         }
