@@ -3,7 +3,7 @@
 //! The area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
 //! gray values in [0, 1] (section III-B). Outside the frame the nearest edge pixel counts.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::image::frame::GrayFrame;
 use crate::tracker::image::rect::Rect;
@@ -20,23 +20,12 @@ pub(crate) struct GrayPatches {
     between: Vec<f32>,
 }
 
-/// Where the centre of a cell lies along one axis.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cell {
-    /// The pixel at or before the centre, and the one after that.
-    first: usize,
-    second: usize,
-    /// The share of the second.
-    share: f32,
-}
-
-/// All cuts of a frame, compiled for this machine's instructions.
-struct Cuts<'a, A> {
-    between: &'a mut [f32],
-    image: &'a GrayFrame,
-    areas: A,
-    params: &'a Params,
-    out: &'a mut [f32],
+/// Where the centres of cells lie along one axis.
+struct Centers {
+    /// The pixel at or before each centre.
+    pixels: [usize; MOST_CELLS],
+    /// The share of the pixel after that one.
+    shares: [f32; MOST_CELLS],
 }
 
 impl GrayPatches {
@@ -49,47 +38,46 @@ impl GrayPatches {
         out: &mut [f32],
     ) {
         // Room for any area at once, so that a larger one allocates nothing.
-        self.between.resize(image.width() as usize, 0.0);
-        Arch::new().dispatch(Cuts {
-            between: &mut self.between,
-            image,
-            areas,
-            params,
-            out,
-        });
-    }
-}
-
-impl<A: Iterator<Item = Rect>> WithSimd for Cuts<'_, A> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let patches = self.out.chunks_exact_mut(self.params.feature_len());
-        for (area, patch) in self.areas.zip(patches) {
-            cut(self.image, &area, self.params, self.between, patch);
+        self.between.resize(image.width() as usize + 1, 0.0);
+        for (area, patch) in areas.zip(out.chunks_exact_mut(params.feature_len())) {
+            cut(image, &area, params, &mut self.between, patch);
         }
     }
 }
 
-/// Writes the feature vector of one area to `patch`.
+/// Writes the feature vector of one area to `patch`, compiled for this machine's instructions.
+#[pulp::with_simd(cut = Arch::new())]
 #[inline(always)]
-fn cut(image: &GrayFrame, area: &Rect, params: &Params, between: &mut [f32], patch: &mut [f32]) {
-    let columns = params.patch_width as usize;
-    let across = cells(area.x, area.width, params.patch_width, image.width());
-    let down = cells(area.y, area.height, params.patch_height, image.height());
-    let (left, right) = (across[0].first, across[columns - 1].second);
-    let row = |y: usize| &image.pixels()[y * image.width() as usize..][left..=right];
-    let between = &mut between[..=right - left];
-    for (target, cell) in patch.chunks_exact_mut(columns).zip(&down) {
-        let pixels = row(cell.first).iter().zip(row(cell.second));
-        for (between, (&upper, &lower)) in between.iter_mut().zip(pixels) {
-            *between = interpolate(upper.into(), lower.into(), cell.share);
+fn cut_simd<S: Simd>(
+    _: S,
+    image: &GrayFrame,
+    area: &Rect,
+    params: &Params,
+    between: &mut [f32],
+    patch: &mut [f32],
+) {
+    let (columns, rows) = (params.patch_width, params.patch_height);
+    let across = centers(area.x, area.width, columns, image.width());
+    let down = centers(area.y, area.height, rows, image.height());
+    let columns = columns as usize;
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let (left, right) = (across.pixels[0], across.pixels[columns - 1]);
+    // The pixels after the last centre too, where the frame has them.
+    let count = (right + 2).min(width) - left;
+    let row = |y: usize| &image.pixels()[y.min(height - 1) * width + left..][..count];
+    let mut pairs = [[0.0; 2]; MOST_CELLS];
+    let centers = down.pixels.iter().zip(&down.shares);
+    for (target, (&y, &share)) in patch.chunks_exact_mut(columns).zip(centers) {
+        for ((between, &upper), &lower) in between.iter_mut().zip(row(y)).zip(row(y + 1)) {
+            *between = interpolate(upper.into(), lower.into(), share) * (1.0 / 255.0);
         }
-        for (value, cell) in target.iter_mut().zip(&across) {
-            let (first, second) = (between[cell.first - left], between[cell.second - left]);
-            let gray = interpolate(first, second, cell.share) * (1.0 / 255.0);
-            *value = gray.min(1.0);
+        between[count] = between[count - 1];
+        for (pair, x) in pairs.iter_mut().zip(&across.pixels[..columns]) {
+            *pair = [between[x - left], between[x - left + 1]];
+        }
+        for ((value, &[first, second]), &share) in target.iter_mut().zip(&pairs).zip(&across.shares)
+        {
+            *value = interpolate(first, second, share).min(1.0);
         }
     }
 }
@@ -99,19 +87,21 @@ fn interpolate(first: f32, second: f32, share: f32) -> f32 {
     first + (second - first) * share
 }
 
-/// `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
+/// The centres of `count` cells over `[start, start + extent)`, among `pixels` pixels whose own centres are at a half.
 #[inline(always)]
-fn cells(start: f64, extent: f64, count: u32, pixels: u32) -> [Cell; MOST_CELLS] {
-    let mut cells = [Cell::default(); MOST_CELLS];
+fn centers(start: f64, extent: f64, count: u32, pixels: u32) -> Centers {
+    let mut centers = Centers {
+        pixels: [0; MOST_CELLS],
+        shares: [0.0; MOST_CELLS],
+    };
     let last = f64::from(pixels - 1);
-    for (index, cell) in (0..count).zip(&mut cells) {
-        let center = start + extent * (f64::from(index) + 0.5) / f64::from(count) - 0.5;
+    for index in 0..count as usize {
+        let center = start + extent * (index as f64 + 0.5) / f64::from(count) - 0.5;
         let clamped = center.clamp(0.0, last);
-        cell.first = clamped as usize;
-        cell.second = (cell.first + 1).min(pixels as usize - 1);
-        cell.share = clamped.fract() as f32;
+        centers.pixels[index] = clamped as usize;
+        centers.shares[index] = clamped.fract() as f32;
     }
-    cells
+    centers
 }
 
 /// The feature vector of `area` of `image`, both in working pixels: D gray values in [0, 1], row by row.

@@ -7,7 +7,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind |
-//! | [`gray`] | gray patches, and `gray_avx512` the same for machines with AVX-512 |
+//! | [`gray`] | gray patches |
 //! | [`hog`] | the gradient histograms of many areas |
 //! | [`centering`] | a mean subtracted from vectors |
 //! | [`hog_cells`], [`block_norm`] | the cells of one area, and the normalisation of their directions |

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{SimdPartialOrd, SimdValue};
 
 use crate::tracker::grassmann::Lanes;
-use crate::tracker::grassmann::candidates::Candidates;
+use crate::tracker::grassmann::batch::Batch;
 use crate::tracker::grassmann::inner_products::InnerProducts;
 use crate::tracker::grassmann::principal_angles;
 use crate::tracker::params::table::Params;
@@ -35,25 +35,23 @@ impl Distance {
         }
     }
 
-    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of `candidates`, the `group`-th, and `entry`, the `k`-th.
+    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of a batch of candidates and `entry`, the
+    /// `k`-th.
     #[inline(always)]
     pub fn between<const M: usize, const N: usize>(
         self,
-        (group, candidates): (usize, &Candidates<M, N>),
+        batch: &Batch<M, N>,
         (k, entry): (usize, Entry),
         products: &InnerProducts,
         columns: usize,
     ) -> Lanes {
         let number = Lanes::splat;
         // ‖μ - μₖ‖² (equation 5), where μ = V 1 / (P + 1); rounding can put it below 0.
-        let mean_product = products.with_mean::<M>(group, k).sum() / number(columns as f64);
-        let origins =
-            candidates.mean_square - number(2.0) * mean_product + number(entry.mean_square);
+        let mean_product = products.with_mean::<M>(k).sum() / number(columns as f64);
+        let origins = batch.mean_square - number(2.0) * mean_product + number(entry.mean_square);
         // UᵀFₖ = (W S⁻¹)ᵀ VᵀFₖ.
-        let bases = candidates
-            .coefficients
-            .tr_mul(&products.with_basis(group, k));
-        let dim = candidates.dim.simd_min(number(entry.dim as f64));
+        let bases = batch.coefficients.tr_mul(&products.with_basis(k));
+        let dim = batch.dim.simd_min(number(entry.dim as f64));
         let angles = principal_angles::squared_norm(&bases, dim);
         let beta = number(4.0 / (PI * PI)) / dim.simd_max(number(1.0));
         number(self.alpha * self.gamma) * origins.simd_max(number(0.0))

@@ -3,10 +3,10 @@
 use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
-use crate::tracker::grassmann::candidates::Candidates;
+use crate::tracker::grassmann::LANES;
+use crate::tracker::grassmann::batch::Batch;
 use crate::tracker::grassmann::distance::{Distance, Entry};
 use crate::tracker::grassmann::inner_products::InnerProducts;
-use crate::tracker::linalg::acos::LANES;
 use crate::tracker::params::table::Params;
 use crate::tracker::weights::likelihood::{self, Likelihoods};
 
@@ -27,8 +27,6 @@ pub struct Evaluation {
     entries: Vec<Entry>,
     products: InnerProducts,
     distance: Distance,
-    /// The number of basis vectors of each candidate.
-    dims: Vec<usize>,
     /// For each candidate, its distance to each entry.
     distances: Vec<f64>,
     likelihoods: Likelihoods,
@@ -75,14 +73,37 @@ impl Evaluation {
 
     /// The first half of [`compute`](Self::compute): the distances alone, which it returns.
     pub(crate) fn compute_distances(&mut self, candidates: &[f32], history: &[&[f32]]) -> &[f64] {
-        self.products.compute(candidates, history);
+        self.products.set_history(history);
         let count = candidates.len() / self.len;
-        self.dims.clear();
         self.distances.clear();
         self.distances.resize(count * self.entries.len(), 0.0);
-        let columns = history.len() + 1;
-        compare(self, columns);
+        compare(self, candidates, history.len() + 1);
         &self.distances
+    }
+
+    /// Compares `candidates`, each with V of so many `columns`: M at most, and N basis vectors.
+    #[inline(always)]
+    fn compare_as<S: Simd, const M: usize, const N: usize>(
+        &mut self,
+        simd: S,
+        candidates: &[f32],
+        columns: usize,
+    ) {
+        let entries = self.entries.len();
+        let rows = self.distances.chunks_mut(LANES * entries);
+        for (candidates, rows) in candidates.chunks(LANES * self.len).zip(rows) {
+            self.products.multiply(simd, candidates);
+            let batch = Batch::<M, N>::of(&self.products.gram(), columns, self.basis_dim);
+            for (k, &entry) in self.entries.iter().enumerate() {
+                let distances = self
+                    .distance
+                    .between(&batch, (k, entry), &self.products, columns);
+                let values = rows[k..].iter_mut().step_by(entries);
+                for (value, distance) in values.zip(distances.0) {
+                    *value = distance;
+                }
+            }
+        }
     }
 
     fn row<'a>(&self, values: &'a [f64], index: usize) -> &'a [f64] {
@@ -104,48 +125,20 @@ impl Evaluation {
         &self.weights
     }
 
-    /// The number of basis vectors in the subspace of candidate `index`.
-    pub fn basis_dim(&self, index: usize) -> usize {
-        self.dims[index]
-    }
-
     /// The most likely candidate (equation 12).
     pub fn best(&self) -> usize {
         likelihood::arg_max(&self.weights)
     }
 }
 
-/// Compares all candidates, each with V of so many `columns`. Compiled for this machine's instructions.
+/// [`Evaluation::compare_as`] with matrices of the paper's size, or of the largest; compiled for this machine's
+/// instructions.
 #[pulp::with_simd(compare = Arch::new())]
 #[inline(always)]
-fn compare_simd<S: Simd>(_: S, evaluation: &mut Evaluation, columns: usize) {
-    // Matrices of the paper's size, or of the largest.
+fn compare_simd<S: Simd>(simd: S, evaluation: &mut Evaluation, candidates: &[f32], columns: usize) {
     if evaluation.patches <= 5 && evaluation.basis_dim <= 3 {
-        evaluation.compare::<6, 3>(columns);
+        evaluation.compare_as::<S, 6, 3>(simd, candidates, columns);
     } else {
-        evaluation.compare::<11, 6>(columns);
-    }
-}
-
-impl Evaluation {
-    /// The same for V of M columns at most, and N basis vectors.
-    #[inline(always)]
-    fn compare<const M: usize, const N: usize>(&mut self, columns: usize) {
-        let entries = self.entries.len();
-        for (group, rows) in self.distances.chunks_mut(LANES * entries).enumerate() {
-            let gram = self.products.gram::<M>(group);
-            let candidates = Candidates::<M, N>::of(&gram, columns, self.basis_dim);
-            let dims = candidates.dim.0.iter().map(|&dim| dim as usize);
-            self.dims.extend(dims);
-            for (k, &entry) in self.entries.iter().enumerate() {
-                let (candidates, entry) = ((group, &candidates), (k, entry));
-                let products = &self.products;
-                let distances = self.distance.between(candidates, entry, products, columns);
-                let values = rows[k..].iter_mut().step_by(entries);
-                for (value, distance) in values.zip(distances.0) {
-                    *value = distance;
-                }
-            }
-        }
+        evaluation.compare_as::<S, 11, 6>(simd, candidates, columns);
     }
 }

@@ -7,7 +7,7 @@
 //! | step | what it makes | equation | file |
 //! |---|---|---|---|
 //! | inner products | VᵀV, and Vᵀμₖ and VᵀFₖ for each entry {μₖ, Fₖ} of the bag | | `inner_products` |
-//! | the candidate's subspace | μ as its products, U as the coefficients W S⁻¹ | 1, 2 | `candidates` |
+//! | the candidate's subspace | μ as its products, U as the coefficients W S⁻¹ | 1, 2 | `batch` |
 //! | principal angles | θ from the singular values of UᵀFₖ, an n × n matrix | 6, 7 | `principal_angles` |
 //! | distances | α γ ‖μ - μₖ‖² + (1 - α) β ‖Θ‖² | 4, 5, 8 | `distance` |
 //! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights::likelihood` |
@@ -25,11 +25,13 @@
 //! - *Sizes.* Matrices here have fixed sizes, so that a frame allocates nothing:
 //!   [`Evaluation`](evaluation::Evaluation) picks them by P and n, and what is beyond P + 1 and n is zero.
 
-mod candidates;
+mod batch;
 mod distance;
 pub(crate) mod evaluation;
 mod inner_products;
 mod principal_angles;
 
-/// A number of each of [`LANES`](crate::tracker::linalg::acos::LANES) candidates, which are compared together.
+use crate::tracker::linalg::acos::LANES;
+
+/// A number of each candidate of a batch.
 type Lanes = simba::simd::AutoF64x8;

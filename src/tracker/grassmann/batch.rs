@@ -1,4 +1,4 @@
-//! The affine subspaces of eight candidates (equation 1), from the Gram matrices of V (equation 2).
+//! The affine subspaces of a batch of candidates (equation 1), from the Gram matrices of V (equation 2).
 
 use nalgebra::{SMatrix, SimdComplexField, SimdPartialOrd, SimdValue};
 
@@ -8,7 +8,7 @@ use crate::tracker::linalg::jacobi;
 
 /// The subspaces {μ, U} of candidates with V of up to M columns, as what V's columns are multiplied with.
 #[derive(Debug)]
-pub(crate) struct Candidates<const M: usize, const N: usize> {
+pub(crate) struct Batch<const M: usize, const N: usize> {
     /// ‖μ‖².
     pub mean_square: Lanes,
     /// W S⁻¹, so that U = V W S⁻¹: zero beyond the columns that U has.
@@ -17,7 +17,7 @@ pub(crate) struct Candidates<const M: usize, const N: usize> {
     pub dim: Lanes,
 }
 
-impl<const M: usize, const N: usize> Candidates<M, N> {
+impl<const M: usize, const N: usize> Batch<M, N> {
     /// The subspaces with `gram` = VᵀV, zero beyond V's `columns`, and at most `basis_dim` basis vectors.
     #[inline(always)]
     pub fn of(gram: &SMatrix<Lanes, M, M>, columns: usize, basis_dim: usize) -> Self {
