@@ -34,6 +34,7 @@ pub fn print() {
         .collect();
     let history = &looks[50..];
 
+    let vectors = candidates.concat();
     let mut evaluation = textbook::shipped(&candidates, history, &bag, &params);
     let (mut paper, frames) = warm(params.clone());
     let (mut robust, _) = warm(Preset::Robust.params());
@@ -57,7 +58,7 @@ pub fn print() {
                 u += 1;
                 black_box(robust.step(&frames[u % scene::ROUND])).expect("frames of one size");
             }),
-            Box::new(|| evaluation.compute(black_box(history))),
+            Box::new(|| evaluation.compute(&vectors, black_box(history))),
             Box::new(|| product.gemm(1.0, black_box(&left), black_box(&right), 0.0)),
         ],
     );

@@ -35,8 +35,7 @@ impl Distance {
         }
     }
 
-    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of a batch of candidates and `entry`, the
-    /// `k`-th.
+    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of each candidate of a batch, and `entry`, the `k`-th.
     #[inline(always)]
     pub fn between<const M: usize, const N: usize>(
         self,

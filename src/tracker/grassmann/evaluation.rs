@@ -13,8 +13,8 @@ use crate::tracker::weights::likelihood::{self, Likelihoods};
 /// The evaluation of N candidates against a bag, exactly as [`Tracker::step`](crate::tracker::tracker::Tracker::step)
 /// does it.
 ///
-/// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed,
-/// [`compute`](Self::compute), then the results. The buffers are kept, so one value serves all frames.
+/// The order of calls is: [`set_bag`](Self::set_bag) whenever the bag changed, [`compute`](Self::compute), then the
+/// results. The buffers are kept, so one value serves all frames.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
     sigma: f64,

@@ -5,11 +5,11 @@ use pulp::Simd;
 
 use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::grassmann::{LANES, Lanes};
-use crate::tracker::linalg::{gemm, scratch};
+use crate::tracker::linalg::gemm;
 use crate::tracker::params::table::Params;
 
-/// Values in a cache line. Vectors begin at one, and lie an extra one apart: 1024 values (8 KB) after another vector, a
-/// vector would share its places in the first cache. Together this is worth 40 % of the product's time.
+/// Values in a cache line. Vectors lie an extra one apart: 1024 values (8 KB) after another vector, a vector would share
+/// its places in the first cache.
 const LINE: usize = 8;
 
 /// The inner products of [H, v] with [μ₁, F₁, …, μ_K, F_K, H], for a batch of [`LANES`] vectors v.
@@ -27,8 +27,6 @@ pub(crate) struct InnerProducts {
     entries: usize,
     /// The bag, H (zero where there are fewer previous patches than P), the batch.
     vectors: Vec<f64>,
-    /// Where the first of them begins.
-    first: usize,
     /// A row for each of H, a column for each of the bag's vectors and of H.
     of_history: Vec<f64>,
     /// A row for each of the bag's vectors and of H, a column for each of the batch.
@@ -55,12 +53,13 @@ impl InnerProducts {
     pub fn set_bag<'a>(&mut self, bag: impl ExactSizeIterator<Item = &'a AffineSubspace>) {
         if bag.len() != self.entries {
             self.entries = bag.len();
-            let values = (self.columns() + LANES) * self.stride;
-            self.first = scratch::aligned_zeros(&mut self.vectors, values);
+            self.vectors.clear();
+            self.vectors
+                .resize((self.columns() + LANES) * self.stride, 0.0);
             self.of_history.resize(self.patches * self.columns(), 0.0);
             self.of_batch.resize(self.columns() * LANES, 0.0);
         }
-        let rows = self.vectors[self.first..].chunks_exact_mut(self.per_entry * self.stride);
+        let rows = self.vectors.chunks_exact_mut(self.per_entry * self.stride);
         for (entry, rows) in bag.zip(rows) {
             let mut rows = rows.chunks_exact_mut(self.stride);
             for (vector, row) in std::iter::once(entry.mean())
@@ -84,7 +83,7 @@ impl InnerProducts {
             "1 to P previous patches"
         );
         let (stride, columns) = (self.stride, self.columns());
-        let all = &mut self.vectors[self.first..][..columns * stride];
+        let all = &mut self.vectors[..columns * stride];
         let bag = self.entries * self.per_entry * stride;
         for (index, row) in all[bag..].chunks_exact_mut(stride).enumerate() {
             match history.get(index) {
@@ -103,7 +102,7 @@ impl InnerProducts {
     #[inline(always)]
     pub fn multiply<S: Simd>(&mut self, simd: S, candidates: &[f32]) {
         let (stride, columns) = (self.stride, self.columns());
-        let (all, batch) = self.vectors[self.first..].split_at_mut(columns * stride);
+        let (all, batch) = self.vectors.split_at_mut(columns * stride);
         let candidates = candidates.chunks_exact(self.len);
         for ((i, vector), row) in candidates.enumerate().zip(batch.chunks_exact_mut(stride)) {
             widen(vector, row);
