@@ -8,7 +8,7 @@
 
 use std::hint::black_box;
 
-use bagtrack::tracker::{AffineSubspace, GrayFrame, Params, Preset, Rect, Tracker, patch};
+use bagtrack::tracker::{AffineSubspace, Frame, Params, Preset, Rect, Tracker, patch};
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::DMatrix;
 
@@ -20,7 +20,7 @@ mod scene;
 use scene::{frame, target};
 
 fn step(criterion: &mut Criterion) {
-    let frames: Vec<GrayFrame> = (0..64).map(frame).collect();
+    let frames: Vec<Frame> = (0..64).map(frame).collect();
     let params = Preset::Paper.params();
     let mut tracker = Tracker::new(&frames[0], target(0), params).expect("a box inside the frame");
     let mut t = 0;
@@ -85,7 +85,7 @@ fn downscale(criterion: &mut Criterion) {
     criterion.bench_function("downscale", |bencher| {
         bencher.iter_batched(
             || luma.clone(),
-            |luma| GrayFrame::from_luma(1920, 1080, luma),
+            |luma| Frame::from_luma(1920, 1080, luma),
             criterion::BatchSize::LargeInput,
         )
     });

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! ```
-//! use bagtrack::tracker::{FrameError, GrayFrame, Preset, Rect, Tracker};
+//! use bagtrack::tracker::{FrameError, Frame, Preset, Rect, Tracker};
 //!
 //! /// Where the target is in frame `t`: it moves by 2 pixels to the right and 1 down in each frame.
 //! fn target(t: u32) -> Rect {
@@ -23,7 +23,7 @@
 //! }
 //!
 //! /// Draws frame `t`: a bright target with a texture, on a darker ground with another one.
-//! fn frame(t: u32) -> Result<GrayFrame, FrameError> {
+//! fn frame(t: u32) -> Result<Frame, FrameError> {
 //!     let (left, top) = (40 + 2 * t, 30 + t);
 //!     let mut luma = Vec::new();
 //!     for y in 0..120 {
@@ -35,7 +35,7 @@
 //!             });
 //!         }
 //!     }
-//!     GrayFrame::from_luma(160, 120, luma)
+//!     Frame::from_luma(160, 120, luma)
 //! }
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -179,7 +179,7 @@ fn track_takes_the_first_annotated_box_and_counts_from_zero() {
     let [left, top, width, height] = boxes(&truth)[11];
     let last = Rect::new(left - 1.0, top - 1.0, width, height);
     assert!(rect(tracked[0]).overlap(&last) < 0.4);
-    assert!(rect(tracked[11]).overlap(&last) > 0.8, "{tracked:?}");
+    assert!(rect(tracked[11]).overlap(&last) > 0.75, "{tracked:?}");
 }
 
 #[test]

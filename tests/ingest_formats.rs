@@ -3,7 +3,7 @@
 mod pictures;
 
 use bagtrack::ingest::{Limits, decode};
-use bagtrack::tracker::GrayFrame;
+use bagtrack::tracker::Frame;
 use image::{DynamicImage, ImageFormat};
 use jpeg_encoder::ColorType;
 use pictures::{BASELINE, JpegForm, color, encode, exif, gray, jpeg, jpeg_forms, jpeg_of};
@@ -11,12 +11,12 @@ use pictures::{BASELINE, JpegForm, color, encode, exif, gray, jpeg, jpeg_forms, 
 // Small enough that the working image is the picture itself; no multiple of a block.
 const SIZE: (u32, u32) = (101, 75);
 
-fn frame(bytes: &[u8]) -> GrayFrame {
+fn frame(bytes: &[u8]) -> Frame {
     decode(bytes, &Limits::default()).expect("the file is valid")
 }
 
 /// Largest and mean absolute difference to the drawn picture's luma.
-fn difference(frame: &GrayFrame, expected: &image::GrayImage) -> (u8, f64) {
+fn difference(frame: &Frame, expected: &image::GrayImage) -> (u8, f64) {
     assert_eq!((frame.width(), frame.height()), expected.dimensions());
     let differences: Vec<u8> = frame
         .pixels()

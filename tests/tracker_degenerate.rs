@@ -2,7 +2,7 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{Estimate, GrayFrame, LEAST_BOX_SIDE, Params, Rect, Tracker, TrackerError};
+use bagtrack::tracker::{Estimate, Frame, LEAST_BOX_SIDE, Params, Rect, Tracker, TrackerError};
 use proptest::prelude::*;
 use tracker_scene::{flat, frame, params, robust, variants};
 
@@ -12,7 +12,7 @@ fn assert_sound(answer: &Estimate) {
 }
 
 /// Starts on the first frame, steps through the rest, and carries a snapshot over every step.
-fn run(frames: &[GrayFrame], target: Rect, params: Params) -> Vec<Estimate> {
+fn run(frames: &[Frame], target: Rect, params: Params) -> Vec<Estimate> {
     let mut tracker = Tracker::new(&frames[0], target, params).expect("an acceptable box");
     frames[1..]
         .iter()
@@ -26,7 +26,7 @@ fn run(frames: &[GrayFrame], target: Rect, params: Params) -> Vec<Estimate> {
 }
 
 /// The same with both presets, and with each mend off.
-fn run_variants(frames: &[GrayFrame], target: Rect, seed: u64) {
+fn run_variants(frames: &[Frame], target: Rect, seed: u64) {
     for (name, params) in variants(seed) {
         println!("{name}");
         run(frames, target, params);
@@ -43,7 +43,7 @@ fn flat_frames_of_every_brightness_have_answers() {
 
 #[test]
 fn a_target_that_goes_black_and_comes_back_has_answers() {
-    let mut frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    let mut frames: Vec<Frame> = (0..8).map(frame).collect();
     frames.extend(vec![flat(120, 90, 0); 12]);
     frames.extend((8..20).map(frame));
     run_variants(&frames, tracker_scene::target(0), 2);
@@ -119,7 +119,7 @@ fn nothing_draws_the_box_away_where_nothing_can_be_told_apart() {
 
 #[test]
 fn more_basis_vectors_than_patches() {
-    let frames: Vec<GrayFrame> = (0..14).map(frame).collect();
+    let frames: Vec<Frame> = (0..14).map(frame).collect();
     for history in [1, 2] {
         for (_, params) in variants(5) {
             let params = Params {
@@ -134,7 +134,7 @@ fn more_basis_vectors_than_patches() {
 
 #[test]
 fn the_smallest_parameters_and_no_motion() {
-    let frames: Vec<GrayFrame> = (0..14).map(frame).collect();
+    let frames: Vec<Frame> = (0..14).map(frame).collect();
     let params = Params {
         particles: 1,
         patch_width: 4,
@@ -155,7 +155,7 @@ fn the_smallest_parameters_and_no_motion() {
 
 #[test]
 fn a_sigma_that_underflows_every_plain_likelihood() {
-    let frames: Vec<GrayFrame> = (0..10).map(frame).collect();
+    let frames: Vec<Frame> = (0..10).map(frame).collect();
     for (_, params) in variants(7) {
         let params = Params {
             sigma: 1e-4,
@@ -167,7 +167,7 @@ fn a_sigma_that_underflows_every_plain_likelihood() {
 
 #[test]
 fn walks_and_scales_without_bound_are_held() {
-    let frames: Vec<GrayFrame> = (0..30).map(frame).collect();
+    let frames: Vec<Frame> = (0..30).map(frame).collect();
     let edge = Rect::new(0.0, 0.0, 120.0, 90.0);
     for (name, params) in variants(8) {
         let params = Params {
@@ -191,7 +191,7 @@ fn walks_and_scales_without_bound_are_held() {
 fn frames_one_pixel_wide_or_high() {
     for (width, height) in [(1, 60), (60, 1), (1, 1), (1, 4000), (4000, 1)] {
         let pixels = (0..width * height).map(|i| (i * 37 % 251) as u8).collect();
-        let frame = GrayFrame::from_luma(width, height, pixels).expect("a frame of this size");
+        let frame = Frame::from_luma(width, height, pixels).expect("a frame of this size");
         let long = 16.0_f64.max(f64::from(width.max(height)) / 10.0);
         let target = Rect::new(0.0, 0.0, long, long);
         run(&vec![frame; 8], target, params(9));
@@ -201,10 +201,10 @@ fn frames_one_pixel_wide_or_high() {
 #[test]
 fn a_tiny_frame_with_the_largest_box() {
     for (width, height) in [(1, 1), (3, 2), (17, 5), (300, 3), (1, 300)] {
-        let frames: Vec<GrayFrame> = (0..12_u32)
+        let frames: Vec<Frame> = (0..12_u32)
             .map(|t| {
                 let pixels = (0..width * height).map(|i| ((i + t) * 53 % 251) as u8);
-                GrayFrame::from_luma(width, height, pixels.collect()).expect("a frame of this size")
+                Frame::from_luma(width, height, pixels.collect()).expect("a frame of this size")
             })
             .collect();
         let side = 4.0 * 4.0_f64.max(f64::from(width.max(height)));
@@ -215,7 +215,7 @@ fn a_tiny_frame_with_the_largest_box() {
 
 #[test]
 fn the_smallest_box_and_what_is_below_it() {
-    let frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    let frames: Vec<Frame> = (0..8).map(frame).collect();
     let least = LEAST_BOX_SIDE;
     run_variants(&frames, Rect::new(30.0, 30.0, least, least), 10);
     let refused = |target| match Tracker::new(&frames[0], target, params(10)) {
@@ -234,7 +234,7 @@ fn the_smallest_box_and_what_is_below_it() {
 
 #[test]
 fn boxes_partly_and_wholly_outside() {
-    let frames: Vec<GrayFrame> = (0..8).map(frame).collect();
+    let frames: Vec<Frame> = (0..8).map(frame).collect();
     for (x, y) in [(-19.0, 20.0), (119.0, 89.0), (30.0, -19.0), (-19.0, 89.0)] {
         run_variants(&frames, Rect::new(x, y, 20.0, 20.0), 11);
     }
@@ -267,11 +267,11 @@ proptest! {
         box_height in 0.0_f64..60.0,
         seed: u64,
     ) {
-        let frames: Vec<GrayFrame> = (0..7)
+        let frames: Vec<Frame> = (0..7)
             .map(|t| {
                 let pixel = |i| luma[(i as usize * (t + 1)) % luma.len()];
                 let pixels = (0..width * height).map(pixel).collect();
-                GrayFrame::from_luma(width, height, pixels).expect("a frame of this size")
+                Frame::from_luma(width, height, pixels).expect("a frame of this size")
             })
             .collect();
         let target = Rect::new(x, y, box_width, box_height);

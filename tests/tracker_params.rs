@@ -2,7 +2,7 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{Features, GrayFrame, Params, Rect, Search, Tracker};
+use bagtrack::tracker::{Features, Frame, Params, Rect, Search, Tracker};
 use proptest::prelude::*;
 
 /// Numbers in [0, 1], the ends and what underflows among them.
@@ -77,7 +77,7 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
 }
 
 /// A frame of `luma`, shifted by some pixels a frame and now and then black: motion, a camera, and the dark.
-fn moving(t: usize, width: u32, height: u32, luma: &[u8]) -> GrayFrame {
+fn moving(t: usize, width: u32, height: u32, luma: &[u8]) -> Frame {
     let gray = |i: usize| {
         if t % 5 == 3 {
             0
@@ -86,7 +86,7 @@ fn moving(t: usize, width: u32, height: u32, luma: &[u8]) -> GrayFrame {
         }
     };
     let pixels = (0..(width * height) as usize).map(gray).collect();
-    GrayFrame::from_luma(width, height, pixels).expect("a frame of this size")
+    Frame::from_luma(width, height, pixels).expect("a frame of this size")
 }
 
 proptest! {

@@ -2,11 +2,11 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{GrayFrame, Params, Preset, Rect, Tracker};
+use bagtrack::tracker::{Frame, Params, Preset, Rect, Tracker};
 use tracker_scene::{frame, leaping, near, panned, receding, robust, target, tilting};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
-fn mean_overlap(scene: impl Fn(usize) -> (GrayFrame, Rect), last: usize, seed: u64) -> f64 {
+fn mean_overlap(scene: impl Fn(usize) -> (Frame, Rect), last: usize, seed: u64) -> f64 {
     let (first, given) = scene(0);
     let mut tracker = Tracker::new(&first, given, robust(seed)).expect("a box inside the frame");
     let overlaps = (1..=last).map(|t| {

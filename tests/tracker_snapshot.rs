@@ -2,7 +2,7 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{GrayFrame, Params, Tracker, TrackerError};
+use bagtrack::tracker::{Frame, Params, Tracker, TrackerError};
 use proptest::prelude::*;
 use tracker_scene::{frame, params, robust, target};
 
@@ -134,7 +134,7 @@ fn must_go_on(bytes: &[u8]) {
         return;
     }
     let textured = (0..width * height).map(|i| (i * 97 % 251) as u8).collect();
-    let textured = GrayFrame::from_luma(width, height, textured).expect("a frame of this size");
+    let textured = Frame::from_luma(width, height, textured).expect("a frame of this size");
     let dark = tracker_scene::flat(width, height, 0);
     for frame in [&dark, &textured, &textured, &dark] {
         let answer = tracker.step(frame).expect("a frame of the session's size");

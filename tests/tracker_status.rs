@@ -3,7 +3,7 @@
 //! it came back.
 
 use bagtrack::sample::{Clip, Scene, Settings};
-use bagtrack::tracker::{Estimate, GrayFrame, Preset, ScoreModel, Status, Tracker};
+use bagtrack::tracker::{Estimate, Frame, Preset, ScoreModel, Status, Tracker};
 
 /// Frames that the status may take to notice: a quarter of a second of a usual video.
 const NOTICED: u32 = 6;
@@ -12,14 +12,14 @@ const LEAST_LOST: u32 = 10;
 /// Frames at the end of a clip in which the target must have been found again.
 const END: u32 = 20;
 
-fn frame(clip: &Clip, index: u32) -> GrayFrame {
+fn frame(clip: &Clip, index: u32) -> Frame {
     let picture = clip.draw(index);
     let luma = picture.pixels().map(|pixel| {
         let [red, green, blue] = pixel.0.map(f32::from);
         (0.299 * red + 0.587 * green + 0.114 * blue).round() as u8
     });
     let luma = luma.collect();
-    GrayFrame::from_luma(picture.width(), picture.height(), luma).expect("a whole picture")
+    Frame::from_luma(picture.width(), picture.height(), luma).expect("a whole picture")
 }
 
 fn follow(clip: &Clip, seed: u64) -> Vec<Estimate> {

@@ -6,7 +6,7 @@ mod tracker_scene;
 
 use std::collections::VecDeque;
 
-use bagtrack::tracker::{AffineSubspace, GrayFrame, Params, Preset, Rect, Tracker, patch};
+use bagtrack::tracker::{AffineSubspace, Frame, Params, Preset, Rect, Tracker, patch};
 use tracker_scene::{frame, target};
 
 /// What the textbook remembers of the frames before.
@@ -19,7 +19,7 @@ struct Memory {
 }
 
 impl Memory {
-    fn of(frame: &GrayFrame, target: &Rect, params: &Params) -> Self {
+    fn of(frame: &Frame, target: &Rect, params: &Params) -> Self {
         let mut memory = Self {
             params: params.clone(),
             history: VecDeque::new(),
@@ -34,7 +34,7 @@ impl Memory {
     }
 
     /// Section III-C: the bag takes the answer's subspace every W frames, in place of the oldest when it is full.
-    fn learn(&mut self, frame: &GrayFrame, answer: &Rect, number: u32) {
+    fn learn(&mut self, frame: &Frame, answer: &Rect, number: u32) {
         let params = &self.params;
         let newest = patch(frame, answer, params);
         if number.is_multiple_of(params.update_every) {

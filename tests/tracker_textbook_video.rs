@@ -4,7 +4,7 @@ mod textbook;
 
 use std::path::{Path, PathBuf};
 
-use bagtrack::tracker::{AffineSubspace, GrayFrame, Params, Preset, Rect, patch};
+use bagtrack::tracker::{AffineSubspace, Frame, Params, Preset, Rect, patch};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -35,9 +35,9 @@ fn sequence(folder: &Path) -> Sequence {
     Sequence { frames, boxes }
 }
 
-fn gray(path: &Path) -> GrayFrame {
+fn gray(path: &Path) -> Frame {
     let luma = image::open(path).expect("a frame that decodes").to_luma8();
-    GrayFrame::from_luma(luma.width(), luma.height(), luma.into_raw()).expect("a frame")
+    Frame::from_luma(luma.width(), luma.height(), luma.into_raw()).expect("a frame")
 }
 
 #[test]

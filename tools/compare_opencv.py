@@ -53,10 +53,17 @@ class Static:
         return True, self.box
 
 
-def new_tracker(name):
-    """A tracker of OpenCV by its short name, from wherever this version keeps it."""
+def new_tracker(name, nano=None):
+    """A tracker of OpenCV by its short name, from wherever this version keeps it; `nano` is that of the model files."""
     if name == "static":
         return Static()
+    if name == "Nano":
+        parameters = cv2.TrackerNano_Params()
+        parameters.backbone, parameters.neckhead = map(str, nano)
+        try:
+            return cv2.TrackerNano_create(parameters)
+        except cv2.error as error:
+            sys.exit(f"compare_opencv: --nano: OpenCV cannot read the two model files: {error}")
     for module in (cv2, getattr(cv2, "legacy", None)):
         create = getattr(module, f"Tracker{name}_create", None)
         if create is not None:
@@ -106,11 +113,11 @@ def overlap(a, b):
     return shared / (a[2] * a[3] + b[2] * b[3] - shared)
 
 
-def updates(name, frames, boxes):
+def updates(name, frames, boxes, nano=None):
     """One tracker through one sequence: for each frame after the first the seconds of its update, whether it says that it
     has the target, and its box, which is held while it has not."""
     cv2.setRNGSeed(SEED)
-    tracker = new_tracker(name)
+    tracker = new_tracker(name, nano)
     held = boxes[0] if name == "static" else tuple(round(value) for value in boxes[0])
     tracker.init(frames[0], held)
     for frame in frames[1:]:
@@ -126,10 +133,10 @@ def updates(name, frames, boxes):
         yield seconds, found, held
 
 
-def track(name, frames, boxes):
+def track(name, frames, boxes, nano=None):
     """One tracker through one sequence: its figures under the names that `bagtrack eval` gives them."""
     errors, overlaps, spent = [], [], 0.0
-    for truth, (seconds, _, held) in zip(boxes[1:], updates(name, frames, boxes)):
+    for truth, (seconds, _, held) in zip(boxes[1:], updates(name, frames, boxes, nano)):
         spent += seconds
         if truth is not None:
             errors.append(center_error(held, truth))
@@ -219,6 +226,10 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_common(parser)
     parser.add_argument("--trackers", default=",".join(ALL), help="which of OpenCV's, by commas (default: %(default)s); may be empty")
+    parser.add_argument(
+        "--nano", nargs=2, type=pathlib.Path, metavar=("BACKBONE", "HEAD"),
+        help="also OpenCV's TrackerNano with these two ONNX files, nanotrack_backbone_sim.onnx and nanotrack_head_sim.onnx",
+    )
     parser.add_argument("--presets", default="robust", help="bagtrack's presets, by commas (default: %(default)s)")
     parser.add_argument("--seeds", default=10, type=positive, help="bagtrack's seeds (default: %(default)s)")
     args = parser.parse_args()
@@ -228,6 +239,11 @@ def arguments():
         if name.lower() not in known:
             parser.error(f"there is no tracker {name}; there are {', '.join(ALL)}")
     args.trackers = [known[name.lower()] for name in wanted]
+    for file in args.nano or []:
+        if not file.is_file():
+            parser.error(f"--nano: {file} is not a file")
+    if args.nano:
+        args.trackers.append("Nano")
     args.presets = [name.strip() for name in args.presets.split(",") if name.strip()]
     args.sequences = folders(args.sequences, parser)
     return args
@@ -252,7 +268,7 @@ def main():
             frames, boxes = load(folder)
         for name in args.trackers:
             print(f"{name} on {folder.name} ...", file=sys.stderr)
-            results[name].append(track(name, frames, boxes))
+            results[name].append(track(name, frames, boxes, args.nano))
     seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
     print(f"{len(names)} sequences; bagtrack: mean over {seeds}; OpenCV {cv2.__version__}; one thread each.\n")
     print(report(names, results))

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Decoding of JPEGs in bagtrack beside OpenCV's imdecode to reduced gray, on the same files in one run.
+"""Decoding of JPEGs in bagtrack beside OpenCV's imdecode in colour, on the same files in one run.
 
     tools/decode_table.py [VIDEO_FRAME.jpg]
 
 Needs cargo and python3 with cv2 (opencv-python), and for the feature `turbo` a C compiler, cmake and nasm. The frame, or else a drawn one, is scaled to four sizes and written
-as JPEG of quality 85, 4:2:0. bagtrack decodes each to its working image (luma, strict, at most 320 pixels
-on the longer side), without and with the feature `turbo`; OpenCV decodes it with the greatest reduction (2, 4 or 8) that leaves at least the working
-image, and area-averages the rest. Printed: medians in milliseconds, one thread; each file is decoded by all in turn,
+as JPEG of quality 85, 4:2:0. bagtrack decodes each, in colour and strictly, to the working image of a target that has a
+sixth of the frame's width and height, and of one of 24 x 24 pixels, without and with the feature `turbo`. OpenCV decodes
+it in colour with the greatest reduction (2, 4 or 8) that leaves at least that size, and area-averages the rest. Printed: medians in milliseconds, one thread; each file is decoded by all in turn,
 several times over, and a ratio is the median of those of the turns.
 """
 
@@ -22,15 +22,14 @@ import cv2
 import numpy
 
 SIZES = [(320, 240), (640, 480), (1280, 720), (1920, 1080)]
-WORKING_SIDE = 320
 ROUNDS = 40
 TURNS = 5
 PROJECT = pathlib.Path(__file__).resolve().parent.parent
 REDUCED = {
-    1: cv2.IMREAD_GRAYSCALE,
-    2: cv2.IMREAD_REDUCED_GRAYSCALE_2,
-    4: cv2.IMREAD_REDUCED_GRAYSCALE_4,
-    8: cv2.IMREAD_REDUCED_GRAYSCALE_8,
+    1: cv2.IMREAD_COLOR,
+    2: cv2.IMREAD_REDUCED_COLOR_2,
+    4: cv2.IMREAD_REDUCED_COLOR_4,
+    8: cv2.IMREAD_REDUCED_COLOR_8,
 }
 
 
@@ -47,16 +46,15 @@ def drawn():
     return numpy.clip(picture + noise, 0, 255).astype(numpy.uint8)
 
 
-def opencv_ms(data, width):
-    """Median milliseconds of imdecode to reduced gray and down to the working side."""
-    factor = max(f for f in REDUCED if f == 1 or width / f >= WORKING_SIDE)
+def opencv_ms(data, width, working):
+    """Median milliseconds of imdecode in reduced colour and down to the working size."""
+    factor = max(f for f in REDUCED if f == 1 or width / f >= working[0])
     times = []
     for _ in range(ROUNDS):
         start = time.perf_counter()
-        gray = cv2.imdecode(data, REDUCED[factor])
-        if gray.shape[1] > WORKING_SIDE:
-            size = (WORKING_SIDE, round(gray.shape[0] * WORKING_SIDE / gray.shape[1]))
-            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+        decoded = cv2.imdecode(data, REDUCED[factor])
+        if decoded.shape[1] > working[0]:
+            cv2.resize(decoded, working, interpolation=cv2.INTER_AREA)
         times.append(time.perf_counter() - start)
     return statistics.median(times) * 1e3, factor
 
@@ -70,10 +68,10 @@ def program(features):
 
 
 def bagtrack_ms(tables, file):
-    """Median milliseconds of decoding, and of a step."""
+    """For each target the working size, and median milliseconds of decoding and of a step."""
     table = subprocess.run([tables, "decode", file], check=True, capture_output=True, text=True)
-    _, _, _, decode, step = table.stdout.splitlines()[1].split("\t")
-    return float(decode), float(step)
+    rows = [line.split("\t") for line in table.stdout.splitlines()[1:]]
+    return [((int(row[3]), int(row[4])), float(row[5]), float(row[6])) for row in rows]
 
 
 def main():
@@ -90,20 +88,22 @@ def main():
                 sys.exit(f"{file} cannot be written")
             files.append(str(file))
         programs = [program([]), program(["--features", "turbo"])]
-        print("| frame | KiB | OpenCV ms (reduction) | bagtrack ms | ratio | with `turbo` ms | ratio | step ms |")
-        print("|---|---|---|---|---|---|---|---|")
+        print("| frame | KiB | decoded to | OpenCV ms (reduction) | bagtrack ms | ratio | with `turbo` ms | ratio | step ms |")
+        print("|---|---|---|---|---|---|---|---|---|")
         for (width, height), file in zip(SIZES, files):
             data = numpy.fromfile(file, numpy.uint8)
-            turns = []
+            turns = {}
             for _ in range(TURNS):
-                theirs, factor = opencv_ms(data, width)
-                (default, step), (turbo, _) = (bagtrack_ms(tables, file) for tables in programs)
-                turns.append((theirs, default, default / theirs, turbo, turbo / theirs, step))
-            theirs, default, ratio, turbo, turbo_ratio, step = (statistics.median(column) for column in zip(*turns))
-            print(
-                f"| {width} × {height} | {len(data) // 1024} | {theirs:.3f} (1/{factor}) | {default:.3f} | {ratio:.2f} "
-                f"| {turbo:.3f} | {turbo_ratio:.2f} | {step:.3f} |"
-            )
+                for (working, default, step), (_, turbo, _) in zip(*(bagtrack_ms(tables, file) for tables in programs)):
+                    theirs, factor = opencv_ms(data, width, working)
+                    row = (theirs, default, default / theirs, turbo, turbo / theirs, step)
+                    turns.setdefault((working, factor), []).append(row)
+            for (working, factor), rows in turns.items():
+                theirs, default, ratio, turbo, turbo_ratio, step = (statistics.median(column) for column in zip(*rows))
+                print(
+                    f"| {width} × {height} | {len(data) // 1024} | {working[0]} × {working[1]} | {theirs:.3f} (1/{factor}) "
+                    f"| {default:.3f} | {ratio:.2f} | {turbo:.3f} | {turbo_ratio:.2f} | {step:.3f} |"
+                )
 
 
 if __name__ == "__main__":

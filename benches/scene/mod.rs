@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each benchmark uses its part.
 
-use bagtrack::tracker::{GrayFrame, Rect};
+use bagtrack::tracker::{Frame, Rect};
 
 /// Width of a frame.
 pub const WIDTH: usize = 320;
@@ -54,12 +54,12 @@ pub fn wall(width: usize, height: usize) -> Vec<u8> {
 }
 
 /// Frame `t`.
-pub fn frame(t: usize) -> GrayFrame {
-    GrayFrame::from_luma(WIDTH as u32, HEIGHT as u32, luma(t, 1)).expect("a frame of this size")
+pub fn frame(t: usize) -> Frame {
+    Frame::from_luma(WIDTH as u32, HEIGHT as u32, luma(t, 1)).expect("a frame of this size")
 }
 
 /// All frames of a round.
-pub fn frames() -> Vec<GrayFrame> {
+pub fn frames() -> Vec<Frame> {
     (0..ROUND).map(frame).collect()
 }
 

@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Preset, Rect, Tracker};
+use bagtrack::ingest::{self, IngestError, Limits};
+use bagtrack::tracker::{Frame, Preset, Rect, Tracker};
 
 use crate::clock;
 
@@ -16,50 +16,63 @@ fn read(file: &str) -> Vec<u8> {
     })
 }
 
-/// Prints a line for each file: its size, milliseconds to decode it to a working image, milliseconds of a step on that.
+/// Prints two lines for each file, for a large target and for one of 24 x 24 pixels: its size, the working size,
+/// milliseconds to decode it to that, milliseconds of a step on it.
 pub fn print(files: &[&str]) {
-    println!("file\twidth\theight\tdecode_ms\tstep_ms");
+    println!("file\twidth\theight\tworking_width\tworking_height\tdecode_ms\tstep_ms");
     for file in files {
         let bytes = read(file);
-        let limits = Limits::default();
-        let frame = ingest::decode(&bytes, &limits).unwrap_or_else(|error| {
-            eprintln!("tables: {file}: {error}");
-            std::process::exit(2);
-        });
-        let (width, height) = frame.source_size();
+        let whole = decoded(ingest::decode(&bytes, &Limits::default()), file);
+        let (width, height) = whole.source_size();
         let (w, h) = (f64::from(width), f64::from(height));
-        let target = Rect::new(w * 0.4, h * 0.4, w * 0.2, h * 0.2);
-        let mut tracker = Tracker::new(&frame, target, Preset::default().params())
-            .expect("a box inside the frame");
-        for _ in 0..60 {
-            tracker.step(&frame).expect("the same frame");
+        let large = Rect::new(w * 0.4, h * 0.4, w / 6.0, h / 6.0);
+        for target in [large, Rect::centered(w / 2.0, h / 2.0, 24.0, 24.0)] {
+            print_target(file, &bytes, target);
         }
-        let times = clock::medians(
-            ROUNDS,
-            vec![
-                Box::new(|| {
-                    black_box(ingest::decode(black_box(&bytes), &limits)).expect("decoded before");
-                }),
-                Box::new(|| {
-                    black_box(tracker.step(&frame)).expect("the same frame");
-                }),
-            ],
-        );
-        println!(
-            "{file}\t{width}\t{height}\t{:.3}\t{:.3}",
-            times[0] * 1e3,
-            times[1] * 1e3
-        );
     }
+}
+
+fn decoded(frame: Result<Frame, IngestError>, file: &str) -> Frame {
+    frame.unwrap_or_else(|error| {
+        eprintln!("tables: {file}: {error}");
+        std::process::exit(2);
+    })
+}
+
+fn print_target(file: &str, bytes: &[u8], target: Rect) {
+    let limits = Limits::default();
+    let params = Preset::default().params();
+    let format = |source| params.frame_format(source, &target);
+    let decode = || decoded(ingest::decode_to(black_box(bytes), &limits, &format), file);
+    let frame = decode();
+    let ((width, height), size) = (frame.source_size(), (frame.width(), frame.height()));
+    let mut tracker = Tracker::new(&frame, target, params.clone()).expect("a box inside the frame");
+    for _ in 0..60 {
+        tracker.step(&frame).expect("the same frame");
+    }
+    let times = clock::medians(
+        ROUNDS,
+        vec![
+            Box::new(|| ingest::recycle(black_box(decode()))),
+            Box::new(|| {
+                black_box(tracker.step(&frame)).expect("the same frame");
+            }),
+        ],
+    );
+    println!(
+        "{file}\t{width}\t{height}\t{}\t{}\t{:.3}\t{:.3}",
+        size.0,
+        size.1,
+        times[0] * 1e3,
+        times[1] * 1e3
+    );
 }
 
 /// Decodes `file` `count` times.
 pub fn repeat(count: usize, file: &str) {
     let bytes = read(file);
     for _ in 0..count {
-        black_box(ingest::decode(black_box(&bytes), &Limits::default())).unwrap_or_else(|error| {
-            eprintln!("tables: {file}: {error}");
-            std::process::exit(2);
-        });
+        let frame = ingest::decode(black_box(&bytes), &Limits::default());
+        ingest::recycle(black_box(decoded(frame, file)));
     }
 }

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{GrayFrame, Params, Preset, Tracker};
+use bagtrack::tracker::{Frame, Params, Preset, Tracker};
 use jpeg_encoder::{ColorType, Encoder};
 
 use crate::clock::Action;
@@ -98,7 +98,7 @@ fn steps(
         change(&mut params, value);
         warm(params)
     };
-    let mut trackers: Vec<(Tracker, Vec<GrayFrame>)> = values.iter().map(with).collect();
+    let mut trackers: Vec<(Tracker, Vec<Frame>)> = values.iter().map(with).collect();
     let actions = trackers.iter_mut().map(|(tracker, frames)| {
         let mut t = 0;
         let step = move || {
@@ -156,14 +156,14 @@ struct FrameSize {
     zoom: usize,
     jpeg: Vec<u8>,
     luma: Vec<u8>,
-    seen: GrayFrame,
+    seen: Frame,
     /// Of both presets.
     trackers: [Tracker; 2],
 }
 
-fn frame(zoom: usize, luma: &[u8]) -> GrayFrame {
+fn frame(zoom: usize, luma: &[u8]) -> Frame {
     let (width, height) = (scene::WIDTH * zoom, scene::HEIGHT * zoom);
-    GrayFrame::from_luma(width as u32, height as u32, luma.to_vec()).expect("a frame of this size")
+    Frame::from_luma(width as u32, height as u32, luma.to_vec()).expect("a frame of this size")
 }
 
 impl FrameSize {

@@ -29,7 +29,7 @@ mod textbook;
 use bagtrack::tracker::{Params, Preset, Tracker};
 
 /// A tracker of the scene with a full history and a full bag, and its frames.
-fn warm(params: Params) -> (Tracker, Vec<bagtrack::tracker::GrayFrame>) {
+fn warm(params: Params) -> (Tracker, Vec<bagtrack::tracker::Frame>) {
     let frames = scene::frames();
     let until = (params.bag_size * params.update_every) as usize + 1;
     let mut tracker =

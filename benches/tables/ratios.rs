@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use bagtrack::sample::{Clip, Scene, Settings};
-use bagtrack::tracker::{AffineSubspace, GrayFrame, Preset, Rect, Status, Tracker, patch};
+use bagtrack::tracker::{AffineSubspace, Frame, Preset, Rect, Status, Tracker, patch};
 use nalgebra::DMatrix;
 
 use crate::{clock, scene, textbook, warm};
@@ -114,7 +114,7 @@ fn out_of_sight(held: f64) -> (f64, String) {
     let clip = Clip::new(settings).expect("the settings are in order");
     let frame = |index: u32| {
         let luma = image::DynamicImage::from(clip.draw(index)).into_luma8();
-        GrayFrame::from_luma(luma.width(), luma.height(), luma.into_raw()).expect("a whole picture")
+        Frame::from_luma(luma.width(), luma.height(), luma.into_raw()).expect("a whole picture")
     };
     let mut tracker = Tracker::new(&frame(0), clip.target(0), Preset::Robust.params())
         .expect("a box inside the frame");
@@ -124,7 +124,7 @@ fn out_of_sight(held: f64) -> (f64, String) {
         index += 1;
     }
     let hidden = (index..clip.frames()).take_while(|&index| clip.visible(index) == 0.0);
-    let hidden: Vec<GrayFrame> = hidden.map(frame).collect();
+    let hidden: Vec<Frame> = hidden.map(frame).collect();
     // Twice through the hidden frames, so that the search reaches its full width.
     for frame in hidden.iter().chain(&hidden) {
         tracker.step(frame).expect("frames of one size");

@@ -94,12 +94,19 @@ fn advance(
     target: Rect,
     params: &Params,
 ) -> Result<Estimate, Box<dyn std::error::Error>> {
-    let frame = ingest::decode(bytes, &Limits::default())?;
+    let limits = Limits::default();
     match tracker {
-        Some(tracker) => Ok(tracker.step(&frame)?),
-        None => Ok(tracker
-            .insert(Tracker::new(&frame, target, params.clone())?)
-            .estimate()),
+        Some(tracker) => {
+            let format = tracker.frame_format();
+            let frame = ingest::decode_to(bytes, &limits, &|_| format)?;
+            Ok(tracker.step(&frame)?)
+        }
+        None => {
+            let format = |source| params.frame_format(source, &target);
+            let frame = ingest::decode_to(bytes, &limits, &format)?;
+            let first = Tracker::new(&frame, target, params.clone())?;
+            Ok(tracker.insert(first).estimate())
+        }
     }
 }
 

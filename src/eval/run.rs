@@ -2,7 +2,8 @@
 
 use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
-use crate::tracker::{Evidence, Params, Status, Tracker, TrackerError};
+use super::sequence_error::SequenceError;
+use crate::tracker::{Evidence, Frame, Params, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -22,6 +23,9 @@ pub enum EvalError {
         /// What the tracker says.
         source: TrackerError,
     },
+    /// A frame cannot be decoded.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
     /// The first frame, or every frame after it, has no annotation: there is nothing to start from or to measure.
     #[error("{0}: the first frame that is played and at least one more must be annotated")]
     NothingToScore(String),
@@ -80,7 +84,7 @@ impl SequenceRuns {
 }
 
 impl SeedRun {
-    fn track(sequence: &Sequence, params: Params) -> Result<Self, EvalError> {
+    fn track(sequence: &Sequence, frames: &[Frame], params: Params) -> Result<Self, EvalError> {
         let refuse = |frame: usize| {
             move |source| EvalError::Tracker {
                 sequence: sequence.name.clone(),
@@ -90,10 +94,10 @@ impl SeedRun {
         };
         let nothing = || EvalError::NothingToScore(sequence.name.clone());
         let first = sequence.boxes[0].ok_or_else(nothing)?;
-        let mut tracker = Tracker::new(&sequence.frames[0], first, params).map_err(refuse(0))?;
+        let mut tracker = Tracker::new(&frames[0], first, params).map_err(refuse(0))?;
         let mut scored = Vec::new();
         let mut step_time = Duration::ZERO;
-        for (index, frame) in sequence.frames.iter().enumerate().skip(1) {
+        for (index, frame) in frames.iter().enumerate().skip(1) {
             let start = Instant::now();
             let estimate = tracker.step(frame);
             step_time += start.elapsed();
@@ -113,7 +117,7 @@ impl SeedRun {
         if scored.is_empty() {
             return Err(nothing());
         }
-        let steps = (sequence.frames.len() - 1) as f64;
+        let steps = (frames.len() - 1) as f64;
         Ok(Self {
             scored,
             step_ms: step_time.as_secs_f64() * 1000.0 / steps,
@@ -132,12 +136,16 @@ pub fn run(
     seeds: NonZeroUsize,
     jobs: NonZeroUsize,
 ) -> Result<SequenceRuns, EvalError> {
+    if sequence.boxes[0].is_none() {
+        return Err(EvalError::NothingToScore(sequence.name.clone()));
+    }
+    let frames = sequence.frames(params)?;
     let one = |seed: usize| {
         let params = Params {
             seed: seed as u64,
             ..params.clone()
         };
-        SeedRun::track(sequence, params)
+        SeedRun::track(sequence, &frames, params)
     };
     let next = AtomicUsize::new(0);
     let work = || {
@@ -174,7 +182,7 @@ pub fn run(
         .collect::<Result<Vec<SeedRun>, EvalError>>()?;
     Ok(SequenceRuns {
         name: sequence.name.clone(),
-        frames: sequence.frames.len(),
+        frames: frames.len(),
         annotated: sequence.boxes.iter().flatten().count(),
         seeds,
     })

@@ -4,26 +4,34 @@ use super::frames;
 use super::playback::Playback;
 use super::sequence_error::SequenceError;
 use crate::ingest::{self, Limits};
-use crate::tracker::{GrayFrame, Rect};
+use crate::tracker::{Frame, FrameFormat, Params, Rect};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Frames with the boxes that people drew on them, in the order in which they are played.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Sequence {
     /// Name of the folder.
     pub name: String,
-    /// The frames, decoded as the service decodes them.
-    pub frames: Vec<GrayFrame>,
+    /// The folder, and the file of each frame.
+    dir: PathBuf,
+    files: Vec<PathBuf>,
+    limits: Limits,
+    /// The frames in the format that was asked for last.
+    decoded: Mutex<Option<Decoded>>,
     /// The box of each frame in 0-based pixels from the top-left corner; none where the frame is not annotated.
     pub boxes: Vec<Option<Rect>>,
 }
+
+/// All frames of a sequence in one format.
+type Decoded = (FrameFormat, Arc<Vec<Frame>>);
 
 impl Sequence {
     /// Name of the file with the boxes.
     pub const BOXES: &'static str = "groundtruth_rect.txt";
 
-    /// Reads and decodes a sequence, from its first frame to its last.
+    /// Reads a sequence, from its first frame to its last.
     ///
     /// # Errors
     /// As [`Self::load_played`]; a first frame without a box is one.
@@ -31,7 +39,7 @@ impl Sequence {
         Self::load_played(dir, Playback::default(), limits)
     }
 
-    /// Reads and decodes the frames of a sequence that are played, in that order.
+    /// Reads the frames of a sequence that are played, in that order.
     ///
     /// # Errors
     /// A missing or unreadable folder, file or frame; another number of boxes than frames; no box to start with.
@@ -52,14 +60,6 @@ impl Sequence {
             )));
         }
         let order = playback.order(&boxes).map_err(refuse)?;
-        let mut decoded = Vec::with_capacity(order.len());
-        for path in order.iter().map(|&index| &paths[index]) {
-            let file = path.file_name().unwrap_or_default().display();
-            let bytes = fs::read(path).map_err(|error| refuse(format!("{file}: {error}")))?;
-            let frame = ingest::decode(&bytes, limits)
-                .map_err(|error| refuse(format!("{file}: {error}")))?;
-            decoded.push(frame);
-        }
         let name = dir.canonicalize().ok().unwrap_or_else(|| dir.to_owned());
         Ok(Self {
             name: name
@@ -67,9 +67,39 @@ impl Sequence {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned(),
-            frames: decoded,
+            dir: dir.to_owned(),
+            files: order.iter().map(|&index| paths[index].clone()).collect(),
+            limits: *limits,
+            decoded: Mutex::default(),
             boxes: order.into_iter().map(|index| boxes[index]).collect(),
         })
+    }
+
+    /// The frames as the service decodes them for a session with `params` that starts with the first box; decoded once
+    /// for parameters with the same format.
+    ///
+    /// # Errors
+    /// A frame that is unreadable, or no first box.
+    pub fn frames(&self, params: &Params) -> Result<Arc<Vec<Frame>>, SequenceError> {
+        let refuse = |reason: String| SequenceError::new(&self.dir, reason);
+        let first = self.boxes[0].ok_or_else(|| refuse("its first frame has no box".to_owned()))?;
+        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+        let wanted = |source| params.frame_format(source, &first);
+        let read = |path: &PathBuf, format: &dyn Fn((u32, u32)) -> FrameFormat| {
+            let file = path.file_name().unwrap_or_default().display();
+            let bytes = fs::read(path).map_err(|error| refuse(format!("{file}: {error}")))?;
+            ingest::decode_to(&bytes, &self.limits, format)
+                .map_err(|error| refuse(format!("{file}: {error}")))
+        };
+        let source = read(&self.files[0], &wanted)?.source_size();
+        let format = wanted(source);
+        if let Some((_, frames)) = decoded.as_ref().filter(|(known, _)| *known == format) {
+            return Ok(frames.clone());
+        }
+        let frames = self.files.iter().map(|path| read(path, &|_| format));
+        let frames = Arc::new(frames.collect::<Result<Vec<Frame>, SequenceError>>()?);
+        *decoded = Some((format, frames.clone()));
+        Ok(frames)
     }
 
     /// Reads the boxes of the sequence in `dir`.

@@ -3,7 +3,7 @@
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
 use crate::sessions::{Fingerprint, LockedSession, ReplayDecision};
-use crate::tracker::{Estimate, GrayFrame, Rect, TrackerError};
+use crate::tracker::{Estimate, Frame, FrameFormat, Rect, TrackerError};
 use axum::body::Bytes;
 
 /// The next frames of a session, as they were received.
@@ -52,7 +52,8 @@ impl NextFrames {
                 replayed: true,
             });
         }
-        let decoded = decode(&self.files, limits)?;
+        let format = locked.session().frame_format();
+        let decoded = decode(&self.files, limits, &|_| format)?;
         self.check_sizes(&decoded, locked.session().source_size())?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let state = locked.state();
@@ -77,12 +78,8 @@ impl NextFrames {
     }
 
     /// Refuses a frame whose size is not the session's.
-    fn check_sizes(
-        &self,
-        frames: &[GrayFrame],
-        (width, height): (u32, u32),
-    ) -> Result<(), Problem> {
-        let mut sizes = frames.iter().map(GrayFrame::source_size);
+    fn check_sizes(&self, frames: &[Frame], (width, height): (u32, u32)) -> Result<(), Problem> {
+        let mut sizes = frames.iter().map(Frame::source_size);
         let Some(index) = sizes.position(|size| size != (width, height)) else {
             return Ok(());
         };
@@ -97,13 +94,17 @@ impl NextFrames {
     }
 }
 
-/// Decodes all files of a request.
+/// Decodes all files of a request in the format that `format` says for uploads of a size.
 ///
 /// # Errors
 /// The problem of the first bad file.
-pub fn decode(files: &[Bytes], limits: &Limits) -> Result<Vec<GrayFrame>, Problem> {
+pub fn decode(
+    files: &[Bytes],
+    limits: &Limits,
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+) -> Result<Vec<Frame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {
-        ingest::decode(file, limits)
+        ingest::decode_to(file, limits, format)
             .map_err(|error| Problem::from(error).of_frame(index, files.len()))
     };
     files.iter().enumerate().map(decode_one).collect()

@@ -182,7 +182,8 @@ async fn start(
     let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
     let start = move || {
-        let frame = &advance::decode(&upload.files, &limits)?[0];
+        let format = |source| params.frame_format(source, &target);
+        let frame = &advance::decode(&upload.files, &limits, &format)?[0];
         let tracker = Tracker::new(frame, target, params)?;
         let fingerprint = Fingerprint::of(&upload.files[0]);
         Ok(SessionState::new(tracker, fingerprint, target))

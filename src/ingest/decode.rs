@@ -1,4 +1,4 @@
-//! The steps from bytes to a frame: sniff, limit, decode strictly, luma, EXIF orientation, downscale.
+//! The steps from bytes to a frame: sniff, limit, decode strictly, luma and chroma, EXIF orientation, downscale.
 
 use super::catch_decoder_panic::catch_decoder_panic;
 use super::error::IngestError;
@@ -6,39 +6,56 @@ use super::limits::Limits;
 use super::scratch::Scratch;
 use super::sniff::{self, Format};
 use super::{jpeg, raster};
-use crate::tracker::GrayFrame;
+use crate::tracker::{Frame, FrameFormat};
 use std::cell::RefCell;
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// Decodes one uploaded frame.
-///
-/// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the working image. A thread keeps some
-/// of them for its next frame, at most 32 MiB.
+/// Decodes one uploaded frame in its own size, in colour where it has any.
 ///
 /// # Errors
 /// See [`IngestError`].
-pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GrayFrame, IngestError> {
+pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Frame, IngestError> {
+    let whole = |size| FrameFormat {
+        size,
+        has_color: true,
+    };
+    decode_to(bytes, limits, &whole)
+}
+
+/// Decodes one uploaded frame in the format that a session wants: `format` says it from the upload's width and height.
+/// A frame that is smaller than that stays as it is.
+///
+/// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of them
+/// for its next frame, at most 32 MiB.
+///
+/// # Errors
+/// See [`IngestError`].
+pub fn decode_to(
+    bytes: &[u8],
+    limits: &Limits,
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+) -> Result<Frame, IngestError> {
     limits.check_bytes(bytes.len())?;
-    let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
-    catch_decoder_panic(format, || {
+    let file = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
+    catch_decoder_panic(file, || {
         SCRATCH.with_borrow_mut(|scratch| {
-            let working = std::mem::take(&mut scratch.working);
-            let stored = match format {
-                Format::Jpeg => jpeg::decode(bytes, limits, scratch)?,
-                Format::Png => raster::decode_png(bytes, limits)?,
-                Format::WebP => raster::decode_webp(bytes, limits)?,
+            let planes = std::mem::take(&mut scratch.planes);
+            let (stored, format) = match file {
+                Format::Jpeg => jpeg::decode(bytes, limits, format, scratch)?,
+                Format::Png => raster::decode_png(bytes, limits, format)?,
+                Format::WebP => raster::decode_webp(bytes, limits, format)?,
             };
-            let frame = stored.into_frame(working);
+            let frame = stored.into_frame(format, planes);
             scratch.trim();
-            frame.map_err(|error| format.damaged(error.to_string()))
+            frame.map_err(|error| file.damaged(error.to_string()))
         })
     })
 }
 
 /// Keeps the memory of a frame that is no longer needed, for the next one that this thread decodes.
-pub fn recycle(frame: GrayFrame) {
-    SCRATCH.with_borrow_mut(|scratch| scratch.working = frame.into_pixels());
+pub fn recycle(frame: Frame) {
+    SCRATCH.with_borrow_mut(|scratch| scratch.planes = frame.into_planes());
 }

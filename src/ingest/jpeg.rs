@@ -1,4 +1,4 @@
-//! JPEG, decoded strictly and straight to luma.
+//! JPEG, decoded strictly, to the channels that it stores.
 
 use super::error::IngestError;
 use super::jpeg_markers::Markers;
@@ -7,7 +7,8 @@ use super::luma::luma_of_rgb8;
 use super::orientation;
 use super::scratch::Scratch;
 use super::sniff::Format;
-use super::stored_luma::StoredLuma;
+use super::stored_image::{Channel, StoredImage};
+use crate::tracker::{FrameFormat, ycbcr};
 use std::borrow::Cow;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -15,12 +16,13 @@ use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 
-/// The luma of a JPEG: at full size or, with libjpeg-turbo, reduced.
+/// A JPEG's luma and chroma: at full size or, with libjpeg-turbo, reduced.
 pub(super) fn decode<'scratch>(
     bytes: &[u8],
     limits: &Limits,
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
     scratch: &'scratch mut Scratch,
-) -> Result<StoredLuma<'scratch>, IngestError> {
+) -> Result<(StoredImage<'scratch>, FrameFormat), IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
     let markers = Markers::read(bytes).map_err(damaged)?;
     limits.check_size(markers.width, markers.height)?;
@@ -29,30 +31,45 @@ pub(super) fn decode<'scratch>(
     }
     let source = (markers.width, markers.height);
     let orientation = orientation::of_exif(markers.exif(bytes));
+    let format = format(orientation::upright(source, orientation));
     #[cfg(feature = "turbo")]
-    if let Some(size) = super::turbo::decode(bytes, &markers, limits, &mut scratch.pixels) {
-        return Ok(StoredLuma {
-            luma: Cow::Borrowed(&scratch.pixels[..size.0 as usize * size.1 as usize]),
-            size,
-            source,
-            orientation,
-        });
+    {
+        // Before it is turned upright, as the decoder sees it.
+        let stored_format = FrameFormat {
+            size: orientation::upright(format.size, orientation),
+            ..format
+        };
+        let pixels = &mut scratch.pixels;
+        if let Some(planes) = super::turbo::decode(bytes, &markers, limits, stored_format, pixels) {
+            let stored = planes.of(&scratch.pixels, source, orientation);
+            return Ok((stored, format));
+        }
     }
-    Ok(StoredLuma {
-        luma: decode_whole(bytes, &markers, limits, scratch)?,
+    let (luma, chroma) = decode_whole(bytes, &markers, limits, format.has_color, scratch)?;
+    let channel = |values| Channel {
+        values,
         size: source,
+    };
+    let stored = StoredImage {
+        luma: channel(luma),
+        chroma: chroma.map(|planes| planes.map(|plane| channel(Cow::Owned(plane)))),
         source,
         orientation,
-    })
+    };
+    Ok((stored, format))
 }
 
-/// The luma at full size, with zune-jpeg.
+/// Luma and, where it is wanted, chroma, as the file has them.
+type Channels<'a> = (Cow<'a, [u8]>, Option<[Vec<u8>; 2]>);
+
+/// The channels at full size, with zune-jpeg.
 fn decode_whole<'scratch>(
     bytes: &[u8],
     markers: &Markers,
     limits: &Limits,
+    has_color: bool,
     scratch: &'scratch mut Scratch,
-) -> Result<Cow<'scratch, [u8]>, IngestError> {
+) -> Result<Channels<'scratch>, IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
     // Most of the decoder's messages come in quotes.
     let reason = |error: DecodeErrors| damaged(error.to_string().trim_matches('"'));
@@ -75,13 +92,13 @@ fn decode_whole<'scratch>(
         return Err(damaged(reason));
     }
     let output = match stored {
-        Some(ColorSpace::YCbCr) if !markers.can_skip_color() => ColorSpace::YCbCr,
+        Some(ColorSpace::YCbCr) if has_color || !markers.can_skip_color() => ColorSpace::YCbCr,
         Some(ColorSpace::YCbCr | ColorSpace::Luma) => ColorSpace::Luma,
         // RGB and CMYK have no Y channel to take.
         _ => ColorSpace::RGB,
     };
     limits
-        .check_memory(markers.memory(output.num_components() as u64 + 1) + guarded.len() as u64)?;
+        .check_memory(markers.memory(2 * output.num_components() as u64) + guarded.len() as u64)?;
     decoder.set_options(options.jpeg_set_out_colorspace(output));
     let bytes = decoder
         .output_buffer_size()
@@ -90,9 +107,28 @@ fn decode_whole<'scratch>(
     scratch.pixels.clear();
     scratch.pixels.resize(bytes, 0);
     decoder.decode_into(&mut scratch.pixels).map_err(reason)?;
+    let of = |channel: usize| {
+        scratch.pixels[channel..]
+            .iter()
+            .copied()
+            .step_by(3)
+            .collect()
+    };
     Ok(match output {
-        ColorSpace::Luma => Cow::Borrowed(&scratch.pixels[..]),
-        ColorSpace::YCbCr => scratch.pixels.iter().copied().step_by(3).collect(),
-        _ => Cow::Owned(luma_of_rgb8(&scratch.pixels)),
+        ColorSpace::Luma => (Cow::Borrowed(&scratch.pixels[..]), None),
+        ColorSpace::YCbCr => (Cow::Owned(of(0)), has_color.then(|| [of(1), of(2)])),
+        _ => {
+            let pixels = scratch.pixels.as_chunks::<3>().0;
+            let of = |channel: usize| -> Vec<u8> {
+                pixels
+                    .iter()
+                    .map(|&rgb| ycbcr::chroma_at(rgb, channel))
+                    .collect()
+            };
+            (
+                Cow::Owned(luma_of_rgb8(&scratch.pixels)),
+                has_color.then(|| [of(0), of(1)]),
+            )
+        }
     })
 }

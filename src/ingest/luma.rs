@@ -1,5 +1,6 @@
-//! Colour to luma, by the weights that JPEG's own Y channel has (Rec. 601).
+//! Colour to luma and chroma, by the weights of JPEG (Rec. 601).
 
+use crate::tracker::ycbcr;
 use image::{DynamicImage, GrayImage};
 
 /// 0.299, 0.587, 0.114 in units of 1/65536; they sum to exactly 65536, so white stays white.
@@ -44,6 +45,33 @@ pub(super) fn luma_of(image: DynamicImage) -> GrayImage {
             .collect(),
     };
     GrayImage::from_raw(width, height, luma).expect("one luma value was made for each pixel")
+}
+
+/// The chroma of a decoded image in half of its columns and rows; none of a gray one.
+pub(super) fn chroma_of(image: &DynamicImage) -> Option<[Vec<u8>; 2]> {
+    let size = (image.width(), image.height());
+    let blend = |[r, g, b, alpha]: [u8; 4]| [r, g, b].map(|value| over_black(value, alpha));
+    Some(match image {
+        image if !image.color().has_color() => return None,
+        DynamicImage::ImageRgb8(rgb) => {
+            let pixels = rgb.as_raw().as_chunks::<3>().0;
+            ycbcr::chroma(size, |i| pixels[i])
+        }
+        DynamicImage::ImageRgba8(rgba) => {
+            let pixels = rgba.as_raw().as_chunks::<4>().0;
+            ycbcr::chroma(size, |i| blend(pixels[i]))
+        }
+        DynamicImage::ImageRgb16(rgb) => {
+            let pixels = rgb.as_raw().as_chunks::<3>().0;
+            ycbcr::chroma(size, |i| pixels[i].map(to_8_bits))
+        }
+        other => {
+            // RGBA in 16 bits, and whatever else `image` comes to decode.
+            let rgba = other.to_rgba8();
+            let pixels = rgba.as_raw().as_chunks::<4>().0;
+            ycbcr::chroma(size, |i| blend(pixels[i]))
+        }
+    })
 }
 
 fn weigh(channels: [u64; 3]) -> u64 {

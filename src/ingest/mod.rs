@@ -1,10 +1,11 @@
-//! Uploaded bytes to a gray working image.
+//! Uploaded bytes to a frame.
 //!
-//! In: the bytes of one image file, and [`Limits`]. Out: a [`GrayFrame`](crate::tracker::GrayFrame), or an
+//! In: the bytes of one image file, and [`Limits`]. Out: a [`Frame`](crate::tracker::Frame), or an
 //! [`IngestError`].
 //!
 //! - *Type*: by the bytes alone (JPEG, PNG, WebP), never by a name or a header of the request.
 //! - *Whole*: a file that ends before its own end marker is an error, even where a decoder would guess the rest.
+//! - *Chroma*: where the file has colour and the session wants it, in half of the luma's width and height.
 //! - *Luma*: Rec. 601, `Y = 0.299 R + 0.587 G + 0.114 B`, rounded. For JPEG this is its own Y channel. Colour profiles
 //!   and gamma are not applied. 16 bits are rounded to 8. Transparency is blended over black, as a canvas does when it
 //!   writes a JPEG.
@@ -36,10 +37,10 @@ mod orientation;
 mod raster;
 mod scratch;
 mod sniff;
-mod stored_luma;
+mod stored_image;
 #[cfg(feature = "turbo")]
 mod turbo;
 
-pub use decode::{decode, recycle};
+pub use decode::{decode, decode_to, recycle};
 pub use error::IngestError;
 pub use limits::Limits;

@@ -3,9 +3,11 @@
 use super::containers::{check_png_whole, check_webp_whole};
 use super::error::IngestError;
 use super::limits::Limits;
-use super::luma::luma_of;
+use super::luma::{chroma_of, luma_of};
+use super::orientation;
 use super::sniff::Format;
-use super::stored_luma::StoredLuma;
+use super::stored_image::{Channel, StoredImage};
+use crate::tracker::{FrameFormat, ycbcr};
 use image::codecs::png::PngDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
@@ -16,48 +18,58 @@ use std::io::Cursor;
 pub(super) fn decode_png(
     bytes: &[u8],
     limits: &Limits,
-) -> Result<StoredLuma<'static>, IngestError> {
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
     check_png_whole(bytes).map_err(|reason| Format::Png.damaged(reason))?;
     // Also bounds compressed side chunks (text, colour profiles), which are read with the header.
     let mut decoder_limits = image::Limits::no_limits();
     decoder_limits.max_alloc = Some(limits.max_memory);
     let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits)
         .map_err(|error| typed(Format::Png, error))?;
-    decode(decoder, Format::Png, 0, limits)
+    decode(decoder, Format::Png, 0, limits, format)
 }
 
 pub(super) fn decode_webp(
     bytes: &[u8],
     limits: &Limits,
-) -> Result<StoredLuma<'static>, IngestError> {
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
     check_webp_whole(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
     // The decoder needs its planes, or an RGBA copy where the image has no alpha.
-    decode(decoder, Format::WebP, 4, limits)
+    decode(decoder, Format::WebP, 4, limits, format)
 }
 
 fn decode(
     mut decoder: impl ImageDecoder,
-    format: Format,
+    file: Format,
     working_bytes_per_pixel: u64,
     limits: &Limits,
-) -> Result<StoredLuma<'static>, IngestError> {
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
     let (width, height) = decoder.dimensions();
     limits.check_size(width, height)?;
-    // The decoded image, what the decoder needs beside it, and the luma.
+    // The decoded image, what the decoder needs beside it, the luma, and the chroma in half of the columns and rows.
     let pixels = u64::from(width) * u64::from(height);
-    limits.check_memory(decoder.total_bytes() + (working_bytes_per_pixel + 1) * pixels)?;
+    limits.check_memory(decoder.total_bytes() + (working_bytes_per_pixel + 2) * pixels)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let image = DynamicImage::from_decoder(decoder).map_err(|error| typed(format, error))?;
-    let luma = luma_of(image);
-    let size = luma.dimensions();
-    Ok(StoredLuma {
-        luma: Cow::Owned(luma.into_raw()),
+    let source = (width, height);
+    let format = format(orientation::upright(source, orientation));
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| typed(file, error))?;
+    let chroma = format.has_color.then(|| chroma_of(&image)).flatten();
+    let channel = |values, size| Channel {
+        values: Cow::Owned(values),
         size,
-        source: size,
+    };
+    let half = ycbcr::chroma_size(source);
+    let stored = StoredImage {
+        luma: channel(luma_of(image).into_raw(), source),
+        chroma: chroma.map(|planes| planes.map(|plane| channel(plane, half))),
+        source,
         orientation,
-    })
+    };
+    Ok((stored, format))
 }
 
 fn typed(format: Format, error: ImageError) -> IngestError {

@@ -1,12 +1,15 @@
-//! JPEG with libjpeg-turbo: luma alone, reduced by its inverse DCT.
+//! JPEG with libjpeg-turbo: its own channels, reduced by their inverse DCT.
 //!
 //! What can go wrong: it turns missing data into gray blocks, with a warning only. So this is a fast path: on any
 //! warning, and for every layout that zune-jpeg refuses, zune-jpeg decides.
 
 use super::jpeg_markers::Markers;
 use super::limits::{Limits, MAX_JPEG_SCANS};
-use crate::tracker::working_size;
-use turbojpeg::{Decompressor, Image, PixelFormat, ScalingFactor};
+use super::stored_image::{Channel, StoredImage};
+use crate::tracker::FrameFormat;
+use image::metadata::Orientation;
+use std::borrow::Cow;
+use turbojpeg::{Colorspace, Decompressor, Image, PixelFormat, ScalingFactor, Subsamp, YuvImage};
 
 /// The reductions for which it has vector instructions; the last one is none.
 const REDUCTIONS: [ScalingFactor; 4] = [
@@ -16,42 +19,109 @@ const REDUCTIONS: [ScalingFactor; 4] = [
     ScalingFactor::ONE,
 ];
 
-/// Decodes to the smallest size that is not smaller than the working image. Returns its width and height; its luma is
-/// at the start of `pixels`. None where zune-jpeg is to decide.
+/// The sizes of the planes that were decoded, one after the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct DecodedPlanes {
+    pub(super) luma: (u32, u32),
+    /// Of Cb and of Cr.
+    pub(super) chroma: Option<(u32, u32)>,
+}
+
+impl DecodedPlanes {
+    /// The planes at the start of `pixels`.
+    pub(super) fn of<'a>(
+        &self,
+        pixels: &'a [u8],
+        source: (u32, u32),
+        orientation: Orientation,
+    ) -> StoredImage<'a> {
+        let mut rest = pixels;
+        let mut next = |size: (u32, u32)| {
+            let (values, after) = rest.split_at(area(size));
+            rest = after;
+            Channel {
+                values: Cow::Borrowed(values),
+                size,
+            }
+        };
+        StoredImage {
+            luma: next(self.luma),
+            chroma: self.chroma.map(|size| [next(size), next(size)]),
+            source,
+            orientation,
+        }
+    }
+}
+
+fn area((width, height): (u32, u32)) -> usize {
+    width as usize * height as usize
+}
+
+/// Decodes to the smallest size that is not smaller than that of `format`, to the start of `pixels`. None where
+/// zune-jpeg is to decide.
 pub(super) fn decode(
     bytes: &[u8],
     markers: &Markers,
     limits: &Limits,
+    format: FrameFormat,
     pixels: &mut Vec<u8>,
-) -> Option<(u32, u32)> {
-    let memory = markers.memory(1) + bytes.len() as u64;
+) -> Option<DecodedPlanes> {
+    let memory = markers.memory(3) + bytes.len() as u64;
     if !markers.is_usual() || limits.check_memory(memory).is_err() {
         return None;
     }
     // A new one each time: it would lend the tables of one file to the next one that has none.
     let mut decompressor = new_decompressor()?;
-    let (width, height) = (markers.width as usize, markers.height as usize);
-    let reduction = reduction(markers.width, markers.height);
-    let (reduced_width, reduced_height) = (reduction.scale(width), reduction.scale(height));
+    let size = (markers.width, markers.height);
+    let reduction = reduction(size, format.size);
+    let scaled = |side: u32| reduction.scale(side as usize);
+    let (width, height) = (scaled(size.0), scaled(size.1));
     decompressor.set_scaling_factor(reduction).ok()?;
     let whole = &bytes[..markers.after_end()];
     let header = decompressor.read_header(whole).ok()?;
-    if (header.width, header.height) != (width, height) {
+    if (header.width as u32, header.height as u32) != size {
         return None;
     }
-    let len = reduced_width * reduced_height;
+    let luma = (width as u32, height as u32);
+    let subsampling = match header.subsamp {
+        Subsamp::None => (1, 1),
+        Subsamp::Sub2x1 => (2, 1),
+        Subsamp::Sub1x2 => (1, 2),
+        Subsamp::Sub2x2 => (2, 2),
+        // Gray, or so rare that the luma alone is taken.
+        _ => (0, 0),
+    };
+    let is_color = format.has_color && header.colorspace == Colorspace::YCbCr && subsampling.0 > 0;
+    let chroma = is_color.then(|| {
+        (
+            luma.0.div_ceil(subsampling.0),
+            luma.1.div_ceil(subsampling.1),
+        )
+    });
+    let len = area(luma) + 2 * chroma.map_or(0, area);
     if pixels.len() < len {
         pixels.resize(len, 0);
     }
-    let image = Image {
-        pixels: &mut pixels[..len],
-        width: reduced_width,
-        pitch: reduced_width,
-        height: reduced_height,
-        format: PixelFormat::GRAY,
-    };
-    decompressor.decompress(whole, image).ok()?;
-    Some((reduced_width as u32, reduced_height as u32))
+    if chroma.is_some() {
+        let image = YuvImage {
+            pixels: &mut pixels[..len],
+            width,
+            align: 1,
+            height,
+            subsamp: header.subsamp,
+        };
+        decompressor.decompress_to_yuv(whole, image).ok()?;
+    } else {
+        let image = Image {
+            pixels: &mut pixels[..len],
+            width,
+            pitch: width,
+            height,
+            format: PixelFormat::GRAY,
+        };
+        decompressor.decompress(whole, image).ok()?;
+    }
+    Some(DecodedPlanes { luma, chroma })
 }
 
 fn new_decompressor() -> Option<Decompressor> {
@@ -62,16 +132,15 @@ fn new_decompressor() -> Option<Decompressor> {
 
 /// The strongest reduction that leaves at least the working size and divides both sides. With another one the last
 /// column would stand for fewer pixels than the others, and boxes would be off.
-fn reduction(width: u32, height: u32) -> ScalingFactor {
-    let (working_width, working_height) = working_size(width, height);
+fn reduction((width, height): (u32, u32), working: (u32, u32)) -> ScalingFactor {
     let fits = |side: u32, working: u32, factor: &ScalingFactor| {
         let divisor = factor.denom() as u32;
         side.is_multiple_of(divisor) && side / divisor >= working
     };
     let strongest = REDUCTIONS
         .into_iter()
-        .find(|factor| fits(width, working_width, factor) && fits(height, working_height, factor));
-    strongest.expect("an image is not smaller than its working size")
+        .find(|factor| fits(width, working.0, factor) && fits(height, working.1, factor));
+    strongest.unwrap_or(ScalingFactor::ONE)
 }
 
 #[cfg(test)]

@@ -136,14 +136,14 @@ impl Registry {
 mod tests {
     use super::*;
     use crate::sessions::{Admission, Fingerprint};
-    use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
+    use crate::tracker::{Frame, Preset, Rect, Tracker};
     use std::sync::mpsc;
 
     const IDLE: Duration = Duration::from_secs(600);
 
     fn state() -> SessionState {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
-        let frame = GrayFrame::from_luma(64, 48, luma).unwrap();
+        let frame = Frame::from_luma(64, 48, luma).unwrap();
         let target = Rect {
             x: 10.0,
             y: 10.0,

@@ -6,7 +6,7 @@
 
 use super::clock::Clock;
 use super::state::SessionState;
-use crate::tracker::{Estimate, Params};
+use crate::tracker::{Estimate, FrameFormat, Params};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -28,6 +28,7 @@ pub struct SessionClosed;
 pub struct Session {
     id: Uuid,
     source_size: (u32, u32),
+    frame_format: FrameFormat,
     params: Params,
     state: Arc<AsyncMutex<SessionState>>,
     /// The permits that are free. Each request at this session has one, the one at work included.
@@ -66,6 +67,7 @@ impl Session {
         let session = Self {
             id: Uuid::new_v4(),
             source_size: state.tracker().source_size(),
+            frame_format: state.tracker().frame_format(),
             params: state.tracker().params().clone(),
             latest: Mutex::new(state.tracker().estimate()),
             state: Arc::new(AsyncMutex::new(state)),
@@ -84,6 +86,11 @@ impl Session {
     /// The session's id.
     pub fn id(&self) -> Uuid {
         self.id
+    }
+
+    /// How the session sees its frames.
+    pub fn frame_format(&self) -> FrameFormat {
+        self.frame_format
     }
 
     /// Width and height of the session's frames as uploaded.

@@ -2,7 +2,7 @@
 
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
 use super::snapshot::{SessionSnapshot, SnapshotError};
-use crate::tracker::{Estimate, GrayFrame, Rect, Tracker, TrackerError};
+use crate::tracker::{Estimate, Frame, Rect, Tracker, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug)]
@@ -67,7 +67,7 @@ impl SessionState {
     /// The index of the frame that the tracker refused, and why. The session is unchanged.
     pub fn step(
         &mut self,
-        frames: &[(Fingerprint, GrayFrame)],
+        frames: &[(Fingerprint, Frame)],
     ) -> Result<Vec<Estimate>, (usize, TrackerError)> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());
@@ -101,7 +101,7 @@ impl SessionState {
     pub fn retarget(
         &mut self,
         fingerprint: Fingerprint,
-        frame: &GrayFrame,
+        frame: &Frame,
         given: Rect,
     ) -> Result<Estimate, TrackerError> {
         let estimate = self.tracker.retarget(frame, given)?;

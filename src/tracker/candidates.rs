@@ -11,7 +11,7 @@ use crate::tracker::confidence::score::Evidence;
 use crate::tracker::features::centering::Centering;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::grassmann::evaluation::Evaluation;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
@@ -95,7 +95,7 @@ impl Candidates {
     /// models of `state`. The many of a wide search come in batches of the usual size: those stay in the caches.
     pub fn describe_and_compare(
         &mut self,
-        image: &GrayFrame,
+        image: &Frame,
         extractor: &mut Extractor,
         state: &State,
     ) {
@@ -111,7 +111,7 @@ impl Candidates {
     /// (B) The vectors of a batch.
     fn describe(
         &mut self,
-        image: &GrayFrame,
+        image: &Frame,
         extractor: &mut Extractor,
         batch: Range<usize>,
         state: &State,

@@ -24,6 +24,9 @@ pub enum TrackerError {
         /// Height of the frame that came.
         got_height: u32,
     },
+    /// The frame was reduced to less than the size in which the session works.
+    #[error("the frame was reduced to less than the session's working size")]
+    Reduced,
     /// The snapshot is damaged, or of another version.
     #[error("the snapshot {0}")]
     Snapshot(&'static str),

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 
 use crate::tracker::features::extractor::Extractor;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::search::SearchContext;
 use crate::tracker::motion::{orientation, resampling};
@@ -16,7 +16,7 @@ impl State {
     /// (A) Draws the first round of particles, in the channels of `image` that it computes.
     pub fn propose(
         &self,
-        image: &GrayFrame,
+        image: &Frame,
         search: &SearchContext<'_>,
         radius: f64,
         draws: &mut ChaCha8Rng,
@@ -37,7 +37,16 @@ impl State {
             Search::Answer => {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut workspace.dense_search;
-                dense_search.run(extractor, search, &self.discriminant);
+                let foreground = &mut workspace.foreground;
+                foreground.compute(
+                    image,
+                    &self.color,
+                    &self.answer,
+                    radius,
+                    bounds,
+                    self.format.has_color,
+                );
+                dense_search.run(extractor, search, &self.discriminant, foreground);
                 let cell = Extractor::cell_size(&self.answer, bounds, params);
                 search.propose(dense_search.maxima(), cell, draws, particles);
             }
@@ -62,7 +71,7 @@ impl State {
     /// Compares the surroundings with those of the frame in which the target was last seen.
     pub fn test_for_change(
         &self,
-        frame: &GrayFrame,
+        frame: &Frame,
         search: &SearchContext<'_>,
         rotation: Option<&Rotation>,
         radius: f64,
@@ -70,7 +79,9 @@ impl State {
     ) {
         if self.params.static_penalty > 0.0 {
             let displaced = to_original(search.displaced(), rotation);
-            workspace.change_test.load(frame);
+            workspace
+                .change_test
+                .load(frame, &self.answer, &self.bounds);
             workspace
                 .change_test
                 .compare(&self.last_seen, &displaced, radius, &self.bounds);
@@ -81,7 +92,7 @@ impl State {
     /// Returns the most likely one of all.
     pub fn weigh(
         &self,
-        image: &GrayFrame,
+        image: &Frame,
         search: &SearchContext<'_>,
         rotation: Option<&Rotation>,
         workspace: &mut Workspace,
@@ -105,7 +116,11 @@ impl State {
     ) {
         let known = workspace.log_priors.len();
         let new = &workspace.candidates.particles[known..];
-        let log_priors = new.iter().map(|particle| search.log_prior(particle));
+        let weight = self.params.histogram_weight;
+        let (foreground, scale) = (&workspace.foreground, self.answer.scale);
+        let log_priors = new.iter().map(|particle| {
+            search.log_prior(particle) + weight * foreground.mean(particle, scale, &self.bounds)
+        });
         workspace.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {
             workspace.original.clear();

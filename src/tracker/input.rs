@@ -1,25 +1,28 @@
 //! What a caller may give: boxes and frames.
 
 use crate::tracker::error::TrackerError;
-use crate::tracker::image::frame::{GrayFrame, working_size};
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 
 /// The shortest side of a box, in pixels of the uploaded frame.
 pub const LEAST_BOX_SIDE: f64 = 4.0;
 
-/// From uploaded to working pixels, along x and along y.
-pub(crate) fn to_working(source: (u32, u32)) -> (f64, f64) {
-    let (width, height) = working_size(source.0, source.1);
+/// From pixels of an upload of size `source` to those of its working image of size `working`, along x and along y.
+pub(crate) fn to_working(source: (u32, u32), working: (u32, u32)) -> (f64, f64) {
     (
-        f64::from(width) / f64::from(source.0),
-        f64::from(height) / f64::from(source.1),
+        f64::from(working.0) / f64::from(source.0),
+        f64::from(working.1) / f64::from(source.1),
     )
 }
 
 /// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`LEAST_BOX_SIDE`] on each
-/// side and at least one pixel of the working image, at most four times as large as the frame, and on the frame with
-/// at least one pixel of its length and height.
-pub(crate) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), TrackerError> {
+/// side and at least one pixel of the working image of size `working`, at most four times as large as the frame, and on
+/// the frame with at least one pixel of its length and height.
+pub(crate) fn check_target(
+    source: (u32, u32),
+    working: (u32, u32),
+    target: &Rect,
+) -> Result<(), TrackerError> {
     let refuse = |reason| Err(TrackerError::Target(reason));
     let values = [target.x, target.y, target.width, target.height];
     if !values.iter().all(|value| value.is_finite()) {
@@ -28,9 +31,11 @@ pub(crate) fn check_target(source: (u32, u32), target: &Rect) -> Result<(), Trac
     if target.width < LEAST_BOX_SIDE || target.height < LEAST_BOX_SIDE {
         return refuse("is too small: each side must be at least 4 pixels");
     }
-    let (horizontal, vertical) = to_working(source);
+    let (horizontal, vertical) = to_working(source, working);
     if target.width * horizontal < 1.0 || target.height * vertical < 1.0 {
-        return refuse("is too small: each side must be at least 1/320 of the frame's longer side");
+        return refuse(
+            "is too small: each side must be at least a pixel of the working image (320 pixels on the longer side, or more)",
+        );
     }
     let limit = max_box_side(source);
     if target.width > limit || target.height > limit {
@@ -53,7 +58,7 @@ pub(crate) fn max_box_side(source: (u32, u32)) -> f64 {
 }
 
 /// Checks that `frame` has the size of the session's frames.
-pub(crate) fn check_frame(source: (u32, u32), frame: &GrayFrame) -> Result<(), TrackerError> {
+pub(crate) fn check_frame(source: (u32, u32), frame: &Frame) -> Result<(), TrackerError> {
     let (got_width, got_height) = frame.source_size();
     if (got_width, got_height) == source {
         return Ok(());

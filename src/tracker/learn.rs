@@ -4,15 +4,16 @@
 
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
+use crate::tracker::appearance::color_histogram::ColorPixels;
 use crate::tracker::classifier::labels;
 use crate::tracker::confidence::update_gate;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
-use crate::tracker::scale::pyramid;
+use crate::tracker::scale::{dsst, pyramid};
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
@@ -65,6 +66,7 @@ impl State {
         let (image, at) = (views.rectified(), &found.rectified);
         self.orientation = self.measure_orientation(views.original(), found, workspace);
         self.learn_discriminant(at, workspace);
+        self.learn_color(image, at, workspace);
         self.learn_scale(image, at, workspace);
         let samples = Background::wanted(found.number, &self.params);
         if samples > 0 {
@@ -93,7 +95,7 @@ impl State {
     /// The target's rotation in `original`, in radians: the last one, or moved towards the likelier of two others.
     fn measure_orientation(
         &self,
-        original: &GrayFrame,
+        original: &Frame,
         found: &Found,
         workspace: &mut Workspace,
     ) -> f64 {
@@ -106,14 +108,14 @@ impl State {
         let window = self.window(&answer, 0.0);
         let first = candidates.particles.len();
         for (angle, _) in tried {
-            let pixels = std::mem::take(&mut rotated.pixels);
+            let scratch = std::mem::take(&mut rotated.frame);
             let rotation = Rotation::about((answer.x, answer.y), angle);
-            let image = rotation.apply(original, &window, pixels);
+            let image = rotation.apply(original, &window, scratch);
             let extractor = &mut rotated.extractor;
             extractor.compute_channels(&image, &[answer], 0.0, bounds, params);
             candidates.particles.push(answer);
             candidates.describe_and_compare(&image, extractor, self);
-            rotated.pixels = image.into_pixels();
+            rotated.frame = image;
         }
         let mut weights = tried.map(|(_, log_prior)| log_prior);
         let sigma = orientation::SIGMA_FACTOR * params.sigma;
@@ -132,8 +134,19 @@ impl State {
         }
     }
 
+    /// Updates the colour histograms with the box `at`.
+    pub fn learn_color(&mut self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
+        if self.params.histogram_weight > 0.0 {
+            let has_color = self.format.has_color;
+            let pixels = ColorPixels::of(image, has_color);
+            let scratch = &mut workspace.learning.color;
+            self.color
+                .learn(pixels, at, &self.bounds, has_color, scratch);
+        }
+    }
+
     /// Updates the scale filter with the pyramid around `at`.
-    pub fn learn_scale(&mut self, image: &GrayFrame, at: &Particle, workspace: &mut Workspace) {
+    pub fn learn_scale(&mut self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
         let rate = self.params.scale_learning_rate;
         if rate > 0.0 {
             self.describe_pyramid(image, at, workspace);
@@ -145,7 +158,7 @@ impl State {
     /// `found` with the scale that the filter measures there, against the last answer's; clamped.
     pub fn measure_scale(
         &self,
-        image: &GrayFrame,
+        image: &Frame,
         found: Particle,
         workspace: &mut Workspace,
     ) -> Particle {
@@ -153,21 +166,23 @@ impl State {
             return self.bounds.clamp(found);
         }
         // A target that was lost may have come nearer.
-        let scale = match self.frames_lost {
-            0 => self.answer.scale,
-            _ => found.scale,
+        let reliance = match self.frames_lost {
+            0 => dsst::reliance(self.bounds.side(&self.answer)),
+            _ => 0.0,
         };
+        let scale = found.scale * (self.answer.scale / found.scale).powf(reliance);
         let center = Particle { scale, ..found };
         self.describe_pyramid(image, &center, workspace);
         let maximum = self.scale_filter.find(&mut workspace.learning.pyramid);
         self.bounds.clamp(Particle {
-            scale: scale * maximum.gated_change().exp(),
+            scale: scale
+                * (dsst::reliance(self.bounds.side(&center)) * maximum.gated_change()).exp(),
             ..found
         })
     }
 
     /// The feature vectors of the pyramid around `center`.
-    fn describe_pyramid(&self, image: &GrayFrame, center: &Particle, workspace: &mut Workspace) {
+    fn describe_pyramid(&self, image: &Frame, center: &Particle, workspace: &mut Workspace) {
         let pyramid::Scratch {
             areas, features, ..
         } = &mut workspace.learning.pyramid;
@@ -179,7 +194,7 @@ impl State {
     }
 
     /// Replaces samples of the background by those of the areas in the workspace.
-    pub fn learn_background(&mut self, image: &GrayFrame, workspace: &mut Workspace) {
+    pub fn learn_background(&mut self, image: &Frame, workspace: &mut Workspace) {
         let learning = &mut workspace.learning;
         let (areas, features) = (&learning.areas, &mut learning.features);
         workspace
@@ -190,7 +205,7 @@ impl State {
     }
 
     /// The feature vector of what is at `at`, as the only one in the workspace.
-    pub fn describe_at(&self, image: &GrayFrame, at: &Particle, workspace: &mut Workspace) {
+    pub fn describe_at(&self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
         let features = &mut workspace.learning.features;
         workspace
             .extractor

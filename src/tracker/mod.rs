@@ -19,19 +19,19 @@
 //! `params` and `linalg`.
 //!
 //! What the paper leaves open:
-//! - Everything happens in the working image ([`GrayFrame`]), at most [`WORKING_SIDE`] pixels on its longer side; boxes
-//!   come in and go out in the pixels of the uploaded frame.
+//! - Everything happens in the working image ([`Frame`]), as large as the target asks for ([`Params::frame_format`]);
+//!   boxes come in and go out in the pixels of the uploaded frame.
 //! - Until there are P previous patches V has those there are, and no basis has more columns than V has directions.
 //! - Of two bases with different numbers of columns, the smaller number counts.
 //! - The draws of a frame depend on the seed and the frame's number alone, so a session that is replayed gives the same
 //!   boxes bit for bit on the same machine.
 //!
 //! ```
-//! use bagtrack::tracker::{GrayFrame, Preset, Rect, Tracker};
+//! use bagtrack::tracker::{Frame, Preset, Rect, Tracker};
 //!
 //! let still = |shift: usize| {
 //!     let luma = (0..64 * 48).map(|i| ((i % 64 + shift) * 7 % 250) as u8).collect();
-//!     GrayFrame::from_luma(64, 48, luma)
+//!     Frame::from_luma(64, 48, luma)
 //! };
 //! let mut tracker = Tracker::new(&still(0)?, Rect::new(10.0, 10.0, 20.0, 16.0), Preset::Paper.params())?;
 //! let answer = tracker.step(&still(1)?)?;
@@ -71,8 +71,11 @@ pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
 pub use features::gray::patch;
 pub use grassmann::evaluation::Evaluation;
-pub use image::frame::{FrameError, GrayFrame, WORKING_SIDE, working_size};
+pub use image::frame::{Frame, FrameError, FrameFormat};
 pub use image::rect::Rect;
+pub use image::resolution::{MAX_WORKING_SIDE, MIN_WORKING_SIDE};
+#[cfg(feature = "ingest")]
+pub(crate) use image::{area_average::area_average, ycbcr};
 pub use input::LEAST_BOX_SIDE;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};

@@ -2,7 +2,7 @@
 
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::features::extractor::Extractor;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::image::warp::Rotation;
@@ -13,7 +13,7 @@ use crate::tracker::workspace::Workspace;
 
 impl State {
     /// The displacement of the whole image since the last frame, in working pixels.
-    pub fn displacement(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> (f64, f64) {
+    pub fn displacement(&mut self, frame: &Frame, workspace: &mut Workspace) -> (f64, f64) {
         match &mut self.global_motion {
             Some(profiles) => profiles.displacement(frame, &mut workspace.global_motion),
             None => (0.0, 0.0),
@@ -49,7 +49,7 @@ impl State {
     /// The views of `frame`, the rectified one in the window of the search.
     pub fn views<'a>(
         &self,
-        frame: &'a GrayFrame,
+        frame: &'a Frame,
         rotation: Option<&Rotation>,
         radius: f64,
         workspace: &mut Workspace,

@@ -10,7 +10,7 @@
 
 use crate::tracker::appearance::bag::Bag;
 use crate::tracker::error::TrackerError;
-use crate::tracker::image::frame::working_size;
+use crate::tracker::image::resolution::MAX_WORKING_SIDE;
 use crate::tracker::input;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
@@ -20,7 +20,7 @@ use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -101,9 +101,13 @@ fn check_numbers(state: &State) -> bool {
     if width == 0 || height == 0 {
         return false;
     }
-    let (working_width, working_height) = working_size(width, height);
+    let working = state.format.size;
+    let fits = |side: u32, whole: u32| (1..=whole.min(MAX_WORKING_SIDE)).contains(&side);
+    if !fits(working.0, width) || !fits(working.1, height) {
+        return false;
+    }
     let bounds = &state.bounds;
-    let (horizontal, vertical) = input::to_working(state.source);
+    let (horizontal, vertical) = input::to_working(state.source, working);
     let box_sides = [
         (bounds.box_width, horizontal),
         (bounds.box_height, vertical),
@@ -114,8 +118,8 @@ fn check_numbers(state: &State) -> bool {
     };
     let target = &state.estimate.target;
     let far = 1e2 * f64::from(width.max(height)) + 1e3;
-    bounds.frame_width == f64::from(working_width)
-        && bounds.frame_height == f64::from(working_height)
+    bounds.frame_width == f64::from(working.0)
+        && bounds.frame_height == f64::from(working.1)
         && box_sides.iter().all(could_be_given)
         && target.is_valid()
         && [target.x, target.y, target.width, target.height]
@@ -158,9 +162,12 @@ fn is_clamped(particle: &Particle, state: &State) -> bool {
 /// The models of the extensions: there when their parameters ask for them, and not otherwise.
 fn check_extensions(state: &State) -> bool {
     let params = &state.params;
-    let (width, height) = working_size(state.source.0, state.source.1);
+    let (width, height) = state.format.size;
     state.background.is_valid_for(params, MAX_FEATURE)
         && state.discriminant.is_valid_for(params, MAX_FEATURE)
+        && state
+            .color
+            .is_valid_for(params.histogram_weight > 0.0, state.format.has_color)
         && state.scale_filter.is_valid_for(params, MAX_FEATURE)
         && state.global_motion.is_some() == params.global_motion
         && state

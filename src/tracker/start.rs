@@ -7,12 +7,13 @@ use rand_chacha::ChaCha8Rng;
 use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
+use crate::tracker::appearance::color_histogram::ColorHistogram;
 use crate::tracker::classifier::labels;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::estimate::{Estimate, Status};
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::{Frame, FrameFormat};
 use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::motion::global_motion::GlobalMotion;
@@ -37,13 +38,20 @@ fn given(frame: u64, target: Rect) -> Estimate {
 
 impl State {
     /// The state after the first frame, in which `target` (checked) is the box.
-    pub fn new(frame: &GrayFrame, target: Rect, params: Params, workspace: &mut Workspace) -> Self {
+    pub fn new(
+        frame: &Frame,
+        format: FrameFormat,
+        target: Rect,
+        params: Params,
+        workspace: &mut Workspace,
+    ) -> Self {
         let source = frame.source_size();
-        let (bounds, answer) = Self::place(source, &target);
+        let (bounds, answer) = Self::place(source, format.size, &target);
         let global_motion = params.global_motion.then(|| GlobalMotion::new(frame));
         let mut state = Self {
             params,
             source,
+            format,
             bounds,
             estimate: given(0, target),
             answer,
@@ -55,6 +63,7 @@ impl State {
             discriminant: Discriminant::default(),
             global_motion,
             scale_filter: ScaleFilter::default(),
+            color: ColorHistogram::default(),
             last_seen: LastSeen::default(),
             update_gate: UpdateGate::default(),
             baseline: DistanceBaseline::default(),
@@ -73,9 +82,9 @@ impl State {
     }
 
     /// Takes `target` (checked) as the box in `frame`, the next one.
-    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect, workspace: &mut Workspace) {
+    pub fn retarget(&mut self, frame: &Frame, target: Rect, workspace: &mut Workspace) {
         let number = self.estimate.frame + 1;
-        let (bounds, answer) = Self::place(self.source, &target);
+        let (bounds, answer) = Self::place(self.source, self.format.size, &target);
         self.bounds = bounds;
         self.orientation = 0.0;
         self.frames_lost = 0;
@@ -105,13 +114,13 @@ impl State {
 
     /// Learns everything that a box given by the user says about the surroundings, and describes the box and its
     /// augmented views.
-    fn init_models(&mut self, frame: &GrayFrame, number: u64, workspace: &mut Workspace) {
-        workspace.change_test.load(frame);
+    fn init_models(&mut self, frame: &Frame, number: u64, workspace: &mut Workspace) {
+        let (bounds, answer) = (&self.bounds, &self.answer);
+        workspace.change_test.load(frame, answer, bounds);
         self.record_seen(workspace);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
         if orientation::is_on(&self.params) {
-            let pixels = self.bounds.frame_width * self.bounds.frame_height;
-            workspace.views.reserve_rectified(pixels as usize);
+            workspace.views.reserve_rectified(frame);
         }
         let views = FrameViews::new(frame, self.downsample_factor(), &mut workspace.views);
         let (image, answer) = (views.original(), self.answer);
@@ -132,6 +141,8 @@ impl State {
         if self.params.discriminant_weight > 0.0 {
             self.init_discriminant(image, &mut draws, workspace);
         }
+        self.color.forget();
+        self.learn_color(image, &answer, workspace);
         self.scale_filter.forget();
         self.learn_scale(image, &answer, workspace);
         self.describe_at(image, &answer, workspace);
@@ -141,7 +152,7 @@ impl State {
 
     /// Appends the feature vectors of the augmented views of the answer. The extractor has the channels of the last of
     /// them then.
-    fn describe_augmented(&self, image: &GrayFrame, workspace: &mut Workspace) {
+    fn describe_augmented(&self, image: &Frame, workspace: &mut Workspace) {
         let (answer, params) = ([self.answer], &self.params);
         let (extractor, learning) = (&mut workspace.extractor, &mut workspace.learning);
         for angle in augmentation::angles(params) {
@@ -156,7 +167,7 @@ impl State {
     /// Fits the discriminant to the target and to areas around it.
     fn init_discriminant(
         &mut self,
-        image: &GrayFrame,
+        image: &Frame,
         draws: &mut ChaCha8Rng,
         workspace: &mut Workspace,
     ) {

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
+use crate::tracker::appearance::color_histogram::ColorHistogram;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::estimate::Estimate;
-use crate::tracker::image::frame::working_size;
+use crate::tracker::image::frame::FrameFormat;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::input;
 use crate::tracker::motion::global_motion::GlobalMotion;
@@ -21,6 +22,9 @@ use crate::tracker::scale::dsst::ScaleFilter;
 
 /// By how much of its usual width the search widens in each frame in which the target is lost.
 const WIDENING: f64 = 0.5;
+/// Three standard deviations of the widest search, in working pixels: the whole frame, or five times the target's usual
+/// size. A wider one costs more, and finds look-alikes.
+const MAX_SEARCHED: f64 = 320.0;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +32,8 @@ pub(crate) struct State {
     pub params: Params,
     /// Width and height of the uploaded frames.
     pub source: (u32, u32),
+    /// How its frames are seen: decided by the first frame and its box.
+    pub format: FrameFormat,
     pub bounds: StateBounds,
     pub estimate: Estimate,
     /// Where the target was found last.
@@ -44,6 +50,7 @@ pub(crate) struct State {
     /// The profiles of the last frame, with `global_motion`.
     pub global_motion: Option<GlobalMotion>,
     pub scale_filter: ScaleFilter,
+    pub color: ColorHistogram,
     pub last_seen: LastSeen,
     pub update_gate: UpdateGate,
     pub baseline: DistanceBaseline,
@@ -54,10 +61,13 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// The bounds of particles around `target`, and the particle that is `target` itself.
-    pub fn place(source: (u32, u32), target: &Rect) -> (StateBounds, Particle) {
-        let (horizontal, vertical) = input::to_working(source);
-        let (width, height) = working_size(source.0, source.1);
+    /// The bounds of particles around `target` in working images of this size, and the particle that is `target` itself.
+    pub fn place(
+        source: (u32, u32),
+        (width, height): (u32, u32),
+        target: &Rect,
+    ) -> (StateBounds, Particle) {
+        let (horizontal, vertical) = input::to_working(source, (width, height));
         let area = target.scaled(horizontal, vertical);
         let bounds = StateBounds {
             frame_width: f64::from(width),
@@ -71,18 +81,18 @@ impl State {
 
     /// The box of `particle`, in pixels of the uploaded frame.
     pub fn target_of(&self, particle: &Particle) -> Rect {
-        let (horizontal, vertical) = input::to_working(self.source);
+        let (horizontal, vertical) = input::to_working(self.source, self.format.size);
         self.bounds
             .area(particle)
             .scaled(1.0 / horizontal, 1.0 / vertical)
     }
 
     /// How many times as wide as usual the next search is. The longer a target is lost, the further it may have come,
-    /// until the search covers the frame.
+    /// until the search covers [`MAX_SEARCHED`] pixels.
     pub fn spread(&self) -> f64 {
         let std = self.params.motion_std_x.max(self.params.motion_std_y);
         let frame = self.bounds.frame_width.max(self.bounds.frame_height);
-        let max = (frame / 3.0 / std.max(1.0)).max(1.0);
+        let max = (frame.min(MAX_SEARCHED) / 3.0 / std.max(1.0)).max(1.0);
         (1.0 + WIDENING * f64::from(self.frames_lost)).min(max)
     }
 

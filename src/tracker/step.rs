@@ -4,7 +4,7 @@
 
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::estimate::Estimate;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::learn::Found;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::random::{self, Draws};
@@ -14,7 +14,7 @@ use crate::tracker::workspace::Workspace;
 
 impl State {
     /// Finds the target in `frame`, the next one, and learns from it. Returns also what the score is made of.
-    pub fn step(&mut self, frame: &GrayFrame, workspace: &mut Workspace) -> (Estimate, Evidence) {
+    pub fn step(&mut self, frame: &Frame, workspace: &mut Workspace) -> (Estimate, Evidence) {
         let number = self.estimate.frame + 1;
         let displacement = self.displacement(frame, workspace);
         let rotation = orientation::rotation(&self.answer, self.orientation);
@@ -51,9 +51,12 @@ impl State {
         let scale = answer.scale;
         let evidence = Evidence { scale, ..evidence };
         let is_usual = !is_lost
-            && self
-                .update_gate
-                .judge(evidence.first_distance, number, &self.params);
+            && self.update_gate.judge(
+                evidence.first_distance,
+                self.format.has_color,
+                number,
+                &self.params,
+            );
         let (score, status) = self.baseline.judge(&evidence, is_lost, is_usual);
         let passes = is_usual && self.passes(score, number);
 

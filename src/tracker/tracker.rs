@@ -1,9 +1,11 @@
 //! The tracker of one session, as the rest of the program sees it.
 
+use std::borrow::Cow;
+
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::{Frame, FrameFormat};
 use crate::tracker::image::rect::Rect;
 use crate::tracker::input;
 use crate::tracker::params::table::Params;
@@ -24,15 +26,18 @@ impl Tracker {
     /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
     ///
     /// # Errors
-    /// A parameter out of its range; a box that is not finite, has a side below
+    /// A parameter out of its range; a frame that was reduced to less than [`Params::frame_format`]; a box that is not finite, has a side below
     /// [`LEAST_BOX_SIDE`](crate::tracker::LEAST_BOX_SIDE) pixels (or below one pixel of the working image) or above
     /// four times the frame's longer side, or lies outside the frame.
-    pub fn new(frame: &GrayFrame, target: Rect, params: Params) -> Result<Self, TrackerError> {
+    pub fn new(frame: &Frame, target: Rect, params: Params) -> Result<Self, TrackerError> {
         params.validate()?;
         let source = frame.source_size();
-        input::check_target(source, &target)?;
+        let mut format = params.frame_format(source, &target);
+        input::check_target(source, format.size, &target)?;
+        format.has_color &= frame.has_color();
+        let frame = frame.in_format(format).ok_or(TrackerError::Reduced)?;
         Ok(workspace::with(|workspace| {
-            let state = State::new(frame, target, params, workspace);
+            let state = State::new(&frame, format, target, params, workspace);
             Self {
                 state,
                 evidence: None,
@@ -43,10 +48,11 @@ impl Tracker {
     /// Finds the target in the next frame.
     ///
     /// # Errors
-    /// A frame whose uploaded size is not that of the session's first frame.
-    pub fn step(&mut self, frame: &GrayFrame) -> Result<Estimate, TrackerError> {
-        input::check_frame(self.state.source, frame)?;
-        let (estimate, evidence) = workspace::with(|workspace| self.state.step(frame, workspace));
+    /// A frame whose uploaded size is not that of the session's first frame, or that was reduced to less than
+    /// [`frame_format`](Self::frame_format).
+    pub fn step(&mut self, frame: &Frame) -> Result<Estimate, TrackerError> {
+        let frame = self.checked(frame)?;
+        let (estimate, evidence) = workspace::with(|workspace| self.state.step(&frame, workspace));
         self.evidence = Some(evidence);
         Ok(estimate)
     }
@@ -56,12 +62,25 @@ impl Tracker {
     ///
     /// # Errors
     /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
-    pub fn retarget(&mut self, frame: &GrayFrame, target: Rect) -> Result<Estimate, TrackerError> {
-        input::check_frame(self.state.source, frame)?;
-        input::check_target(self.state.source, &target)?;
-        workspace::with(|workspace| self.state.retarget(frame, target, workspace));
+    pub fn retarget(&mut self, frame: &Frame, target: Rect) -> Result<Estimate, TrackerError> {
+        let frame = self.checked(frame)?;
+        input::check_target(self.state.source, self.state.format.size, &target)?;
+        workspace::with(|workspace| self.state.retarget(&frame, target, workspace));
         self.evidence = None;
         Ok(self.state.estimate)
+    }
+
+    /// `frame` as this session sees frames.
+    fn checked<'a>(&self, frame: &'a Frame) -> Result<Cow<'a, Frame>, TrackerError> {
+        input::check_frame(self.state.source, frame)?;
+        frame
+            .in_format(self.state.format)
+            .ok_or(TrackerError::Reduced)
+    }
+
+    /// How this session sees its frames. One that comes in this format is not copied.
+    pub fn frame_format(&self) -> FrameFormat {
+        self.state.format
     }
 
     /// The last answer.

@@ -4,11 +4,13 @@
 
 use std::cell::RefCell;
 
-use crate::tracker::appearance::{background, bag};
+use crate::tracker::appearance::foreground_map::ForegroundMap;
+use crate::tracker::appearance::{background, bag, color_histogram};
 use crate::tracker::candidates::Candidates;
 use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
 use crate::tracker::features::extractor::Extractor;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::frame_views;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
@@ -23,6 +25,7 @@ pub(crate) struct Workspace {
     pub views: frame_views::Scratch,
     pub extractor: Extractor,
     pub dense_search: DenseSearch,
+    pub foreground: ForegroundMap,
     pub change_test: ChangeTest,
     /// Running sums of weights, for resampling.
     pub sums: Vec<f64>,
@@ -45,6 +48,7 @@ pub(crate) struct Learning {
     pub view: Vec<f32>,
     pub background: background::Scratch,
     pub bag: bag::Scratch,
+    pub color: color_histogram::Scratch,
     pub fit: ridge::Scratch,
     pub pyramid: pyramid::Scratch,
 }
@@ -53,7 +57,7 @@ pub(crate) struct Learning {
 #[derive(Debug, Default)]
 pub(crate) struct Rotated {
     pub extractor: Extractor,
-    pub pixels: Vec<u8>,
+    pub frame: Frame,
 }
 
 thread_local! {

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each test binary uses its part.
 
-use bagtrack::tracker::{Features, GrayFrame, Params, Preset, Rect, Search};
+use bagtrack::tracker::{Features, Frame, Params, Preset, Rect, Search};
 
 fn texture(x: usize, y: usize, seed: u32) -> u8 {
     let cell =
@@ -22,7 +22,7 @@ pub fn target(t: usize) -> Rect {
 }
 
 /// Frame `t`, 120 x 90 pixels: the target is bright texture on dark.
-pub fn frame(t: usize) -> GrayFrame {
+pub fn frame(t: usize) -> Frame {
     let (width, height) = (120, 90);
     let area = target(t);
     let (left, top) = (area.x as usize, area.y as usize);
@@ -37,7 +37,7 @@ pub fn frame(t: usize) -> GrayFrame {
             }
         })
         .collect();
-    GrayFrame::from_luma(width as u32, height as u32, luma).expect("a frame of this size")
+    Frame::from_luma(width as u32, height as u32, luma).expect("a frame of this size")
 }
 
 /// Waves of several lengths that never repeat in sight: a background that a camera can be told by.
@@ -48,7 +48,7 @@ fn hills(x: f64, y: f64) -> f64 {
 
 /// Frame `t`, 200 x 160 pixels, and the target's box in it, of the same target over hills, seen by a camera that is
 /// turned by `camera` pixels: the whole picture moves.
-pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
+pub fn panned(t: usize, camera: (usize, usize)) -> (Frame, Rect) {
     let walk = target(t);
     let (left, top) = (walk.x as usize + camera.0, walk.y as usize + camera.1);
     let luma = (0..200 * 160_usize)
@@ -63,12 +63,12 @@ pub fn panned(t: usize, camera: (usize, usize)) -> (GrayFrame, Rect) {
             }
         })
         .collect();
-    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    let frame = Frame::from_luma(200, 160, luma).expect("a frame of this size");
     (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
 }
 
 /// Frame `t`, 320 x 240 pixels, and the target's box in it, of this width and height: the same target seen from near.
-pub fn near(t: usize, (width, height): (usize, usize)) -> (GrayFrame, Rect) {
+pub fn near(t: usize, (width, height): (usize, usize)) -> (Frame, Rect) {
     let (left, top) = (40 + bounce(t, 60) as usize, 20 + bounce(t, 40) as usize);
     let luma = (0..320 * 240_usize)
         .map(|i| {
@@ -81,14 +81,14 @@ pub fn near(t: usize, (width, height): (usize, usize)) -> (GrayFrame, Rect) {
             }
         })
         .collect();
-    let frame = GrayFrame::from_luma(320, 240, luma).expect("a frame of this size");
+    let frame = Frame::from_luma(320, 240, luma).expect("a frame of this size");
     let target = Rect::new(left as f64, top as f64, width as f64, height as f64);
     (frame, target)
 }
 
 /// Frame `t`, 200 x 160 pixels, and the target's box in it: over hills that stay it leaps to and fro, every fifth
 /// frame.
-pub fn leaping(t: usize) -> (GrayFrame, Rect) {
+pub fn leaping(t: usize) -> (Frame, Rect) {
     let (hills, _) = panned(0, (0, 0));
     let [(left, top), (next_left, next_top)] = [(88, 68), (122, 46)];
     let (left, top) = if (t / 5).is_multiple_of(2) {
@@ -107,13 +107,13 @@ pub fn leaping(t: usize) -> (GrayFrame, Rect) {
             luma[(top + y) * 200 + left + x] = 70 + texture(x, y, 5) / 4;
         }
     }
-    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    let frame = Frame::from_luma(200, 160, luma).expect("a frame of this size");
     (frame, Rect::new(left as f64, top as f64, 24.0, 20.0))
 }
 
 /// Frame `t`, 200 x 160 pixels, with two unlike targets and their boxes: the first moves as ever, the second stands
 /// below it and swings a little.
-pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
+pub fn pair(t: usize) -> (Frame, Rect, Rect) {
     let (frame, first) = panned(t, (0, 0));
     let second = Rect::new(30.0 + bounce(t, 50), 105.0 + bounce(t, 25), 26.0, 26.0);
     let (left, top) = (second.x as usize, second.y as usize);
@@ -123,13 +123,13 @@ pub fn pair(t: usize) -> (GrayFrame, Rect, Rect) {
             luma[(top + y) * 200 + left + x] = 20 + texture(x, y, 77) / 3;
         }
     }
-    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    let frame = Frame::from_luma(200, 160, luma).expect("a frame of this size");
     (frame, first, second)
 }
 
 /// Frame `t`, 200 x 160 pixels, and the target's box in it: the target goes away, by 0.6 % a frame, while what is
 /// behind it comes nearer by as much, as a car does before a bridge.
-pub fn receding(t: usize) -> (GrayFrame, Rect) {
+pub fn receding(t: usize) -> (Frame, Rect) {
     let scale = (-0.006 * t as f64).exp();
     let (middle_x, middle_y) = (100.0, 80.0);
     let blend = |x: f64, y: f64, seed: u32| {
@@ -160,7 +160,7 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
             gray as u8
         })
         .collect();
-    let frame = GrayFrame::from_luma(200, 160, luma).expect("a frame of this size");
+    let frame = Frame::from_luma(200, 160, luma).expect("a frame of this size");
     (
         frame,
         Rect::centered(middle_x, middle_y, 60.0 * scale, 48.0 * scale),
@@ -170,7 +170,7 @@ pub fn receding(t: usize) -> (GrayFrame, Rect) {
 /// Frame `t` and the target's box in it: a face under dark hair tilts to one side around the neck, by two degrees a
 /// frame up to 50, stays there, and sways; behind it are hills. From afar 200 x 160 pixels, from near (`zoom` 3) 320
 /// x 240 of that three times as large.
-pub fn tilting(t: usize, zoom: usize) -> (GrayFrame, Rect) {
+pub fn tilting(t: usize, zoom: usize) -> (Frame, Rect) {
     let ((width, height), (left, top)) = match zoom {
         1 => ((200, 160), (0.0, 0.0)),
         _ => ((320, 240), (36.0, 42.0)),
@@ -200,16 +200,16 @@ pub fn tilting(t: usize, zoom: usize) -> (GrayFrame, Rect) {
             }
         })
         .collect();
-    let frame = GrayFrame::from_luma(width as u32, height as u32, luma);
+    let frame = Frame::from_luma(width as u32, height as u32, luma);
     let (x, y) = (neck.0 + 28.0 * sin - left, neck.1 - 28.0 * cos - top);
     let target = Rect::centered(larger * x, larger * y, larger * 28.0, larger * 36.0);
     (frame.expect("a frame of this size"), target)
 }
 
 /// A frame of one gray value.
-pub fn flat(width: u32, height: u32, value: u8) -> GrayFrame {
+pub fn flat(width: u32, height: u32, value: u8) -> Frame {
     let pixels = vec![value; width as usize * height as usize];
-    GrayFrame::from_luma(width, height, pixels).expect("a frame of this size")
+    Frame::from_luma(width, height, pixels).expect("a frame of this size")
 }
 
 /// The paper's parameters with another seed.

@@ -3,7 +3,7 @@
 //! A subspace of one vector is a point. With two rotated copies the first subspace spans what the target looks like
 //! when it tilts, from the first frame on. The whole frame is rotated, so the rim shows what would be there.
 
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::particles::Particle;
@@ -19,14 +19,14 @@ pub(crate) fn angles(params: &Params) -> impl Iterator<Item = f64> + use<> {
 }
 
 /// `frame` rotated by `angle` about the centre of `target`.
-pub(crate) fn rotated(frame: &GrayFrame, target: &Particle, angle: f64) -> GrayFrame {
+pub(crate) fn rotated(frame: &Frame, target: &Particle, angle: f64) -> Frame {
     let everywhere = Rect::new(
         0.0,
         0.0,
         frame.downsample() * f64::from(frame.width()),
         frame.downsample() * f64::from(frame.height()),
     );
-    Rotation::about((target.x, target.y), angle).apply(frame, &everywhere, Vec::new())
+    Rotation::about((target.x, target.y), angle).apply(frame, &everywhere, Frame::default())
 }
 
 #[cfg(test)]
@@ -34,9 +34,9 @@ mod tests {
     use super::*;
     use crate::tracker::params::presets::Preset;
 
-    fn frame(gray: impl Fn(usize, usize) -> u8) -> GrayFrame {
+    fn frame(gray: impl Fn(usize, usize) -> u8) -> Frame {
         let pixels = (0..80 * 60).map(|i| gray(i % 80, i / 80)).collect();
-        GrayFrame::from_luma(80, 60, pixels).expect("a frame of this size")
+        Frame::from_luma(80, 60, pixels).expect("a frame of this size")
     }
 
     const TARGET: Particle = Particle {

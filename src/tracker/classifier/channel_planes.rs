@@ -2,13 +2,13 @@
 
 use pulp::Simd;
 
-use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, LANES};
+use crate::tracker::features::channels::{CHANNELS, GRAY, LANES};
 use crate::tracker::features::extractor::Grid;
 
 /// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
 pub(crate) const MAX_OFFSET: usize = 24;
-/// The channels after the directions and the gray values: energies of the directions, gray values and their squares,
-/// each summed over as many cells to the right as a window is wide.
+/// The channels after those of a cell: energies of all channels but the gray values, gray values and their squares, each
+/// summed over as many cells to the right as a window is wide.
 const WIDE: usize = GRAY + 1;
 const WIDE_COUNT: usize = 3;
 const PLANES: usize = WIDE + WIDE_COUNT;
@@ -41,13 +41,13 @@ impl ChannelPlanes {
             let cells = cells.as_chunks::<CHANNELS>().0;
             let (squares, energies) = (&mut self.squares, &mut self.energies);
             energies[..grays.len()].fill(0.0);
-            for (direction, line) in lines.chunks_exact_mut(self.stride).enumerate() {
-                if direction == DIRECTIONS {
+            for (channel, line) in lines.chunks_exact_mut(self.stride).enumerate() {
+                if channel == GRAY {
                     break;
                 }
                 for ((value, energy), cell) in line.iter_mut().zip(&mut *energies).zip(cells) {
-                    *value = cell[direction];
-                    *energy += cell[direction] * cell[direction];
+                    *value = cell[channel];
+                    *energy += cell[channel] * cell[channel];
                 }
             }
             for (square, gray) in squares.iter_mut().zip(grays) {
@@ -121,7 +121,7 @@ mod tests {
         };
         let mut planes = ChannelPlanes::default();
         planes.load(&grid, (width, height));
-        let cell = |i: usize, j: usize| &grid.values[(j * columns + i) * CHANNELS..][..DIRECTIONS];
+        let cell = |i: usize, j: usize| &grid.values[(j * columns + i) * CHANNELS..][..GRAY];
         let gray = |i: usize, j: usize| grid.grays[j * columns + i];
         for (i, j) in [(0, 0), (3, 2), (6, 5)] {
             assert_eq!(planes.line((i, j), 4)[0], cell(i, j)[4]);

@@ -10,6 +10,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::tracker::appearance::foreground_map::ForegroundMap;
 use crate::tracker::classifier::channel_planes::MAX_OFFSET;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::sliding_window::SlidingWindow;
@@ -81,6 +82,7 @@ impl SearchGrid {
 struct Weigh<'a> {
     places: SearchGrid,
     search: &'a SearchContext<'a>,
+    foreground: &'a ForegroundMap,
     values: &'a mut [f32],
 }
 
@@ -90,10 +92,15 @@ impl WithSimd for Weigh<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let weight = self.search.params.discriminant_weight;
+        let histogram_weight = self.search.params.histogram_weight;
         let rows = self.values.chunks_exact_mut(self.places.columns());
         for (row, values) in rows.enumerate() {
             for (column, value) in values.iter_mut().enumerate() {
-                let prior = self.search.log_prior(&self.places.at(column, row));
+                let place = self.places.at(column, row);
+                let color = self
+                    .foreground
+                    .mean(&place, place.scale, self.search.bounds);
+                let prior = self.search.log_prior(&place) + histogram_weight * color;
                 *value = (weight * f64::from(*value) + prior) as f32;
             }
         }
@@ -113,6 +120,7 @@ impl DenseSearch {
         extractor: &mut Extractor,
         search: &SearchContext<'_>,
         discriminant: &Discriminant,
+        foreground: &ForegroundMap,
     ) {
         let params = search.params;
         self.maxima.clear();
@@ -141,6 +149,7 @@ impl DenseSearch {
         Arch::new().dispatch(Weigh {
             places,
             search,
+            foreground,
             values,
         });
         let columns = places.columns();
@@ -180,13 +189,13 @@ fn take_maximum(values: &mut [f32], columns: usize) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::image::frame::Frame;
     use crate::tracker::motion::particles::StateBounds;
     use crate::tracker::params::presets::Preset;
 
-    fn frame() -> GrayFrame {
+    fn frame() -> Frame {
         let luma = (0..160 * 120).map(|i| ((i * i / 7 + i / 160 * 13 + i) % 251) as u8);
-        GrayFrame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
+        Frame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
     }
 
     /// The cells of a grid are those of areas, but for the edges.

@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::window_score::{Products, Scorer};
-use crate::tracker::features::channels::{CHANNELS, DIRECTIONS, GRAY, Lanes};
+use crate::tracker::features::channels::{CHANNELS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
 use crate::tracker::params::table::Params;
 
@@ -105,7 +105,7 @@ fn correlate<S: Simd>(
     let origin = discriminant.origin().chunks_exact(row_len);
     let mut directions = [[simd.splat_f32s(0.0); 2]; ROWS];
     for (r, of) in weights.clone().zip(origin.clone()).enumerate() {
-        for channel in 0..DIRECTIONS {
+        for channel in 0..GRAY {
             let mut lines = [&[][..]; ROWS];
             for (line, row) in lines.iter_mut().zip(rows) {
                 *line = planes.line((first, row + r), channel);
@@ -160,7 +160,7 @@ mod tests {
     use crate::tracker::features::channels::GRAY_WEIGHT;
     use crate::tracker::features::extractor::Extractor;
     use crate::tracker::features::hog_cells::MIN_CONTRAST;
-    use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::image::frame::Frame;
     use crate::tracker::linalg::vector_ops;
     use crate::tracker::motion::particles::{Particle, StateBounds};
     use crate::tracker::params::presets::Preset;
@@ -169,9 +169,9 @@ mod tests {
         ((i * i * 37 + i * 7919) % 1000) as f32 / 500.0 - 1.0
     }
 
-    fn frame() -> GrayFrame {
+    fn frame() -> Frame {
         let luma = (0..160 * 120).map(|i| ((i * i / 7 + i / 160 * 13 + i) % 251) as u8);
-        GrayFrame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
+        Frame::from_luma(160, 120, luma.collect()).expect("a frame of this size")
     }
 
     /// Each score from the vector of its window, written out.
@@ -234,7 +234,7 @@ mod tests {
                 let deviation = variance.sqrt().max(MIN_CONTRAST * cell_pixels);
                 let mut vector = Vec::new();
                 for (c, gray) in grays.iter().enumerate() {
-                    let values = &grid.values[cell(c) * CHANNELS..][..DIRECTIONS];
+                    let values = &grid.values[cell(c) * CHANNELS..][..GRAY];
                     vector.extend_from_slice(values);
                     vector.push((gray - mean) / deviation * GRAY_WEIGHT);
                 }

@@ -19,6 +19,9 @@ const WARM_UP: u64 = 20;
 /// typical of a patch that shares about half with the first.
 const INITIAL_MEAN: f64 = 0.25;
 const ALWAYS_ACCEPTED: f64 = 0.3;
+/// What the limit is multiplied by where there is colour, which keeps the distance of a target that turns steadier, and
+/// takes that of an occluder further.
+const COLOR_STRICTNESS: f64 = 0.8;
 /// The least mean against which a target that was lost is recognised, also if it has hardly changed so far.
 const MIN_MEAN: f64 = 0.15;
 /// How much better than the lost threshold the discriminant must score a target that is found again.
@@ -79,8 +82,10 @@ impl UpdateGate {
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may update the models as far as
     /// the distance tells; updates the running mean.
-    pub fn judge(&mut self, distance: f64, number: u64, params: &Params) -> bool {
-        let limit = (params.update_distance_ratio * self.mean_distance).max(ALWAYS_ACCEPTED);
+    pub fn judge(&mut self, distance: f64, has_color: bool, number: u64, params: &Params) -> bool {
+        let strictness = if has_color { COLOR_STRICTNESS } else { 1.0 };
+        let limit =
+            (strictness * params.update_distance_ratio * self.mean_distance).max(ALWAYS_ACCEPTED);
         let accepted = params.update_distance_ratio <= 0.0 || distance < limit;
         let passes = number < WARM_UP || accepted;
         let rate = if passes { RATE } else { RATE_REJECTED };
@@ -98,8 +103,8 @@ mod tests {
     fn a_jump_does_not_pass_until_it_has_lasted() {
         let params = Preset::Robust.params();
         let mut gate = UpdateGate::default();
-        assert!((1..50).all(|number| gate.judge(0.2, number, &params)));
-        let rejected = (50..500).take_while(|&number| !gate.judge(0.6, number, &params));
+        assert!((1..50).all(|number| gate.judge(0.2, false, number, &params)));
+        let rejected = (50..500).take_while(|&number| !gate.judge(0.6, false, number, &params));
         let rejected = rejected.count();
         assert!((10..100).contains(&rejected), "{rejected}");
     }
@@ -129,6 +134,11 @@ mod tests {
     fn a_creeping_change_passes_all_along() {
         let params = Preset::Robust.params();
         let mut gate = UpdateGate::default();
-        assert!((1..200).all(|number| gate.judge(0.2 + number as f64 * 0.003, number, &params)));
+        assert!((1..200).all(|number| gate.judge(
+            0.2 + number as f64 * 0.003,
+            false,
+            number,
+            &params
+        )));
     }
 }

@@ -21,6 +21,16 @@ impl Centering<'_> {
     }
 }
 
+/// Centers a vector, where there is one and that is asked for.
+#[inline(always)]
+pub(crate) fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut [f32]) {
+    if let Some(centering) = centering
+        && !vector.is_empty()
+    {
+        centering.apply(simd, vector);
+    }
+}
+
 /// Centers all `vectors`, each of length `len`.
 #[pulp::with_simd(center_all = Arch::new())]
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! The channels of a gradient histogram: nine directions, then the gray value.
+//! The channels of a cell: a gradient histogram of nine directions, then chroma and the gray value.
 //!
 //! In the integral image and in cells the channels of one point lie side by side, padded with zeros to 16 lanes. They
 //! fill a cache line: one or two vector instructions work on all of them, and a look-up touches one line.
@@ -9,14 +9,20 @@ use crate::tracker::params::table::CELL_VALUES;
 
 /// Directions of a gradient, from 0 to 180 degrees.
 pub(crate) const DIRECTIONS: usize = 9;
-/// The channel of the gray values, after the directions.
-pub(crate) const GRAY: usize = DIRECTIONS;
+/// The channels of Cb and Cr, after the directions; 0 where there is no colour.
+pub(crate) const CHROMA: [usize; 2] = [DIRECTIONS, DIRECTIONS + 1];
+/// The channel of the gray values, the last one: the only one whose values depend on those of the whole area.
+pub(crate) const GRAY: usize = DIRECTIONS + CHROMA.len();
 /// The channels: the values of one cell in a feature vector.
-pub(crate) const CHANNELS: usize = DIRECTIONS + 1;
+pub(crate) const CHANNELS: usize = GRAY + 1;
 const _: () = assert!(CHANNELS == CELL_VALUES);
 
 /// The weight of the gray value beside the directions: a blurred target has few gradients.
 pub(crate) const GRAY_WEIGHT: f32 = 0.3;
+
+/// The chroma (of 128 levels either way) at which its channel has half of its greatest value: the hue of a pale target
+/// counts, and a vivid one does not outweigh everything else.
+pub(crate) const HALF_CHROMA: f32 = 20.0;
 
 /// The channels, with the zeros after them.
 pub(crate) const LANES: usize = 16;

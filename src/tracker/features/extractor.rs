@@ -9,7 +9,7 @@ use crate::tracker::features::gray::GrayPatches;
 use crate::tracker::features::hog::Hog;
 use crate::tracker::features::integral::IntegralChannels;
 use crate::tracker::image::downsample;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
@@ -76,7 +76,7 @@ impl Extractor {
     /// answer: its cells decide the resolution.
     pub fn compute_channels(
         &mut self,
-        frame: &GrayFrame,
+        frame: &Frame,
         particles: &[Particle],
         radius: f64,
         bounds: &StateBounds,
@@ -95,7 +95,7 @@ impl Extractor {
     /// Replaces `out` by the feature vectors of `particles`, of length D each.
     pub fn features(
         &mut self,
-        frame: &GrayFrame,
+        frame: &Frame,
         particles: &[Particle],
         bounds: &StateBounds,
         params: &Params,
@@ -109,7 +109,7 @@ impl Extractor {
     /// centers them, where that is asked for.
     pub fn describe(
         &mut self,
-        frame: &GrayFrame,
+        frame: &Frame,
         particles: &[Particle],
         bounds: &StateBounds,
         params: &Params,
@@ -129,8 +129,13 @@ impl Extractor {
                     |particle| context_area(particle, bounds, params).in_pixels_of(downsample);
                 let areas = particles.iter().map(area);
                 let size = (params.patch_width as usize, params.patch_height as usize);
-                self.hog
-                    .describe(&self.integral, areas, size, out, centering);
+                self.hog.describe(
+                    &self.integral,
+                    areas,
+                    (size, params.chroma_weight),
+                    out,
+                    centering,
+                );
             }
         }
     }
@@ -187,7 +192,13 @@ impl Extractor {
         let hog = &mut self.grid_hog;
         hog.reserve(max_columns, max_rows);
         let (size, values) = ((columns, rows), &mut grid.values);
-        hog.describe(&self.integral, areas, size, values, None);
+        hog.describe(
+            &self.integral,
+            areas,
+            (size, params.chroma_weight),
+            values,
+            None,
+        );
         grid.grays.extend(hog.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
             cell[GRAY] = 0.0;
@@ -197,7 +208,7 @@ impl Extractor {
     /// Writes the gray patches of `particles`, of length D each, to `out`, whatever the features are.
     pub fn cut(
         &mut self,
-        frame: &GrayFrame,
+        frame: &Frame,
         particles: &[Particle],
         bounds: &StateBounds,
         params: &Params,

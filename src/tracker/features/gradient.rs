@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
-use crate::tracker::features::channels::DIRECTIONS;
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::features::channels::{DIRECTIONS, HALF_CHROMA};
+use crate::tracker::image::frame::Frame;
+use crate::tracker::image::plane::Plane;
+use crate::tracker::image::ycbcr::NEUTRAL;
 
 /// The gradients of a row of pixels.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +16,8 @@ pub(crate) struct GradientRow {
     pub strengths: Vec<f32>,
     /// The gray values minus an offset, after that of the pixel before the row.
     pub gray: Vec<f32>,
+    /// Cb and Cr minus that of gray, compressed: in units of [`HALF_CHROMA`], -1 to 1.
+    pub chroma: [Vec<f32>; 2],
 }
 
 impl GradientRow {
@@ -22,7 +26,7 @@ impl GradientRow {
     #[inline(always)]
     pub fn compute(
         &mut self,
-        frame: &GrayFrame,
+        frame: &Frame,
         pixels: Range<usize>,
         y: usize,
         padded: usize,
@@ -37,6 +41,13 @@ impl GradientRow {
         self.gray.extend(line[pixels.clone()].iter().map(gray));
         self.gray.push(gray(&line[pixels.end.min(width - 1)]));
 
+        for (channel, out) in self.chroma.iter_mut().enumerate() {
+            out.clear();
+            if let Some(planes) = frame.chroma() {
+                compress_chroma(&planes[channel], pixels.clone(), y, out);
+            }
+            out.resize(padded, 0.0);
+        }
         let count = pixels.len();
         self.bins.resize(count, 0.0);
         self.strengths.resize(count, 0.0);
@@ -56,6 +67,28 @@ impl GradientRow {
         self.gray.truncate(count + 1);
         self.gray.resize(padded + 1, 0.0);
     }
+}
+
+/// Appends the compressed chroma of `pixels` in row `y` of the luma, whose pixels are half as large as those of `plane`.
+#[inline(always)]
+fn compress_chroma(plane: &Plane, pixels: Range<usize>, y: usize, out: &mut Vec<f32>) {
+    let row = plane.row(y / 2);
+    let last = row.len() - 1;
+    let compress = |value: u8| {
+        let value = f32::from(value) - NEUTRAL as f32;
+        value / (HALF_CHROMA + value.abs())
+    };
+    let (first, end) = (pixels.start / 2, (pixels.end - 1) / 2);
+    // Of the first and the last pair only one may be wanted.
+    out.reserve(pixels.len() + 2);
+    for column in first..=end {
+        let value = compress(row[column.min(last)]);
+        out.extend([value, value]);
+    }
+    if pixels.start % 2 == 1 {
+        out.remove(0);
+    }
+    out.truncate(pixels.len());
 }
 
 /// The unsigned angle of (x, y), 0 to π, to within 0.0003: a minimax polynomial of the arc tangent on \[0, 1\]. It

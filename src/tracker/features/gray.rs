@@ -5,7 +5,7 @@
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::params::table::Params;
 
@@ -32,7 +32,7 @@ impl GrayPatches {
     /// Writes the feature vectors of `areas` (working pixels, finite, sides above 0) to `out`, D values for each.
     pub fn cut(
         &mut self,
-        image: &GrayFrame,
+        image: &Frame,
         areas: impl Iterator<Item = Rect>,
         params: &Params,
         out: &mut [f32],
@@ -50,7 +50,7 @@ impl GrayPatches {
 #[inline(always)]
 fn cut_simd<S: Simd>(
     _: S,
-    image: &GrayFrame,
+    image: &Frame,
     area: &Rect,
     params: &Params,
     between: &mut [f32],
@@ -105,7 +105,7 @@ fn centers(start: f64, extent: f64, count: u32, pixels: u32) -> Centers {
 }
 
 /// The feature vector of `area` of `image`, both in working pixels: D gray values in [0, 1], row by row.
-pub fn patch(image: &GrayFrame, area: &Rect, params: &Params) -> Vec<f32> {
+pub fn patch(image: &Frame, area: &Rect, params: &Params) -> Vec<f32> {
     let mut values = vec![0.0; params.feature_len()];
     GrayPatches::default().cut(image, std::iter::once(*area), params, &mut values);
     values
@@ -116,13 +116,13 @@ mod tests {
     use super::*;
     use crate::tracker::params::presets::Preset;
 
-    fn image(width: u32, height: u32) -> GrayFrame {
+    fn image(width: u32, height: u32) -> Frame {
         let luma = (0..width * height).map(|i| (i * 97 % 256) as u8).collect();
-        GrayFrame::from_luma(width, height, luma).expect("a frame of this size")
+        Frame::from_luma(width, height, luma).expect("a frame of this size")
     }
 
     /// Bilinear interpolation at one point, pixel by pixel.
-    fn at(image: &GrayFrame, x: f64, y: f64) -> f64 {
+    fn at(image: &Frame, x: f64, y: f64) -> f64 {
         let pixel = |x: f64, y: f64| {
             let x = x.clamp(0.0, f64::from(image.width() - 1)) as usize;
             let y = y.clamp(0.0, f64::from(image.height() - 1)) as usize;

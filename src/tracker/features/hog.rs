@@ -6,7 +6,7 @@
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::features::centering::Centering;
+use crate::tracker::features::centering::{Centering, center};
 use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::hog_cells::HogCells;
 use crate::tracker::features::integral::IntegralChannels;
@@ -28,11 +28,14 @@ impl Hog {
         &mut self,
         integral: &IntegralChannels,
         areas: impl Iterator<Item = Rect>,
-        (columns, rows): (usize, usize),
+        ((columns, rows), chroma_weight): ((usize, usize), f64),
         out: &mut [f32],
         centering: Option<Centering<'_>>,
     ) {
         self.resize(columns, rows);
+        for cells in &mut self.cells {
+            cells.chroma_weight = chroma_weight as f32;
+        }
         describe_all(self, integral, areas, out, centering);
     }
 
@@ -96,32 +99,25 @@ fn describe_all_simd<S: Simd, A: Iterator<Item = Rect>>(
     center(simd, &mut centering, to_normalize);
 }
 
-/// Centers a vector, where there is one and that is asked for.
-#[inline(always)]
-fn center<S: Simd>(simd: S, centering: &mut Option<Centering<'_>>, vector: &mut [f32]) {
-    if let Some(centering) = centering
-        && !vector.is_empty()
-    {
-        centering.apply(simd, vector);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::features::channels::{DIRECTIONS, GRAY_WEIGHT};
+    use crate::tracker::features::channels::{CHROMA, DIRECTIONS, GRAY_WEIGHT, HALF_CHROMA};
     use crate::tracker::features::hog_cells::{MAX_DIRECTION, MIN_STRENGTH};
-    use crate::tracker::image::frame::GrayFrame;
+    use crate::tracker::image::frame::Frame;
     use crate::tracker::params::presets::Preset;
     use crate::tracker::params::table::Params;
 
-    fn frame() -> GrayFrame {
+    fn frame() -> Frame {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
-        GrayFrame::from_luma(60, 50, luma.collect()).expect("a frame of this size")
+        let chroma = |k| (0..30 * 25).map(move |i| (90 + (i * i / 9 + i * k) % 80) as u8);
+        let chroma = Some([chroma(5).collect(), chroma(11).collect()]);
+        let frame = Frame::from_reduced((60, 50), (60, 50), luma.collect(), chroma);
+        frame.expect("a frame of this size")
     }
 
     /// Direction (in bins) and strength of the gradient of the pixel at (`x`, `y`).
-    fn gradient(frame: &GrayFrame, x: usize, y: usize) -> (f64, f64) {
+    fn gradient(frame: &Frame, x: usize, y: usize) -> (f64, f64) {
         let (width, height) = (frame.width() as usize, frame.height() as usize);
         let pixel = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
         let across = pixel((x + 1).min(width - 1), y) - pixel(x.saturating_sub(1), y);
@@ -135,7 +131,7 @@ mod tests {
     }
 
     /// The sums over a cell, pixel by pixel, each weighted by the share of it that is inside.
-    fn cell(frame: &GrayFrame, area: &Rect) -> [f64; CHANNELS] {
+    fn cell(frame: &Frame, area: &Rect) -> [f64; CHANNELS] {
         let mut sums = [0.0; CHANNELS];
         let width = frame.width() as usize;
         for y in 0..frame.height() as usize {
@@ -148,7 +144,12 @@ mod tests {
                 let (lower, part) = (bin as usize, bin.fract());
                 sums[lower] += share * strength * (1.0 - part);
                 sums[(lower + 1) % DIRECTIONS] += share * strength * part;
-                sums[DIRECTIONS] += share * f64::from(frame.pixels()[y * width + x]);
+                sums[GRAY] += share * f64::from(frame.pixels()[y * width + x]);
+                let planes = frame.chroma().expect("it has colour");
+                for (channel, plane) in CHROMA.into_iter().zip(planes) {
+                    let chroma = f64::from(plane.pixels[y / 2 * 30 + x / 2]) - 128.0;
+                    sums[channel] += share * chroma / (f64::from(HALF_CHROMA) + chroma.abs());
+                }
             }
         }
         sums
@@ -185,13 +186,14 @@ mod tests {
         }
     }
 
-    fn features(frame: &GrayFrame, area: Rect, params: &Params) -> Vec<f32> {
+    fn features(frame: &Frame, area: Rect, params: &Params) -> Vec<f32> {
         let mut integral = IntegralChannels::default();
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
         integral.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
         let size = (params.patch_width as usize, params.patch_height as usize);
         let mut out = vec![1.0; params.feature_len()];
         let areas = std::iter::once(area);
+        let size = (size, params.chroma_weight);
         Hog::default().describe(&integral, areas, size, &mut out, None);
         out
     }
@@ -218,10 +220,10 @@ mod tests {
         let cells: Vec<_> = (0..20).map(|i| cell(&frame, &cell_area(i))).collect();
         let energy =
             |cell: &[f64; CHANNELS]| -> f64 { cell[..DIRECTIONS].iter().map(|v| v * v).sum() };
-        let mean = cells.iter().map(|cell| cell[DIRECTIONS]).sum::<f64>() / 20.0;
+        let mean = cells.iter().map(|cell| cell[GRAY]).sum::<f64>() / 20.0;
         let variance = cells
             .iter()
-            .map(|cell| (cell[DIRECTIONS] - mean).powi(2))
+            .map(|cell| (cell[GRAY] - mean).powi(2))
             .sum::<f64>()
             / 20.0;
         for (index, values) in found.chunks_exact(CHANNELS).enumerate() {
@@ -241,8 +243,13 @@ mod tests {
                     "{value} {expected}"
                 );
             }
-            let gray = (cells[index][DIRECTIONS] - mean) * f64::from(GRAY_WEIGHT) / variance.sqrt();
-            assert!((f64::from(values[DIRECTIONS]) - gray).abs() < 2e-3);
+            let gray = (cells[index][GRAY] - mean) * f64::from(GRAY_WEIGHT) / variance.sqrt();
+            assert!((f64::from(values[GRAY]) - gray).abs() < 2e-3);
+            for channel in CHROMA {
+                let expected = cells[index][channel] * params.chroma_weight / (width * height);
+                let found = f64::from(values[channel]);
+                assert!((found - expected).abs() < 2e-3, "{found} {expected}");
+            }
         }
     }
 
@@ -251,7 +258,7 @@ mod tests {
         let params = Preset::Robust.params();
         let bright = frame();
         let dim = bright.pixels().iter().map(|gray| gray / 2 + 10).collect();
-        let dim = GrayFrame::from_luma(60, 50, dim).expect("a frame of this size");
+        let dim = Frame::from_luma(60, 50, dim).expect("a frame of this size");
         let area = Rect::new(12.0, 9.0, 30.0, 28.0);
         let distance =
             |a: &[f32], b: &[f32]| -> f32 { a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum() };
@@ -267,11 +274,11 @@ mod tests {
     fn features_in_the_last_corner_of_a_bright_frame_are_those_of_the_same_pixels_alone() {
         let gray = |x: usize, y: usize| (243 + (x * x / 7 + y * 5 + x * y) % 13) as u8;
         let pixels = (0..320 * 240).map(|i| gray(i % 320, i / 320)).collect();
-        let frame = GrayFrame::from_luma(320, 240, pixels).expect("a frame of this size");
+        let frame = Frame::from_luma(320, 240, pixels).expect("a frame of this size");
         let pixels = (0..48 * 40)
             .map(|i| gray(272 + i % 48, 200 + i / 48))
             .collect();
-        let corner = GrayFrame::from_luma(48, 40, pixels).expect("a frame of this size");
+        let corner = Frame::from_luma(48, 40, pixels).expect("a frame of this size");
         let params = Preset::Robust.params();
         for (x, y) in [(4.0, 3.0), (6.3, 2.6), (11.8, 3.1)] {
             let alone = features(&corner, Rect::new(x, y, 32.0, 32.0), &params);
@@ -284,7 +291,7 @@ mod tests {
 
     #[test]
     fn a_flat_area_has_features_of_zero() {
-        let flat = GrayFrame::from_luma(20, 20, vec![90; 400]).expect("a frame of this size");
+        let flat = Frame::from_luma(20, 20, vec![90; 400]).expect("a frame of this size");
         let params = Preset::Robust.params();
         let out = features(&flat, Rect::new(4.0, 4.0, 12.0, 12.0), &params);
         assert!(out.iter().all(|value| value.abs() < 1e-3));

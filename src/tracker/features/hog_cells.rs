@@ -3,7 +3,9 @@
 use pulp::Simd;
 
 use crate::tracker::features::block_norm::BlockNorm;
-use crate::tracker::features::channels::{CHANNELS, GRAY, GRAY_WEIGHT, LANES, Lanes, registers};
+use crate::tracker::features::channels::{
+    CHANNELS, CHROMA, GRAY, GRAY_WEIGHT, LANES, Lanes, registers,
+};
 use crate::tracker::features::integral::IntegralChannels;
 use crate::tracker::features::sample_coords::SampleCoords;
 use crate::tracker::image::rect::Rect;
@@ -21,6 +23,8 @@ const ENERGY_SHARES: Lanes = Lanes::directions(1.0, 1.0);
 const LIMITS: Lanes = {
     let mut limits = Lanes([MAX_DIRECTION; LANES]);
     limits.0[GRAY] = f32::INFINITY;
+    limits.0[CHROMA[0]] = f32::INFINITY;
+    limits.0[CHROMA[1]] = f32::INFINITY;
     limits
 };
 
@@ -37,6 +41,8 @@ pub(crate) struct HogCells {
     grays: GrayMoments,
     /// The area of a cell, in pixels.
     cell_area: f32,
+    /// The weight of the mean chroma of a cell.
+    pub chroma_weight: f32,
     /// The edges of the cells in the integral image.
     x_edges: SampleCoords,
     y_edges: SampleCoords,
@@ -186,9 +192,12 @@ impl HogCells {
         let gray_scale = GRAY_WEIGHT / variance.sqrt().max(MIN_CONTRAST * cell_area);
         let floor = (MIN_STRENGTH * cell_area) * (MIN_STRENGTH * cell_area);
         // A value is min(cell * factor + offset, limit).
-        let gray_factors = Lanes::single(GRAY, gray_scale);
+        let mut own_factors = Lanes::single(GRAY, gray_scale);
+        for channel in CHROMA {
+            own_factors.0[channel] = self.chroma_weight / cell_area;
+        }
         let offsets = Lanes::single(GRAY, -mean * gray_scale);
-        let (gray_factors, offsets) = (gray_factors.load::<S>(), offsets.load::<S>());
+        let (own_factors, offsets) = (own_factors.load::<S>(), offsets.load::<S>());
         let (directions, limits) = (ENERGY_SHARES, LIMITS);
         let (directions, limits) = (directions.load::<S>(), limits.load::<S>());
         let factors = self.norm.factors(floor);
@@ -201,7 +210,7 @@ impl HogCells {
                     let factor = simd.mul_add_e_f32s(
                         directions[register],
                         direction_factor,
-                        gray_factors[register],
+                        own_factors[register],
                     );
                     let scaled = simd.mul_add_e_f32s(cell[register], factor, offsets[register]);
                     *value = simd.min_f32s(scaled, limits[register]);

@@ -17,7 +17,7 @@ use crate::tracker::features::binning::sum_row;
 use crate::tracker::features::channels::{LANES, Lanes, Registers, registers};
 use crate::tracker::features::gradient::GradientRow;
 use crate::tracker::features::sample_coords::{SampleCoord, SampleCoords};
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 
 /// Cells of at least this many pixels a side have a corner at every second pixel. They lose nothing by it, and a large
@@ -47,7 +47,7 @@ pub(crate) struct IntegralChannels {
 impl IntegralChannels {
     /// Sums the channels over the part of `frame` that `window` touches, for cells of size `cell` = width, height. All
     /// lengths are in pixels of `frame`.
-    pub fn compute(&mut self, frame: &GrayFrame, window: &Rect, cell: (f64, f64)) {
+    pub fn compute(&mut self, frame: &Frame, window: &Rect, cell: (f64, f64)) {
         (self.left, self.right) = covered(window.x, window.width, frame.width() as usize);
         (self.top, self.bottom) = covered(window.y, window.height, frame.height() as usize);
         self.spacing = if cell.0.min(cell.1) >= MIN_COARSE_CELL {
@@ -115,7 +115,7 @@ impl IntegralChannels {
 
 #[pulp::with_simd(sum_window = Arch::new())]
 #[inline(always)]
-fn sum_window_simd<S: Simd>(simd: S, integral: &mut IntegralChannels, frame: &GrayFrame) {
+fn sum_window_simd<S: Simd>(simd: S, integral: &mut IntegralChannels, frame: &Frame) {
     let (columns, spacing) = (integral.columns, integral.spacing);
     let stride = columns + 1;
     let corners = stride * (integral.rows + 1);
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn sums_are_those_of_the_pixels_above_and_left() {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
-        let frame = GrayFrame::from_luma(60, 50, luma.collect()).expect("a frame of this size");
+        let frame = Frame::from_luma(60, 50, luma.collect()).expect("a frame of this size");
         let mut sums = IntegralChannels::default();
         for (left, top, cell) in [(0, 0, 4.0), (7, 12, 4.0), (0, 0, 9.0), (7, 12, 9.0)] {
             // An odd width and height.
@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn cells_of_stripes_over_the_whole_frame_stay_within_a_percent() {
         let stripes = (0..320 * 320).map(|i| if i % 320 % 4 < 2 { 0 } else { 255 });
-        let frame = GrayFrame::from_luma(320, 320, stripes.collect());
+        let frame = Frame::from_luma(320, 320, stripes.collect());
         let frame = frame.expect("a frame of this size");
         let mut sums = IntegralChannels::default();
         sums.compute(&frame, &Rect::new(0.0, 0.0, 320.0, 320.0), (4.0, 4.0));

@@ -1,6 +1,6 @@
 //! From areas of a frame to feature vectors: what the tracker compares.
 //!
-//! In: a [`GrayFrame`](crate::tracker::image::frame::GrayFrame) and particles, in working pixels. Out: for each
+//! In: a [`Frame`](crate::tracker::image::frame::Frame) and particles, in working pixels. Out: for each
 //! particle a vector of D `f32` values, one after the other. These are H₁ x H₂ gray values in [0, 1] (section III-B),
 //! or H₁ x H₂ cells of ten values: nine gradient directions in [0, 0.4] and a gray value of mean 0.
 //!

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::plane::Plane;
 
 /// Fractional bits of a coordinate.
 const FRACTION_BITS: u32 = 16;
@@ -76,12 +76,12 @@ impl Axis {
     }
 }
 
-/// Replaces `out` by the gray values of `frame` at the samples (`x`, `y`).
+/// Replaces `out` by the values of `plane` at the samples (`x`, `y`).
 #[inline(always)]
-pub(crate) fn sample_row(frame: &GrayFrame, x: &Axis, y: &Axis, out: &mut [u8]) {
+pub(crate) fn sample_row(plane: &Plane, x: &Axis, y: &Axis, out: &mut [u8]) {
     // Only samples beyond the edge have to be clamped, and those are few.
     let inside = y.inside(x.inside(0..out.len()));
-    let (source, width) = (frame.pixels(), frame.width() as usize);
+    let (source, width) = (&plane.pixels[..], plane.width as usize);
     let mut done = inside.start;
     if inside.len() >= GROUP_SIZE {
         while done < inside.end {

@@ -3,9 +3,12 @@
 //! A feature vector has as many cells for a large target as for a small one. In larger pixels a large target costs no
 //! more time than a small one, and its cells say the same. Squares that the frame's edge cuts are left out.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd};
 
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
+use crate::tracker::image::plane::Plane;
 
 /// The shorter side of a cell in larger pixels is at least this long. At 4 the scale is measured too coarsely, and the
 /// box does not follow a target that grows.
@@ -22,10 +25,10 @@ pub(crate) fn factor(first_cell: f64, cell: f64, frame_side: f64) -> usize {
     let mut factor = 1;
     while factor < MAX_FACTOR {
         let next = (2 * factor) as f64;
-        // A box may be larger than the frame, which needs a pixel.
+        // A box may be larger than the frame, whose chroma needs a pixel too.
         if first_cell < MIN_CELL_SIDE * next
             || cell < MIN_SHRUNK_CELL_SIDE * next
-            || frame_side < next
+            || frame_side < 2.0 * next
         {
             break;
         }
@@ -34,52 +37,75 @@ pub(crate) fn factor(first_cell: f64, cell: f64, frame_side: f64) -> usize {
     factor
 }
 
-/// `frame` in pixels that are `factor` = 2 or 4 times as large; neither side of the frame is shorter than that. The
-/// memory of `pixels` is used again, whatever it holds.
-pub(crate) fn downsampled(frame: &GrayFrame, factor: usize, mut pixels: Vec<u8>) -> GrayFrame {
-    let columns = downsample(frame, factor, &mut pixels);
-    let rows = pixels.len() / columns;
-    frame.in_larger_pixels(factor as u32, (columns as u32, rows as u32), pixels)
+/// `frame` in pixels that are `factor` = 2 or 4 times as large; neither side of the frame is shorter than twice that.
+/// The memory of `scratch` is used again, whatever it holds.
+pub(crate) fn downsampled(frame: &Frame, factor: usize, scratch: Frame) -> Frame {
+    frame.map_planes(scratch, |plane, mut pixels| {
+        let columns = downsample(plane, factor, &mut pixels);
+        let size = (columns as u32, (pixels.len() / columns) as u32);
+        Plane::new(size, pixels, plane.pixel_side * factor as u32)
+    })
 }
 
 /// Replaces `out` by the mean of each whole square of `factor` = 2 or 4 pixels a side, row by row. Returns the number
 /// of squares in a row, which may be 0.
-pub(crate) fn downsample(frame: &GrayFrame, factor: usize, out: &mut Vec<u8>) -> usize {
-    let (columns, rows) = (
-        frame.width() as usize / factor,
-        frame.height() as usize / factor,
-    );
-    out.clear();
-    out.resize(columns * rows, 0);
-    if columns > 0 {
-        square_means(frame, factor, columns, out);
-    }
+pub(crate) fn downsample(plane: &Plane, factor: usize, out: &mut Vec<u8>) -> usize {
+    let (columns, rows) = squares(plane, factor);
+    downsample_part(plane, factor, (0..columns, 0..rows), out);
     columns
+}
+
+/// The numbers of whole squares in a row and in a column.
+pub(crate) fn squares(plane: &Plane, factor: usize) -> (usize, usize) {
+    (
+        plane.width as usize / factor,
+        plane.height as usize / factor,
+    )
+}
+
+/// As [`downsample`], for the squares of these columns and rows.
+pub(crate) fn downsample_part(
+    plane: &Plane,
+    factor: usize,
+    (columns, rows): (Range<usize>, Range<usize>),
+    out: &mut Vec<u8>,
+) {
+    out.clear();
+    out.resize(columns.len() * rows.len(), 0);
+    if !out.is_empty() {
+        square_means(plane, factor, columns, rows.start, out);
+    }
 }
 
 #[pulp::with_simd(square_means = Arch::new())]
 #[inline(always)]
 fn square_means_simd<S: Simd>(
     _: S,
-    frame: &GrayFrame,
+    plane: &Plane,
     factor: usize,
-    columns: usize,
+    columns: Range<usize>,
+    first_row: usize,
     out: &mut [u8],
 ) {
     match factor {
-        2 => square_means_of::<2>(frame, columns, out),
-        4 => square_means_of::<4>(frame, columns, out),
+        2 => square_means_of::<2>(plane, columns, first_row, out),
+        4 => square_means_of::<4>(plane, columns, first_row, out),
         _ => unreachable!("the factor is 2 or 4"),
     }
 }
 
 #[inline(always)]
-fn square_means_of<const FACTOR: usize>(frame: &GrayFrame, columns: usize, out: &mut [u8]) {
-    let width = frame.width() as usize;
-    let bands = frame.pixels().chunks_exact(FACTOR * width);
-    for (out, band) in out.chunks_exact_mut(columns).zip(bands) {
+fn square_means_of<const FACTOR: usize>(
+    plane: &Plane,
+    columns: Range<usize>,
+    first_row: usize,
+    out: &mut [u8],
+) {
+    let width = plane.width as usize;
+    let bands = plane.pixels.chunks_exact(FACTOR * width).skip(first_row);
+    for (out, band) in out.chunks_exact_mut(columns.len()).zip(bands) {
         let lines: [&[[u8; FACTOR]]; FACTOR] =
-            std::array::from_fn(|row| &band[row * width..][..width].as_chunks().0[..columns]);
+            std::array::from_fn(|row| &band[row * width..][..width].as_chunks().0[columns.clone()]);
         for (i, out) in out.iter_mut().enumerate() {
             let mut sum = 0;
             // Two plain loops become vector instructions; an iterator over the square does not.
@@ -103,11 +129,11 @@ mod tests {
         for (width, height) in [(320, 240), (43, 18), (4, 4), (3, 9), (9, 3)] {
             let texture = (0..width * height).map(|i| (i * i * 7 + i) as u8);
             for luma in [vec![255; width * height], texture.collect()] {
-                let frame = GrayFrame::from_luma(width as u32, height as u32, luma.clone());
+                let frame = Frame::from_luma(width as u32, height as u32, luma.clone());
                 let frame = frame.expect("a frame of this size");
                 for factor in [2, 4] {
                     let mut found = vec![1, 2, 3];
-                    let columns = downsample(&frame, factor, &mut found);
+                    let columns = downsample(frame.luma(), factor, &mut found);
                     assert_eq!(columns, width / factor);
                     assert_eq!(found.len(), columns * (height / factor));
                     let count = factor * factor;
@@ -124,8 +150,8 @@ mod tests {
 
     #[test]
     fn a_downsampled_frame_knows_its_size_and_factor() {
-        let frame = GrayFrame::from_luma(43, 18, vec![9; 43 * 18]).expect("a frame of this size");
-        let found = downsampled(&frame, 4, vec![7; 5]);
+        let frame = Frame::from_luma(43, 18, vec![9; 43 * 18]).expect("a frame of this size");
+        let found = downsampled(&frame, 4, Frame::default());
         assert_eq!((found.width(), found.height()), (10, 4));
         assert_eq!(found.downsample(), 4.0);
         assert_eq!(found.source_size(), (43, 18));
@@ -138,6 +164,6 @@ mod tests {
         assert_eq!(sides.map(|cell| of(cell, 1.0)), [1, 1, 2, 2, 4, 4]);
         let scales = [2.0, 1.0, 0.67, 0.66];
         assert_eq!(scales.map(|scale| of(12.1, scale)), [2, 2, 2, 1]);
-        assert_eq!(factor(45.0, 45.0, 3.0), 2);
+        assert_eq!(factor(45.0, 45.0, 7.0), 2);
     }
 }

@@ -1,13 +1,14 @@
-//! The working image that the tracker sees.
+//! The frames that the tracker sees: luma, and chroma where there is colour.
 //!
-//! Uploads come in any size; the paper's pixel lengths hold for images of 320 x 240. So every frame is brought to
-//! at most [`WORKING_SIDE`] on its longer side, and the tracker works there. A frame remembers the size it was
-//! uploaded with, which is what boxes are given in.
+//! A frame remembers the size that it was uploaded with, which is what boxes are given in. A session sees all its
+//! frames in one [`FrameFormat`]; a decoder that knows it need not make larger ones.
 
-use crate::tracker::image::area_average::area_average;
+use std::borrow::Cow;
 
-/// Longest side, in pixels, of the working image. The paper's pixel lengths hold at this size.
-pub const WORKING_SIDE: u32 = 320;
+use serde::{Deserialize, Serialize};
+
+use crate::tracker::image::plane::Plane;
+use crate::tracker::image::ycbcr::{self, chroma_size};
 
 /// Why pixels do not make a frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -24,155 +25,164 @@ pub enum FrameError {
     },
 }
 
-/// An 8-bit luma image, at most [`WORKING_SIDE`] on its longer side, that knows the size of the
-/// uploaded frame it was made from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GrayFrame {
-    width: u32,
-    height: u32,
-    pixels: Vec<u8>,
-    source_width: u32,
-    source_height: u32,
-    /// Working pixels along a side of one of `pixels`: 1, 2 or 4.
-    downsample: u32,
+/// How a session sees its frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FrameFormat {
+    /// Width and height in working pixels.
+    pub size: (u32, u32),
+    /// Whether chroma counts.
+    pub has_color: bool,
 }
 
-impl GrayFrame {
-    /// Makes the working image of `width` x `height` luma values in row order: an area average where the
-    /// longer side is over [`WORKING_SIDE`] (aspect kept, each side rounded to whole pixels and at least 1),
-    /// the pixels themselves otherwise. No allocation beyond the working image and two of its rows.
+/// An 8-bit image, with the size of the uploaded frame that it was made from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Frame {
+    source: (u32, u32),
+    luma: Plane,
+    /// Cb and Cr of Rec. 601 in full range, in pixels twice as large as those of the luma.
+    chroma: Option<[Plane; 2]>,
+}
+
+impl Frame {
+    /// A gray frame of `width` x `height` luma values in row order.
     ///
     /// # Errors
     /// A side of 0, or a number of values that is not `width * height`.
     pub fn from_luma(width: u32, height: u32, luma: Vec<u8>) -> Result<Self, FrameError> {
-        let size = (width, height);
-        let working = checked_working_size(size, size, luma.len())?;
-        if working == size {
-            return Ok(Self::new(size, working, luma));
-        }
-        let mut pixels = Vec::new();
-        area_average(&luma, size, working, &mut pixels);
-        Ok(Self::new(size, working, pixels))
+        Self::from_reduced((width, height), (width, height), luma, None)
     }
 
-    /// The working image of a frame of `source` = width, height, from a reduced image of it that a decoder gives:
-    /// `luma` of `size` = width, height, not smaller than the working image. The memory of `scratch` is used again,
-    /// whatever it holds.
+    /// A frame of `width` x `height` RGB triples in row order, brought to luma and chroma by Rec. 601.
     ///
     /// # Errors
-    /// As [`Self::from_luma`]; also a reduced image that is smaller than the working image or larger than the frame.
+    /// As [`from_luma`](Self::from_luma).
+    pub fn from_rgb(width: u32, height: u32, rgb: &[u8]) -> Result<Self, FrameError> {
+        let size = (width, height);
+        let pixels = rgb.as_chunks::<3>().0;
+        let luma: Vec<u8> = pixels.iter().map(|&pixel| ycbcr::luma(pixel)).collect();
+        let is_whole = rgb.len() as u64 == 3 * u64::from(width) * u64::from(height);
+        let chroma = is_whole.then(|| ycbcr::chroma(size, |i| pixels[i]));
+        match chroma {
+            Some(chroma) => Self::from_reduced(size, size, luma, Some(chroma)),
+            None => Err(FrameError::Size {
+                width,
+                height,
+                pixels: luma.len(),
+            }),
+        }
+    }
+
+    /// A frame that was uploaded in the size `source` and reduced to `size`: `luma` of this size and chroma of half of
+    /// it on each side, rounded up, each row by row.
+    ///
+    /// # Errors
+    /// As [`from_luma`](Self::from_luma); also a size that is larger than `source`.
     pub fn from_reduced(
         source: (u32, u32),
         size: (u32, u32),
-        luma: &[u8],
-        mut scratch: Vec<u8>,
+        luma: Vec<u8>,
+        chroma: Option<[Vec<u8>; 2]>,
     ) -> Result<Self, FrameError> {
-        let working = checked_working_size(source, size, luma.len())?;
-        scratch.clear();
-        if working == size {
-            scratch.extend_from_slice(luma);
-        } else {
-            area_average(luma, size, working, &mut scratch);
+        let area = |size: (u32, u32)| u64::from(size.0) * u64::from(size.1);
+        let half = chroma_size(size);
+        let is_whole = luma.len() as u64 == area(size)
+            && chroma
+                .iter()
+                .flatten()
+                .all(|plane| plane.len() as u64 == area(half));
+        if area(size) == 0 || size.0 > source.0 || size.1 > source.1 || !is_whole {
+            return Err(FrameError::Size {
+                width: source.0,
+                height: source.1,
+                pixels: luma.len(),
+            });
         }
-        Ok(Self::new(source, working, scratch))
+        Ok(Self {
+            source,
+            luma: Plane::new(size, luma, 1),
+            chroma: chroma.map(|planes| planes.map(|plane| Plane::new(half, plane, 2))),
+        })
     }
 
-    fn new(source: (u32, u32), working: (u32, u32), pixels: Vec<u8>) -> Self {
+    /// The same frame with each plane changed by `change`, which gets the memory of that plane in `scratch`.
+    pub(crate) fn map_planes(
+        &self,
+        scratch: Self,
+        change: impl Fn(&Plane, Vec<u8>) -> Plane,
+    ) -> Self {
+        let [cb, cr] = scratch.chroma.unwrap_or_default();
         Self {
-            width: working.0,
-            height: working.1,
-            pixels,
-            source_width: source.0,
-            source_height: source.1,
-            downsample: 1,
+            source: self.source,
+            luma: change(&self.luma, scratch.luma.pixels),
+            chroma: self
+                .chroma
+                .as_ref()
+                .map(|[of_cb, of_cr]| [change(of_cb, cb.pixels), change(of_cr, cr.pixels)]),
         }
     }
 
-    /// A frame of the same size with other `pixels`, as many as it has.
-    pub(crate) fn with_pixels(&self, pixels: Vec<u8>) -> Self {
-        debug_assert_eq!(pixels.len(), self.pixels.len());
-        Self { pixels, ..*self }
-    }
-
-    /// The same frame in `pixels` that are `factor` times as large; `size` = columns, rows of them.
-    pub(crate) fn in_larger_pixels(&self, factor: u32, size: (u32, u32), pixels: Vec<u8>) -> Self {
-        debug_assert_eq!(pixels.len(), (size.0 * size.1) as usize);
-        let (width, height) = size;
-        Self {
-            width,
-            height,
-            pixels,
-            downsample: factor,
-            ..*self
+    /// The frame in `format`: an area average where it is larger, and without chroma where that does not count. None
+    /// where it is smaller than the format.
+    pub(crate) fn in_format(&self, format: FrameFormat) -> Option<Cow<'_, Self>> {
+        let (width, height) = self.luma.size();
+        if width < format.size.0 || height < format.size.1 {
+            return None;
         }
+        let chroma = self.chroma.as_ref().filter(|_| format.has_color);
+        if self.luma.size() == format.size && chroma.is_some() == self.chroma.is_some() {
+            return Some(Cow::Borrowed(self));
+        }
+        let half = chroma_size(format.size);
+        Some(Cow::Owned(Self {
+            source: self.source,
+            luma: self.luma.reduced(format.size),
+            chroma: chroma.map(|planes| [planes[0].reduced(half), planes[1].reduced(half)]),
+        }))
     }
 
-    /// Working pixels along a side of one of the pixels: 1, 2 or 4.
+    /// Cb and Cr.
+    pub(crate) fn chroma(&self) -> Option<&[Plane; 2]> {
+        self.chroma.as_ref()
+    }
+
+    /// The luma.
+    pub(crate) fn luma(&self) -> &Plane {
+        &self.luma
+    }
+
+    /// Working pixels along a side of one of the luma's pixels: 1, 2 or 4.
     pub(crate) fn downsample(&self) -> f64 {
-        f64::from(self.downsample)
+        f64::from(self.luma.pixel_side)
     }
 
-    /// Width of the working image.
+    /// Width of the luma.
     pub fn width(&self) -> u32 {
-        self.width
+        self.luma.width
     }
 
-    /// Height of the working image.
+    /// Height of the luma.
     pub fn height(&self) -> u32 {
-        self.height
+        self.luma.height
     }
 
     /// The luma values, row by row.
     pub fn pixels(&self) -> &[u8] {
-        &self.pixels
+        &self.luma.pixels
     }
 
-    /// The luma values, moved out, so that their memory can be used again.
-    pub fn into_pixels(self) -> Vec<u8> {
-        self.pixels
+    /// Whether it has chroma.
+    pub fn has_color(&self) -> bool {
+        self.chroma.is_some()
+    }
+
+    /// The memory of its planes, so that it can be used again: luma, Cb, Cr.
+    pub fn into_planes(self) -> [Vec<u8>; 3] {
+        let [cb, cr] = self.chroma.unwrap_or_default();
+        [self.luma.pixels, cb.pixels, cr.pixels]
     }
 
     /// Width and height of the uploaded frame.
     pub fn source_size(&self) -> (u32, u32) {
-        (self.source_width, self.source_height)
+        self.source
     }
-}
-
-/// The working size of a frame of size `source`, checked against a reduced image of `size` with `values` pixels.
-fn checked_working_size(
-    source: (u32, u32),
-    size: (u32, u32),
-    values: usize,
-) -> Result<(u32, u32), FrameError> {
-    let error = FrameError::Size {
-        width: source.0,
-        height: source.1,
-        pixels: values,
-    };
-    let expected = u64::from(size.0) * u64::from(size.1);
-    if source.0 == 0 || source.1 == 0 || values as u64 != expected {
-        return Err(error);
-    }
-    let working = working_size(source.0, source.1);
-    let fits = |working, size, source| working <= size && size <= source;
-    match fits(working.0, size.0, source.0) && fits(working.1, size.1, source.1) {
-        true => Ok(working),
-        false => Err(error),
-    }
-}
-
-/// The size of the working image of an upload of `width` x `height`, both above 0.
-pub fn working_size(width: u32, height: u32) -> (u32, u32) {
-    let longer = width.max(height);
-    if longer <= WORKING_SIDE {
-        return (width, height);
-    }
-    let shrink = |side: u32| {
-        let scaled =
-            (u64::from(side) * u64::from(WORKING_SIDE) + u64::from(longer) / 2) / u64::from(longer);
-        u32::try_from(scaled)
-            .expect("a scaled side is at most the working side")
-            .max(1)
-    };
-    (shrink(width), shrink(height))
 }

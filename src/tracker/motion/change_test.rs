@@ -7,7 +7,9 @@
 //! The test errs on the side of the particle: where light or camera changed the place, and where the last box covered
 //! it, it says nothing.
 
-use crate::tracker::image::frame::GrayFrame;
+use std::ops::Range;
+
+use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::motion::joint_integral::JointIntegral;
 use crate::tracker::motion::last_seen::{CELL, LastSeen, SmallImage, small_box};
@@ -35,12 +37,12 @@ impl ChangeTest {
         &self.image
     }
 
-    /// Makes the small image of `frame`.
-    pub fn load(&mut self, frame: &GrayFrame) {
+    /// Makes the small image of `frame` around the box of `particle`.
+    pub fn load(&mut self, frame: &Frame, particle: &Particle, bounds: &StateBounds) {
         self.last_box = None;
-        self.image.load(frame);
+        self.image.load(frame, particle, bounds);
         self.integral
-            .reserve(self.image.pixels.len() + self.image.width());
+            .reserve(self.image.pixels.capacity() + self.image.width());
     }
 
     /// Compares the small image with the last one, `radius` working pixels around the box of `displaced`, which is
@@ -53,25 +55,24 @@ impl ChangeTest {
         bounds: &StateBounds,
     ) {
         let Some(target) = &last.target else { return };
-        let (width, pixels) = (self.image.width(), &self.image.pixels);
-        if width == 0 || last.image.pixels.len() != pixels.len() {
-            return;
-        }
-        let height = pixels.len() / width;
         let (cell, radius) = (CELL as f64, radius / CELL as f64);
         let [across, down] = [displaced.x - target.x, displaced.y - target.y]
             .map(|shift| (shift / cell).round() as isize);
         // Where a pixel of now has one of then.
-        let span = |from: f64, side: f64, len: usize, shift: isize| {
-            let len = len as isize;
-            let first = ((from - radius).floor() as isize).max(0).max(shift);
-            let end = (from + side + radius).ceil() as isize;
-            let end = end.min(len).min(len + shift);
+        let span = |from: f64, side: f64, now: Range<usize>, then: Range<usize>, shift: isize| {
+            let first = ((from - radius).floor() as isize)
+                .max(now.start as isize)
+                .max(then.start as isize + shift);
+            let end = ((from + side + radius).ceil() as isize)
+                .min(now.end as isize)
+                .min(then.end as isize + shift);
             (first < end).then_some((first as usize, end as usize))
         };
         let now = small_box(displaced, bounds);
-        let columns = span(now.x, now.width, width, across);
-        let rows = span(now.y, now.height, height, down);
+        let ((columns_now, rows_now), (columns_then, rows_then)) =
+            (self.image.part(), last.image.part());
+        let columns = span(now.x, now.width, columns_now, columns_then, across);
+        let rows = span(now.y, now.height, rows_now, rows_then, down);
         let (Some((left, right)), Some((top, bottom))) = (columns, rows) else {
             return;
         };
@@ -83,12 +84,12 @@ impl ChangeTest {
         });
         let columns = right - left;
         let rows = (top..bottom).map(|row| {
-            let now = &pixels[row * width + left..][..columns];
-            let (row, left) = (
+            let then = (
                 row.strict_add_signed(-down),
                 left.strict_add_signed(-across),
             );
-            (now, &last.image.pixels[row * width + left..][..columns])
+            let now = self.image.row(row, left, columns);
+            (now, last.image.row(then.0, then.1, columns))
         });
         self.integral.compute((left, top), columns, rows);
     }
@@ -148,7 +149,7 @@ mod tests {
     }
 
     /// A scene, moved right by `shift`, on which something striped covers the box of `target`.
-    fn frame(shift: usize, target: &Particle) -> GrayFrame {
+    fn frame(shift: usize, target: &Particle) -> Frame {
         let area = BOUNDS.area(target);
         let gray = |x: usize, y: usize| {
             let (across, down) = (x as f64 + 0.5 - area.x, y as f64 + 0.5 - area.y);
@@ -163,15 +164,15 @@ mod tests {
             (40 + (column * column * 7 + row * row * 13 + column * row * 3) % 150) as u8
         };
         let pixels = (0..160 * 120).map(|i| gray(i % 160, i / 160)).collect();
-        GrayFrame::from_luma(160, 120, pixels).expect("a frame of this size")
+        Frame::from_luma(160, 120, pixels).expect("a frame of this size")
     }
 
     /// The test of a frame after one that had the target at `from`, when the image moved by `shift`.
     fn compared(from: Particle, to: Particle, shift: usize) -> ChangeTest {
         let (mut test, mut last) = (ChangeTest::default(), LastSeen::default());
-        test.load(&frame(0, &from));
+        test.load(&frame(0, &from), &from, &BOUNDS);
         last.record(from, test.image());
-        test.load(&frame(shift, &to));
+        test.load(&frame(shift, &to), &from, &BOUNDS);
         let displaced = particle(from.x + shift as f64, from.y);
         test.compare(&last, &displaced, 60.0, &BOUNDS);
         test
@@ -248,7 +249,7 @@ mod tests {
         let (from, to) = (particle(40.0, 50.0), particle(70.0, 60.0));
         let test = compared(from, to, 12);
         let mut last = ChangeTest::default();
-        last.load(&frame(0, &from));
+        last.load(&frame(0, &from), &from, &BOUNDS);
         let particles: Vec<Particle> = (0..203)
             .map(|i| Particle {
                 x: f64::from(i * 37 % 190) - 15.3,
@@ -273,18 +274,18 @@ mod tests {
     fn nothing_is_said_without_a_frame_before_or_of_one_too_small() {
         let mut test = ChangeTest::default();
         let target = particle(50.0, 60.0);
-        test.load(&frame(0, &target));
+        test.load(&frame(0, &target), &target, &BOUNDS);
         test.compare(&LastSeen::default(), &target, 60.0, &BOUNDS);
         assert_eq!(unchanged(&test, particle(90.0, 60.0)), 0.0);
         for (width, height) in [(3, 50), (50, 3), (4, 4)] {
             let pixels = vec![7; width * height];
-            let frame = GrayFrame::from_luma(width as u32, height as u32, pixels);
+            let frame = Frame::from_luma(width as u32, height as u32, pixels);
             let frame = frame.expect("a frame of this size");
             let mut last = LastSeen::default();
-            test.load(&frame);
+            test.load(&frame, &target, &BOUNDS);
             last.record(particle(1.0, 1.0), test.image());
             assert!(last.is_valid_for((width as u32, height as u32), true));
-            test.load(&frame);
+            test.load(&frame, &target, &BOUNDS);
             test.compare(&last, &particle(1.0, 1.0), 60.0, &BOUNDS);
             assert_eq!(unchanged(&test, particle(2.0, 2.0)), 0.0);
         }

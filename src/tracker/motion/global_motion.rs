@@ -7,12 +7,15 @@
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::image::frame::GrayFrame;
+use crate::tracker::image::frame::Frame;
 
 /// The greatest displacement looked for, in working pixels.
 const RADIUS: usize = 48;
 /// A displacement must have less than this share of the misfit of none.
 const MAX_MISFIT: f32 = 0.7;
+/// All pixels count of a frame whose longer side has less than twice as many, every second of one with less than three
+/// times as many, and so on.
+const MAX_ALL: usize = 320;
 /// Parts of a sum, so that the loops vectorise.
 const PARTS: usize = 32;
 
@@ -27,7 +30,7 @@ pub(crate) struct GlobalMotion {
 
 impl GlobalMotion {
     /// The profiles of `frame`.
-    pub fn new(frame: &GrayFrame) -> Self {
+    pub fn new(frame: &Frame) -> Self {
         let mut profiles = Self::default();
         sum_up(frame, &mut profiles.columns, &mut profiles.rows);
         profiles
@@ -35,7 +38,7 @@ impl GlobalMotion {
 
     /// The displacement from the last frame to `frame`, in whole working pixels along x and along y; the profiles of
     /// `frame` are kept. `scratch` is a buffer.
-    pub fn displacement(&mut self, frame: &GrayFrame, scratch: &mut Self) -> (f64, f64) {
+    pub fn displacement(&mut self, frame: &Frame, scratch: &mut Self) -> (f64, f64) {
         sum_up(frame, &mut scratch.columns, &mut scratch.rows);
         std::mem::swap(self, scratch);
         (
@@ -55,20 +58,28 @@ impl GlobalMotion {
 
 #[pulp::with_simd(sum_up = Arch::new())]
 #[inline(always)]
-fn sum_up_simd<S: Simd>(_: S, frame: &GrayFrame, columns: &mut Vec<f32>, rows: &mut Vec<f32>) {
+fn sum_up_simd<S: Simd>(_: S, frame: &Frame, columns: &mut Vec<f32>, rows: &mut Vec<f32>) {
     let (width, height) = (frame.width() as usize, frame.height() as usize);
     columns.clear();
     columns.resize(width, 0.0);
     rows.clear();
-    for row in frame.pixels().chunks_exact(width) {
-        // Sums of gray values of a column are below 2^24, so exact in single precision.
-        for (column, &gray) in columns.iter_mut().zip(row) {
-            *column += f32::from(gray);
+    // Of a large frame some rows, and some parts of each row, are enough.
+    let step = (width.max(height) / MAX_ALL).max(1);
+    for (y, row) in frame.pixels().chunks_exact(width).enumerate() {
+        if y.is_multiple_of(step) {
+            // Sums of gray values of a column are below 2^24, so exact in single precision.
+            for (column, &gray) in columns.iter_mut().zip(row) {
+                *column += f32::from(gray);
+            }
         }
-        let sum: u32 = row.iter().map(|&gray| u32::from(gray)).sum();
-        rows.push(sum as f32 / width as f32);
+        let (mut sum, mut count) = (0, 0);
+        for part in row.chunks(PARTS).step_by(step) {
+            sum += part.iter().map(|&gray| u32::from(gray)).sum::<u32>();
+            count += part.len();
+        }
+        rows.push(sum as f32 / count as f32);
     }
-    let share = height as f32;
+    let share = height.div_ceil(step) as f32;
     columns.iter_mut().for_each(|column| *column /= share);
 }
 
@@ -123,20 +134,20 @@ fn mean_of_differences(after: &[f32], before: &[f32], of: impl Fn(f32) -> f32) -
 mod tests {
     use super::*;
 
-    fn scene(left: usize, top: usize, brighter: u8) -> GrayFrame {
+    fn scene(left: usize, top: usize, brighter: u8) -> Frame {
         let gray = |i: usize| {
             let (x, y) = ((i % 120 + left) as f64, (i / 120 + top) as f64);
             let waves = (x * 0.13).sin() + (x * 0.041).cos() + (y * 0.09).sin() + (y * 0.17).cos();
             (110.0 + 25.0 * waves) as u8 + brighter
         };
-        GrayFrame::from_luma(120, 100, (0..120 * 100).map(gray).collect()).expect("a frame")
+        Frame::from_luma(120, 100, (0..120 * 100).map(gray).collect()).expect("a frame")
     }
 
     #[test]
     fn profiles_are_the_means_of_columns_and_rows() {
         for (width, height) in [(33, 8), (75, 21), (320, 240)] {
             let luma = (0..width * height).map(|i| 255 - (i * 7919 / 31 % 97) as u8);
-            let frame = GrayFrame::from_luma(width, height, luma.collect()).expect("a frame");
+            let frame = Frame::from_luma(width, height, luma.collect()).expect("a frame");
             let global_motion = GlobalMotion::new(&frame);
             let (width, height) = (width as usize, height as usize);
             let gray = |x: usize, y: usize| f64::from(frame.pixels()[y * width + x]);
@@ -155,7 +166,7 @@ mod tests {
     fn a_displacement_of_the_image_is_found_whatever_the_light() {
         let mut global_motion = GlobalMotion::new(&scene(40, 40, 0));
         let mut scratch = GlobalMotion::default();
-        let mut shift = |frame: &GrayFrame| global_motion.displacement(frame, &mut scratch);
+        let mut shift = |frame: &Frame| global_motion.displacement(frame, &mut scratch);
         assert_eq!(shift(&scene(40, 40, 9)), (0.0, 0.0));
         assert_eq!(shift(&scene(33, 40, 0)), (7.0, 0.0));
         assert_eq!(shift(&scene(51, 29, 5)), (-18.0, 11.0));
@@ -165,7 +176,7 @@ mod tests {
     fn flat_and_tiny_frames_have_no_shift() {
         for (width, height) in [(1, 1), (2, 50), (120, 100)] {
             let flat = |gray| {
-                GrayFrame::from_luma(width, height, vec![gray; (width * height) as usize])
+                Frame::from_luma(width, height, vec![gray; (width * height) as usize])
                     .expect("a frame")
             };
             let shift =

@@ -58,6 +58,11 @@ impl StateBounds {
         }
     }
 
+    /// √(width · height) of the box of `particle`, in working pixels.
+    pub fn side(&self, particle: &Particle) -> f64 {
+        (self.box_width * self.box_height).sqrt() * particle.scale
+    }
+
     /// The candidate area of `particle`, in working pixels.
     pub fn area(&self, particle: &Particle) -> Rect {
         Rect::centered(

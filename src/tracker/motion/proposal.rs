@@ -16,6 +16,10 @@ const AROUND_MAXIMUM: usize = 6;
 const MODES: usize = 5;
 /// Standard deviation, in the second round, of the logarithm of the scale.
 const REFINED_STD_SCALE: f64 = 0.01;
+/// To how many working pixels the size of a box is known, before and after the first round. Of a box of ten pixels it is
+/// a larger share than the scale changes by.
+const BLUR: f64 = 0.4;
+const REFINED_BLUR: f64 = 0.3;
 /// An answer is the mean of the particles this near to the most likely one, in working pixels: steadier than one.
 const AVERAGING_RADIUS: f64 = 3.0;
 
@@ -36,7 +40,7 @@ impl SearchContext<'_> {
             out.push(self.bounds.clamp(self.displaced()));
         }
         let count = self.counts().1.max(out.len());
-        let scale_std = self.params.motion_std_scale;
+        let scale_std = self.scale_std(self.params.motion_std_scale, BLUR);
         for maximum in maxima {
             let std = (0.5 * cell.0, 0.5 * cell.1, scale_std);
             for _ in 0..AROUND_MAXIMUM.min((count / 2).saturating_sub(out.len())) {
@@ -75,7 +79,11 @@ impl SearchContext<'_> {
             if particles.len() >= all {
                 break;
             }
-            let std = (REFINED_STD, REFINED_STD, REFINED_STD_SCALE);
+            let std = (
+                REFINED_STD,
+                REFINED_STD,
+                self.scale_std(REFINED_STD_SCALE, REFINED_BLUR),
+            );
             let drawn = self.draw(&particles[mode], std, generator);
             particles.push(drawn);
         }
@@ -104,6 +112,15 @@ impl SearchContext<'_> {
         let scale = (log_scale / total).exp();
         let (x, y) = (x / total, y / total);
         Particle { x, y, scale }
+    }
+
+    /// The standard deviation of the logarithm of the scale: `std`, and more for a box so small that `blur` working pixels
+    /// are a notable share of its sides.
+    fn scale_std(&self, std: f64, blur: f64) -> f64 {
+        match self.params.search {
+            Search::Resampled => std,
+            Search::Answer => std.hypot(blur / self.bounds.side(&self.last)),
+        }
     }
 
     /// A draw around `center`; the standard deviations are of x, of y and of the logarithm of the scale.

@@ -150,9 +150,9 @@ mod tests {
         // Limited by their number, by their values, and by their products with the background; at the limit already.
         for (params, expected) in [
             (large(600, 8, 64), 1000),
-            (large(200, 20, 32), 275),
-            (large(600, 8, 200), 809),
-            (large(47, 48, 0), 47),
+            (large(200, 20, 32), 229),
+            (large(600, 8, 200), 666),
+            (large(45, 45, 0), 45),
         ] {
             let max = max(&params);
             assert_eq!(max, expected);

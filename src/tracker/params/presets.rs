@@ -45,9 +45,12 @@ const PAPER: Params = Params {
     motion_std_x: 5.0,
     motion_std_y: 5.0,
     motion_std_scale: 0.01,
+    target_side: 0.0,
     features: Features::Gray,
     search: Search::Resampled,
     single_vector_candidate: false,
+    chroma_weight: 0.0,
+    histogram_weight: 0.0,
     context: 1.0,
     background_samples: 0,
     displacement_std: 0.0,
@@ -77,9 +80,13 @@ const ROBUST: Params = Params {
     motion_std_x: 8.0,
     motion_std_y: 8.0,
     motion_std_scale: 0.02,
+    // Twice as much tells no more, and half of it less.
+    target_side: 64.0,
     features: Features::Gradients,
     search: Search::Answer,
     single_vector_candidate: true,
+    chroma_weight: 0.8,
+    histogram_weight: 15.0,
     context: 1.2,
     background_samples: 64,
     displacement_std: 12.0,
@@ -97,7 +104,7 @@ const ROBUST: Params = Params {
     update_distance_ratio: 1.5,
     // Right twice as often as wrong.
     update_min_score: 0.65,
-    discriminant_weight: 12.0,
+    discriminant_weight: 20.0,
     // The discriminant says 0.5 to 1 on the target, and about 0.1 beside it.
     lost_threshold: 0.35,
     ..PAPER

@@ -2,8 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Values of a cell with [`Features::Gradients`]: nine directions and the gray value.
-pub(crate) const CELL_VALUES: usize = 10;
+use crate::tracker::image::frame::FrameFormat;
+use crate::tracker::image::rect::Rect;
+use crate::tracker::image::resolution;
+
+/// Values of a cell with [`Features::Gradients`]: nine directions, two of chroma and the gray value.
+pub(crate) const CELL_VALUES: usize = 12;
 
 /// What a candidate area is turned into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -11,7 +15,7 @@ pub(crate) const CELL_VALUES: usize = 10;
 pub enum Features {
     /// H₁ x H₂ gray values in \[0, 1\], as in the paper.
     Gray,
-    /// For each of H₁ x H₂ cells a histogram of gradients in nine directions, and the cell's gray value.
+    /// For each of H₁ x H₂ cells a histogram of gradients in nine directions, the cell's chroma and its gray value.
     Gradients,
 }
 
@@ -60,7 +64,7 @@ macro_rules! parameters {
     (@range $min:literal $max:literal) => { Some(($min as f64, $max as f64)) };
     ($($(#[doc = $doc:literal])* $name:ident: $kind:ident $([$min:literal to $max:literal])? $({$($choice:literal)*})?;)*) => {
         /// Every parameter of the tracker. Lengths are in pixels of the working image
-        /// ([`WORKING_SIDE`](crate::tracker::WORKING_SIDE)).
+        /// ([`frame_format`](Self::frame_format)).
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct Params {
@@ -126,6 +130,9 @@ parameters! {
     /// is 1. Searching from the answer it is that of the scale's logarithm.
     motion_std_scale: f64 [0 to 1];
 
+    /// The first box's √(width · height) in working pixels: the resolution follows the target. Off: 0, a working image
+    /// of 320 pixels on its longer side.
+    target_side: f64 [0 to 256];
     /// What a candidate area is turned into. Gradients hardly change with the light.
     features: Features {"gray" "gradients"};
     /// Where particles are drawn from. The paper: `resampled`.
@@ -134,6 +141,12 @@ parameters! {
     /// candidate hardly counts beside the history that it shares with all others. Then n = 1 for the candidate, and
     /// its one principal angle is that between its vector and the entry's subspace. Off: false.
     single_vector_candidate: bool;
+    /// Weight of the mean chroma of a cell beside its gradients. With gradients, in colour. Off: 0.
+    chroma_weight: f64 [0 to 10];
+    /// Weight of the colour histogram (of luma, without colour): the likelihood is multiplied by exp(weight · m), where
+    /// m is the mean over the box of the probability that a pixel's colour is the target's, minus a half. Searching from
+    /// the answer. Off: 0.
+    histogram_weight: f64 [0 to 100];
     /// The area that is described, as a multiple of the box on each side. The rim of a target tells where it ends.
     /// Off: 1.
     context: f64 [0.5 to 3];
@@ -176,6 +189,15 @@ parameters! {
 }
 
 impl Params {
+    /// How a session sees frames of the size `source` (width and height, above 0) that starts with `target`, a box in
+    /// their pixels.
+    pub fn frame_format(&self, source: (u32, u32), target: &Rect) -> FrameFormat {
+        FrameFormat {
+            size: resolution::working_size(source, target, self.target_side),
+            has_color: self.features == Features::Gradients,
+        }
+    }
+
     /// D, the length of a feature vector.
     pub fn feature_len(&self) -> usize {
         let cells = self.patch_width as usize * self.patch_height as usize;

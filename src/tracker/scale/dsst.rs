@@ -26,6 +26,8 @@ const LAMBDA: f32 = 0.01;
 const MAX_CHANGE: f64 = 0.06;
 /// The share of a change that is applied, so that noise averages out.
 const GAIN: f64 = 0.75;
+/// √(width · height) in working pixels of a target whose measured scale counts as much as that of the particles.
+const HALF_RELIANCE: f64 = 16.0;
 /// Maxima of the response of which none of the change is applied, and from which on all of it.
 const MIN_RESPONSE: f64 = 0.3;
 const FULL_RESPONSE: f64 = 0.6;
@@ -83,10 +85,9 @@ impl ScaleFilter {
                 at += (0.5 * (left - right) / curvature).clamp(-0.5, 0.5);
             }
         }
-        Maximum {
-            change: STEP * at,
-            response: response[best],
-        }
+        let change = STEP * at;
+        let response = response[best];
+        Maximum { change, response }
     }
 
     /// Whether this may be the filter of a tracker with `params`, all numbers at most `max` in size.
@@ -102,6 +103,12 @@ impl ScaleFilter {
             && self.numerators.iter().all(|value| value.abs() <= max)
             && self.energies.iter().all(|b| (0.0..=max).contains(b))
     }
+}
+
+/// How much a measurement counts against the scale of the particles, 0 to 1, of a target with `side` = √(width · height)
+/// working pixels: a pyramid of few pixels tells little.
+pub(crate) fn reliance(side: f64) -> f64 {
+    1.0 / (1.0 + (HALF_RELIANCE / side).powi(4))
 }
 
 impl Maximum {

@@ -43,6 +43,8 @@ pub(crate) fn params(params: &Params) -> Params {
         patch_width: CELLS,
         patch_height: CELLS,
         context: 1.0,
+        // Colour tells little of the scale, and outweighs what does.
+        chroma_weight: 0.0,
         ..params.clone()
     }
 }
