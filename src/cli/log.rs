@@ -61,7 +61,8 @@ impl Log {
             .with_writer(lines);
         match format {
             LogFormat::Text => log.init(),
-            LogFormat::Json => log.json().init(),
+            // The span of the request is there once, not again in a list of all spans.
+            LogFormat::Json => log.json().with_span_list(false).init(),
         }
         // The default hook writes to standard error itself, and would wait for its reader.
         std::panic::set_hook(Box::new(log_panic));

@@ -1,10 +1,12 @@
 //! A session's next frames: decode them, then track through them or take the box that the user gives.
 
+use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
 use crate::sessions::{Fingerprint, LockedSession, ReplayDecision};
 use crate::tracker::{Estimate, GrayFrame, Rect, TrackerError};
 use axum::body::Bytes;
+use std::time::Instant;
 
 /// The next frames of a session, as they were received.
 #[derive(Debug)]
@@ -36,6 +38,7 @@ impl NextFrames {
         &self,
         locked: &mut LockedSession,
         limits: &Limits,
+        metrics: &TrackingMetrics,
     ) -> Result<Answered, Problem> {
         let fingerprints: Vec<Fingerprint> = self
             .files
@@ -52,9 +55,10 @@ impl NextFrames {
                 replayed: true,
             });
         }
-        let decoded = decode(&self.files, limits)?;
+        let decoded = decode(&self.files, limits, metrics)?;
         self.check_sizes(&decoded, locked.session().source_size())?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
+        let (before, started) = (locked.session().latest(), Instant::now());
         let state = locked.state();
         let estimates = match self.correction {
             Some(target) => {
@@ -66,12 +70,15 @@ impl NextFrames {
             }
             None => state.step(&frames),
         };
+        let took = started.elapsed();
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
         let refused = |(index, error)| Problem::from(error).of_frame(index, self.files.len());
+        let estimates = estimates.map_err(refused)?;
+        metrics.tracked(before, &estimates, took);
         Ok(Answered {
-            estimates: estimates.map_err(refused)?,
+            estimates,
             replayed: false,
         })
     }
@@ -101,9 +108,14 @@ impl NextFrames {
 ///
 /// # Errors
 /// The problem of the first bad file.
-pub fn decode(files: &[Bytes], limits: &Limits) -> Result<Vec<GrayFrame>, Problem> {
+pub fn decode(
+    files: &[Bytes],
+    limits: &Limits,
+    metrics: &TrackingMetrics,
+) -> Result<Vec<GrayFrame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {
-        ingest::decode(file, limits)
+        metrics
+            .decoding(|| ingest::decode(file, limits))
             .map_err(|error| Problem::from(error).of_frame(index, files.len()))
     };
     files.iter().enumerate().map(decode_one).collect()

@@ -1,6 +1,7 @@
 //! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
 //! environment variable, which only the program reads.
 
+use super::auth::config::AccessConfig;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -31,13 +32,20 @@ pub struct Config {
         default_value_t = Config::default().session_queue
     ))]
     pub session_queue: usize,
-    /// A session that is not used for this long expires.
+    /// A session expires when no frame comes for this long.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SESSION_IDLE",
         default_value = shown(Config::default().session_idle),
         value_parser = humantime::parse_duration
     ))]
     pub session_idle: Duration,
+    /// A new session expires when its first frame does not come for this long.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SESSION_FIRST",
+        default_value = shown(Config::default().session_first),
+        value_parser = humantime::parse_duration
+    ))]
+    pub session_first: Duration,
     /// Most bytes of a request body.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_MAX_BODY_BYTES",
@@ -114,8 +122,8 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub work_timeout: Duration,
-    /// On SIGTERM, /readyz answers 503 for this long before connections are refused, so that a load
-    /// balancer notices.
+    /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
+    /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SHUTDOWN_DELAY",
         default_value = shown(Config::default().shutdown_delay),
@@ -129,6 +137,9 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub shutdown_timeout: Duration,
+    /// Who may use the service.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub access: AccessConfig,
 }
 
 /// A duration as flags have it.
@@ -148,6 +159,7 @@ impl Default for Config {
             max_sessions: 1024,
             session_queue: 8,
             session_idle: Duration::from_secs(600),
+            session_first: Duration::from_secs(60),
             max_body_bytes: 32 << 20,
             max_upload_bytes: 512 << 20,
             max_frames: 64,
@@ -160,8 +172,9 @@ impl Default for Config {
             header_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             work_timeout: Duration::from_secs(30),
-            shutdown_delay: Duration::ZERO,
+            shutdown_delay: Duration::from_secs(5),
             shutdown_timeout: Duration::from_secs(20),
+            access: AccessConfig::default(),
         }
     }
 }

@@ -49,6 +49,11 @@ impl Config {
                 moment.contains(&self.session_idle),
                 duration,
             ),
+            (
+                "session-first",
+                moment.contains(&self.session_first),
+                duration,
+            ),
             ("max-body-bytes", self.max_body_bytes >= 1, positive),
             (
                 "max-upload-bytes",

@@ -2,10 +2,11 @@
 
 use super::api;
 use super::problems::problem::Problem;
+use super::security_headers::DOCS_POLICY;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::http::header::{CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE};
 use axum::response::{IntoResponse, Redirect, Response};
 use std::sync::{Arc, LazyLock};
 use utoipa_swagger_ui::Config;
@@ -46,6 +47,7 @@ fn file(path: &str) -> Result<Response, Problem> {
             let headers = [
                 (CONTENT_TYPE, file.content_type),
                 (CACHE_CONTROL, "max-age=3600".to_owned()),
+                (CONTENT_SECURITY_POLICY, DOCS_POLICY.to_owned()),
             ];
             Ok((headers, Bytes::from(file.bytes.into_owned())).into_response())
         }

@@ -40,13 +40,12 @@ impl utoipa::IntoResponses for Problems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
-            Kind::SessionNotFound,
             Kind::FrameOutOfOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
         ];
-        problem_responses(&[problem_responses::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
     }
 }
 
@@ -92,7 +91,8 @@ pub async fn post(
         correction: None,
     };
     let limits = state.config.frame_limits();
-    let advance = move |locked: &mut _| next.advance(locked, &limits);
+    let metrics = state.metrics.tracking.clone();
+    let advance = move |locked: &mut _| next.advance(locked, &limits, &metrics);
     let Answered {
         estimates,
         replayed,

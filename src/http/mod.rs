@@ -5,8 +5,9 @@
 //! and back.
 //!
 //! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
-//! work than there are cores; a connection breaks after a frame was taken. [`Application`] bounds the first, [`Config`]
-//! names every bound, numbered frames can be sent again, and the cause of an error is in the log only.
+//! work than there are cores; a connection breaks after a frame was taken; a client has no key. [`Application`] bounds
+//! the first, [`Config`] names every bound, numbered frames can be sent again, the room `auth` says who may call, and the
+//! cause of an error is in the log only.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,7 +15,7 @@
 //!
 //! let application = Application::bind(Config::default()).await?;
 //! println!("listening on http://{}", application.local_addr()?);
-//! application.serve(std::future::pending()).await;
+//! application.serve(std::future::pending::<()>()).await;
 //! # Ok(())
 //! # }
 //! ```
@@ -23,18 +24,28 @@ mod advance;
 mod answer;
 mod answer_problems;
 mod api;
+mod auth;
 mod config;
 mod config_validation;
+mod cors;
 mod create;
+mod create_request;
 mod docs;
 mod drain;
+mod draining;
 mod frames;
 mod health;
+mod idempotency;
+mod metrics;
 mod openapi;
+mod opening;
 mod page;
 mod problems;
 mod request_id;
+mod request_log;
 mod router;
+mod saturation;
+mod security_headers;
 mod server;
 mod session;
 mod session_path;
@@ -42,12 +53,17 @@ mod snapshot;
 mod state;
 mod target;
 mod target_box;
+mod token;
+mod trace_context;
 mod upload;
 mod work;
 
 pub use api::document as openapi_document;
+pub use auth::access::AccessError;
+pub use auth::config::{AccessConfig, Secret};
+pub use auth::keys::{ApiKeys, KeysError};
 pub use config::Config;
 pub use config_validation::ConfigError;
 pub use problems::kind::Kind as ProblemKind;
-pub use server::{Application, BindError};
+pub use server::{Application, BindError, Shutdown};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

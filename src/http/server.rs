@@ -3,6 +3,8 @@
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
 //! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
 
+use super::auth::access::{Access, AccessError};
+use super::auth::keys::ApiKeys;
 use super::config::Config;
 use super::config_validation::ConfigError;
 use super::router::router;
@@ -28,6 +30,9 @@ pub enum BindError {
     /// A setting is out of its range.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The keys cannot be used, or the service would be open to a network.
+    #[error(transparent)]
+    Access(#[from] AccessError),
     /// The address cannot be listened on.
     #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
     Listen {
@@ -36,6 +41,21 @@ pub enum BindError {
         /// What the system says.
         source: io::Error,
     },
+}
+
+/// How a service ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shutdown {
+    /// After the configured delay, in which sessions are still served.
+    Gradual,
+    /// Without the delay.
+    Prompt,
+}
+
+impl From<()> for Shutdown {
+    fn from((): ()) -> Self {
+        Self::Gradual
+    }
 }
 
 /// The service, bound to its address.
@@ -62,10 +82,11 @@ impl Application {
     pub async fn bind_with_clock(config: Config, clock: Clock) -> Result<Self, BindError> {
         config.validate()?;
         let address = config.listen;
+        let access = Access::load(&config.access, address)?;
         let listener = TcpListener::bind(address).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
-            state: AppState::new(config, clock),
+            state: AppState::new(config, access, clock),
             extra: Router::new(),
         })
     }
@@ -78,16 +99,21 @@ impl Application {
         self.listener.local_addr()
     }
 
+    /// The API keys, to read them again.
+    pub fn api_keys(&self) -> ApiKeys {
+        self.state.access.keys.clone()
+    }
+
     /// Serves these routes too, behind the same layers.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
     }
 
-    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once. After the configured delay no connection
-    /// is accepted any more, and open requests get the configured time to end; then they are cut off. Returns whether
-    /// all of them ended in time.
-    pub async fn serve(self, shutdown: impl Future<Output = ()>) -> bool {
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
+    /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests get
+    /// the configured time to end; then they are cut off. Returns whether all of them ended in time.
+    pub async fn serve<S: Into<Shutdown>>(self, shutdown: impl Future<Output = S>) -> bool {
         let Self {
             listener,
             state,
@@ -103,11 +129,13 @@ impl Application {
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
-                () = shutdown => {
+                how = shutdown => {
                     tracing::info!("shutting down");
                     state.drain();
                     // New connections are still served: a load balancer asks for /readyz on them.
-                    let _ = timeout(config.shutdown_delay, accepting).await;
+                    if how.into() == Shutdown::Gradual {
+                        let _ = timeout(config.shutdown_delay, accepting).await;
+                    }
                 }
             }
         }
@@ -169,6 +197,8 @@ async fn sweep(state: AppState) {
     loop {
         ticks.tick().await;
         let expired = state.registry.sweep();
+        state.prune();
+        state.metrics.upkeep();
         if expired > 0 {
             tracing::info!(expired, live = state.registry.len(), "sessions expired");
         }

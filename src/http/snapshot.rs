@@ -23,19 +23,19 @@ impl utoipa::IntoResponses for Problems {
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
             Kind::MalformedRequest,
-            Kind::SessionNotFound,
             Kind::SessionBusy,
             Kind::QueueFull,
             Kind::WorkTimeout,
         ];
-        problem_responses(&[problem_responses::ALWAYS, own])
+        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
     }
 }
 
 /// Take a snapshot
 ///
-/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version, to
-/// go on from there under a new id; this session lives on.
+/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version that has
+/// the same secret (`BAGTRACK_SNAPSHOT_KEYS`), to go on from there under a new id; this session lives on as long as it
+/// would have done.
 ///
 /// `curl -o s.snapshot http://localhost:8080/sessions/$ID/snapshot &&
 /// curl --data-binary @s.snapshot http://other:8080/sessions`
@@ -58,8 +58,9 @@ pub async fn get(
     refuse_query(&uri)?;
     let session = path.find(&state)?;
     let queue = state.admission.enter(0)?;
-    let permit = session.enter()?;
-    let take = |locked: &mut LockedSession| Ok(locked.state().snapshot());
+    let permit = session.visit()?;
+    let keys = state.access.snapshots.clone();
+    let take = move |locked: &mut LockedSession| Ok(locked.state().snapshot(&keys));
     let bytes = work::on_session(&state, permit, queue, take).await?;
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], bytes).into_response())
 }

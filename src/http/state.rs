@@ -1,12 +1,17 @@
 //! What all handlers share.
 
+use super::auth::access::Access;
 use super::config::Config;
+use super::idempotency::IdempotencyStore;
+use super::metrics::registry::Metrics;
 use super::problems::problem::Problem;
-use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
+use super::saturation::Saturation;
+use crate::sessions::{Admission, Clock, Lease, QueuePermit, Registry, Session};
 use axum::http::HeaderMap;
 use axum::http::header::CONTENT_LENGTH;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
 
 /// What all handlers share; clones are the same state.
 #[derive(Debug, Clone)]
@@ -21,6 +26,15 @@ pub struct Shared {
     pub registry: Registry,
     /// Which requests may work.
     pub admission: Admission,
+    /// Keys and secrets.
+    pub access: Access,
+    /// What is counted and measured.
+    pub metrics: Metrics,
+    /// The answers to requests with an idempotency key.
+    pub opened: IdempotencyStore,
+    /// Whether `/readyz` has found the queue full.
+    pub saturation: Saturation,
+    clock: Clock,
     /// Set from the moment that the service was asked to end.
     draining: AtomicBool,
 }
@@ -33,15 +47,24 @@ impl std::ops::Deref for AppState {
 }
 
 impl AppState {
-    /// The state of a service with these settings and this clock.
-    pub fn new(config: Config, clock: Clock) -> Self {
+    /// The state of a service with these settings, keys and this clock.
+    pub fn new(config: Config, access: Access, clock: Clock) -> Self {
+        let lease = Lease {
+            first: config.session_first,
+            idle: config.session_idle,
+        };
         Self(Arc::new(Shared {
             registry: Registry::new(
                 config.max_sessions,
                 config.session_queue,
-                config.session_idle,
-                clock,
+                lease,
+                clock.clone(),
             ),
+            access,
+            metrics: Metrics::new(),
+            opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
+            saturation: Saturation::default(),
+            clock,
             admission: Admission::new(config.queue, config.max_upload_bytes, config.worker_count()),
             draining: AtomicBool::new(false),
             config,
@@ -70,6 +93,16 @@ impl AppState {
         let length = length.and_then(|length| length.parse::<usize>().ok());
         let bytes = length.map_or(max, |length| length.min(max));
         Ok(self.admission.enter(bytes)?)
+    }
+
+    /// The time.
+    pub fn now(&self) -> SystemTime {
+        self.clock.wall(self.clock.now())
+    }
+
+    /// Drops what is kept on behalf of sessions that have ended.
+    pub fn prune(&self) {
+        self.opened.prune(|id| self.registry.is_live(id));
     }
 
     /// When the session expires, in RFC 3339.

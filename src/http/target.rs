@@ -46,14 +46,13 @@ impl utoipa::IntoResponses for Problems {
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
             Kind::MissingBox,
-            Kind::SessionNotFound,
             Kind::FrameOutOfOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::InvalidBox,
             Kind::SessionBusy,
         ];
-        problem_responses(&[problem_responses::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
     }
 }
 
@@ -104,7 +103,8 @@ pub async fn put(
         correction: Some(target.into()),
     };
     let limits = state.config.frame_limits();
-    let correct = move |locked: &mut _| next.advance(locked, &limits);
+    let metrics = state.metrics.tracking.clone();
+    let correct = move |locked: &mut _| next.advance(locked, &limits, &metrics);
     let Answered {
         estimates,
         replayed,

@@ -6,6 +6,7 @@
 use super::problems::problem::Problem;
 use super::state::AppState;
 use crate::sessions::{LockedSession, QueuePermit, SessionPermit};
+use std::time::Instant;
 use tokio::time::timeout;
 
 /// Runs `work` on a worker.
@@ -14,6 +15,11 @@ where
     T: Send + 'static,
     F: FnOnce() -> Result<T, Problem> + Send + 'static,
 {
+    let (asked, waited) = (Instant::now(), state.metrics.queue_wait.clone());
+    let work = move || {
+        waited.record(asked.elapsed().as_secs_f64());
+        work()
+    };
     match timeout(state.config.work_timeout, state.admission.run(queue, work)).await {
         Ok(outcome) => outcome?,
         Err(_) => Err(Problem::work_timeout()),
@@ -31,11 +37,15 @@ where
     T: Send + 'static,
     F: FnOnce(&mut LockedSession) -> Result<T, Problem> + Send + 'static,
 {
+    let (asked, waited) = (Instant::now(), state.metrics.queue_wait.clone());
     let waiting = async {
         let mut locked = permit.lock().await?;
         state
             .admission
-            .run(queue, move || work(&mut locked))
+            .run(queue, move || {
+                waited.record(asked.elapsed().as_secs_f64());
+                work(&mut locked)
+            })
             .await?
     };
     timeout(state.config.work_timeout, waiting)

@@ -1,5 +1,6 @@
 //! What work on a session changes: the tracker, and the answers that a repeated request gets again.
 
+use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use crate::tracker::{Estimate, GrayFrame, Rect, Tracker, TrackerError};
@@ -26,18 +27,23 @@ impl SessionState {
         }
     }
 
-    /// The session that a snapshot holds.
+    /// The session that a snapshot holds, with at most `max_recent` stored answers.
     ///
     /// # Errors
     /// See [`SnapshotError`].
-    pub fn restore(snapshot: &[u8]) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { tracker, recent } = SessionSnapshot::decode(snapshot)?;
+    pub fn restore(
+        snapshot: &[u8],
+        keys: &MacKeys,
+        max_recent: usize,
+    ) -> Result<Self, SnapshotError> {
+        let SessionSnapshot { tracker, recent } =
+            SessionSnapshot::decode(snapshot, keys, max_recent)?;
         Ok(Self { tracker, recent })
     }
 
-    /// The session as bytes.
-    pub fn snapshot(&self) -> Vec<u8> {
-        SessionSnapshot::encode(&self.tracker, &self.recent)
+    /// The session as bytes, signed.
+    pub fn snapshot(&self, keys: &MacKeys) -> Vec<u8> {
+        SessionSnapshot::encode(&self.tracker, &self.recent, keys)
     }
 
     /// The tracker.

@@ -62,7 +62,9 @@ fn serves_answers_health_and_ends_on_sigterm() {
 #[test]
 fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
     let mut command = bagtrack();
-    command.args(["serve", "--log-format", "json"]);
+    // Probes are logged at this level.
+    let debug = ["serve", "--log-format", "json", "--log", "bagtrack=debug"];
+    command.args(debug);
     command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
     let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
     let log = BufReader::new(child.stderr.take().unwrap()).lines();

@@ -1,5 +1,6 @@
 //! The service over a real socket, with a real client.
 
+mod access;
 mod application;
 mod binary;
 mod capacity;
@@ -8,9 +9,14 @@ mod expiry;
 mod flow;
 mod footage;
 mod forms;
+mod idempotency;
+mod log;
+mod metrics;
 mod openapi;
+mod origins;
 mod pictures;
 mod problems;
+mod process;
 mod provoke;
 mod raw;
 mod replay;

@@ -1,9 +1,9 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
-use crate::application::{BOX, TestApplication};
+use crate::application::{BOX, TestApplication, expect};
 use crate::pictures;
 use crate::raw::RawConnection;
-use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE};
+use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use std::time::Duration;
@@ -24,7 +24,7 @@ impl Operation {
     }
 
     fn takes_frames(&self) -> bool {
-        matches!(self.method, Method::POST | Method::PUT)
+        matches!(self.method, Method::POST | Method::PUT) && !self.path.ends_with("/token")
     }
 }
 
@@ -41,6 +41,7 @@ pub struct Attempt {
     body: Vec<u8>,
     frames: usize,
     media_type: Option<&'static str>,
+    idempotency_key: Option<&'static str>,
     /// Sends the head alone.
     without_body: bool,
 }
@@ -54,6 +55,7 @@ fn settings(slug: &str, config: &mut Config) {
         "too-many-sessions" => config.max_sessions = 1,
         "session-busy" => config.session_queue = 1,
         "queue-full" => config.queue = 1,
+        "unauthorized" => config.access.api_keys = vec![Secret::from("me:0123456789abcdef")],
         "not-ready" => config.shutdown_delay = Duration::from_secs(600),
         _ => {}
     }
@@ -74,6 +76,7 @@ impl Attempt {
             body: Vec::new(),
             frames: 1,
             media_type: None,
+            idempotency_key: None,
             without_body: false,
         };
         if operation.takes_frames() {
@@ -91,6 +94,32 @@ impl Attempt {
             "malformed-request" => self.query.push(("colour", "red")),
             "missing-frame" => self.body.clear(),
             "missing-box" => self.query.clear(),
+            "unauthorized" => {
+                self.app.key = Some("fedcba9876543210".to_owned());
+                self.id = None;
+            }
+            "forbidden" => {
+                let path = format!("/sessions/{}/token", self.id.as_ref().unwrap());
+                let request = self.app.request(Method::POST, &path, &[]);
+                let token = expect(request.send().await.unwrap(), StatusCode::OK).await;
+                self.app.key = Some(token["token"].as_str().unwrap().to_owned());
+            }
+            "session-expired" => {
+                self.app.clock.advance(Duration::from_secs(600));
+                self.id = None;
+            }
+            "idempotency-key-reused" => {
+                self.idempotency_key = Some("a key");
+                let response = self.send().await;
+                assert_eq!(
+                    response.status(),
+                    StatusCode::BAD_REQUEST,
+                    "no space is allowed"
+                );
+                self.idempotency_key = Some("a-key");
+                assert_eq!(self.send().await.status(), StatusCode::CREATED);
+                self.query = vec![("box", "21,15,16,12")];
+            }
             "session-not-found" => {
                 self.path = template.replace("{id}", "67e55044-10b1-426f-9247-bb680e5fe0c8");
             }
@@ -143,6 +172,9 @@ impl Attempt {
         }
         if let Some(media_type) = self.media_type {
             request = request.header("content-type", media_type);
+        }
+        if let Some(key) = self.idempotency_key {
+            request = request.header("idempotency-key", key);
         }
         let request = if self.frames > 1 {
             let part = || Part::bytes(self.body.clone()).file_name("frame.png");

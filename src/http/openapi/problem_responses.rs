@@ -15,6 +15,13 @@ use utoipa::openapi::{
 /// The problem that every operation may answer.
 pub const ALWAYS: &[Kind] = &[Kind::Internal];
 
+/// The problems that every operation on a session may answer.
+pub const SESSION: &[Kind] = &[
+    Kind::Unauthorized,
+    Kind::SessionNotFound,
+    Kind::SessionExpired,
+];
+
 /// The problems that every operation with frames may answer.
 pub const UPLOAD: &[Kind] = &[
     Kind::MalformedRequest,
@@ -80,6 +87,12 @@ fn example(kind: Kind) -> Problem {
         Kind::MalformedRequest => Problem::malformed("`box` is given twice; give it once."),
         Kind::MissingFrame => Problem::missing_frame(),
         Kind::MissingBox => Problem::missing_box(),
+        Kind::Unauthorized => Problem::unauthorized(),
+        Kind::Forbidden => Problem::forbidden(),
+        Kind::OriginNotAllowed => Problem::origin_not_allowed(),
+        Kind::HostNotAllowed => Problem::host_not_allowed(),
+        Kind::SessionExpired => Problem::session_expired(),
+        Kind::IdempotencyKeyReused => Problem::idempotency_key_reused(),
         Kind::RouteNotFound => Problem::route_not_found(),
         Kind::SessionNotFound => Problem::session_not_found(),
         Kind::MethodNotAllowed => Problem::method_not_allowed(),

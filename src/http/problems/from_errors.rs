@@ -4,7 +4,8 @@ use super::kind::Kind;
 use super::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
-    QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions, WorkLost,
+    NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions,
+    WorkLost,
 };
 use crate::tracker::TrackerError;
 use std::sync::Arc;
@@ -62,7 +63,8 @@ impl From<TrackerError> for Problem {
 
 impl From<SnapshotError> for Problem {
     fn from(error: SnapshotError) -> Self {
-        let detail = format!("{error}. Send the bytes of GET /sessions/{{id}}/snapshot unchanged.");
+        let advice = "Send the bytes of GET /sessions/{id}/snapshot unchanged, to a service with the same keys.";
+        let detail = format!("{error}. {advice}");
         Self::new(Kind::InvalidSnapshot, detail).caused_by(Arc::new(error))
     }
 }
@@ -86,6 +88,15 @@ impl From<SessionBusy> for Problem {
     fn from(_: SessionBusy) -> Self {
         let detail = "Wait for the answers to the frames already sent. The session is unchanged.";
         Self::new(Kind::SessionBusy, detail)
+    }
+}
+
+impl From<NoSession> for Problem {
+    fn from(error: NoSession) -> Self {
+        match error {
+            NoSession::Unknown => Self::session_not_found(),
+            NoSession::Expired => Self::session_expired(),
+        }
     }
 }
 

@@ -53,11 +53,52 @@ impl Problem {
         Self::new(Kind::RouteNotFound, "See /docs for the paths there are.")
     }
 
-    /// No live session has this id.
+    /// The request has no key, or none that is valid.
+    pub fn unauthorized() -> Self {
+        let detail =
+            "Send an API key, or a session token that has not ended: `Authorization: Bearer …`.";
+        Self::new(Kind::Unauthorized, detail)
+    }
+
+    /// The request needs an API key, and came with a session token.
+    pub fn forbidden() -> Self {
+        let detail =
+            "Use an API key: a session token is good for what is below its own session only.";
+        Self::new(Kind::Forbidden, detail)
+    }
+
+    /// A browser sent the request for a page of another origin.
+    pub fn origin_not_allowed() -> Self {
+        let detail = "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
+        Self::new(Kind::OriginNotAllowed, detail)
+    }
+
+    /// The request names another host.
+    pub fn host_not_allowed() -> Self {
+        let detail =
+            "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
+        Self::new(Kind::HostNotAllowed, detail)
+    }
+
+    /// No live session of the client has this id.
     pub fn session_not_found() -> Self {
-        let detail = "The session was never opened here, was deleted or has expired; open a new one with POST \
+        let detail = "The session was never opened here with this key, or was deleted; open a new one with POST \
             /sessions.";
         Self::new(Kind::SessionNotFound, detail)
+    }
+
+    /// The session was not used for too long.
+    pub fn session_expired() -> Self {
+        let detail = "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST \
+            /sessions.";
+        Self::new(Kind::SessionExpired, detail)
+    }
+
+    /// The idempotency key came with another request before.
+    pub fn idempotency_key_reused() -> Self {
+        let detail =
+            "Send the same frame and settings as the first time, or a new `Idempotency-Key`.";
+        Self::new(Kind::IdempotencyKeyReused, detail)
     }
 
     /// The route has other methods.
@@ -103,7 +144,16 @@ impl Problem {
 
     /// The service is about to end.
     pub fn not_ready() -> Self {
-        Self::new(Kind::NotReady, "Send requests to another instance.")
+        let detail = "The service is about to end. Open sessions at another instance.";
+        Self::new(Kind::NotReady, detail)
+    }
+
+    /// The queue is full.
+    pub fn saturated() -> Self {
+        Self::new(
+            Kind::NotReady,
+            "The queue is full. Send requests to another instance.",
+        )
     }
 
     /// The service failed.
