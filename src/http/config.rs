@@ -95,7 +95,7 @@ pub struct Config {
     ))]
     pub max_connections: usize,
     /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
-    /// commas; `*` for all.
+    /// commas; `*` for all. Requests of other pages are refused.
     #[cfg_attr(
         feature = "cli",
         arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')

@@ -76,7 +76,10 @@ impl utoipa::IntoResponses for Problems {
     responses(
         (
             status = 200, description = "Where the target is", body = FrameAnswers,
-            headers(("Replayed" = bool, description = "`true` where these answers were given before"))
+            headers(
+                ("Replayed" = bool, description = "`true` where these answers were given before"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
         ),
         Problems
     )

@@ -86,7 +86,10 @@ impl utoipa::IntoResponses for Problems {
     responses(
         (
             status = 200, description = "The correction is taken", body = Answer,
-            headers(("Replayed" = bool, description = "`true` where this answer was given before"))
+            headers(
+                ("Replayed" = bool, description = "`true` where this answer was given before"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
         ),
         Problems
     )

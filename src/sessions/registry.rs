@@ -229,10 +229,12 @@ mod tests {
         assert!(registry.remove(id));
         assert_eq!(was_free.try_recv(), Ok(true), "when it is removed");
 
-        let (registry, clock, _, was_free) = watched();
+        let (registry, clock, id, was_free) = watched();
         clock.advance(IDLE);
         assert_eq!(registry.sweep(), 1);
         assert_eq!(was_free.try_recv(), Ok(true), "when it is swept");
+        let swept = registry.find(id, &Owner::default());
+        assert_eq!(swept.unwrap_err(), NoSession::Expired);
     }
 
     #[tokio::test]
