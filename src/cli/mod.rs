@@ -5,6 +5,8 @@
 
 mod draw;
 mod eval;
+#[cfg(feature = "otel")]
+mod export;
 mod health;
 mod log;
 mod output;

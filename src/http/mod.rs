@@ -33,6 +33,8 @@ mod create_request;
 mod docs;
 mod drain;
 mod draining;
+#[cfg(feature = "otel")]
+mod exported_span;
 mod frames;
 mod health;
 mod idempotency;

@@ -1,16 +1,17 @@
-//! One line in the log for each request, and a span around what is logged on its behalf.
+//! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the method, and the path: never bytes or boxes, no more of the
 //! path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
 //! only where `debug` is asked for.
 
 use super::request_id;
-use super::trace_context::TraceContext;
+use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::sessions::short_id;
 use axum::extract::Request;
 use axum::middleware::Next;
 use axum::response::Response;
 use std::time::Instant;
+use tracing::field::Empty;
 use tracing::{Instrument, Level, Span};
 use uuid::Uuid;
 
@@ -22,12 +23,21 @@ const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 pub async fn log_request(request: Request, next: Next) -> Response {
     let started = Instant::now();
     let is_probe = PROBES.contains(&request.uri().path());
-    let span = span(&request, is_probe);
-    let response = next.run(request).instrument(span.clone()).await;
+    let (span, context) = (
+        span(&request, is_probe),
+        TraceContext::of(request.headers()),
+    );
+    #[cfg(feature = "otel")]
+    let context = super::exported_span::join(&span, &request, context);
+    span.record("trace", context.trace_id());
+    let mut response = next.run(request).instrument(span.clone()).await;
+    response.headers_mut().insert(TRACEPARENT, context.header());
     let (status, ms) = (
         response.status().as_u16(),
         started.elapsed().as_secs_f64() * 1e3,
     );
+    #[cfg(feature = "otel")]
+    super::exported_span::answered(&span, status);
     span.in_scope(|| match is_probe {
         true => tracing::debug!(status, ms, "answered"),
         false => tracing::info!(status, ms, "answered"),
@@ -37,12 +47,10 @@ pub async fn log_request(request: Request, next: Next) -> Response {
 
 fn span(request: &Request, is_probe: bool) -> Span {
     let id = request_id::of(request);
-    let context = request.extensions().get::<TraceContext>();
-    let trace = context.map(TraceContext::trace_id).unwrap_or_default();
     let (method, path) = (request.method(), logged(request.uri().path()));
     match is_probe {
-        true => tracing::span!(Level::DEBUG, "request", id, trace, %method, path),
-        false => tracing::span!(Level::INFO, "request", id, trace, %method, path),
+        true => tracing::span!(Level::DEBUG, "request", id, trace = Empty, %method, path),
+        false => tracing::span!(Level::INFO, "request", id, trace = Empty, %method, path),
     }
 }
 

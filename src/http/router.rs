@@ -13,7 +13,6 @@ use super::request_id::{REQUEST_ID, remove_unusable_id};
 use super::request_log::log_request;
 use super::security_headers::secure;
 use super::state::AppState;
-use super::trace_context::trace_request;
 use super::{docs, page};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -52,7 +51,6 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), mark_draining))
         .layer(middleware::from_fn(log_request))
         .layer(middleware::from_fn_with_state(state.clone(), count_request))
-        .layer(middleware::from_fn(trace_request))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
         .layer(middleware::map_request(remove_unusable_id))

@@ -1,12 +1,9 @@
 //! `traceparent` (W3C Trace Context): the trace of the client goes on here, or a new one begins.
 //!
-//! The answer has the header with the trace and the span of this request, so that a client finds it in the log. Nothing
-//! is exported.
+//! The answer has the header with the trace and the span of this request, so that a client finds it in the log and
+//! where spans are exported to (feature `otel`).
 
-use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
-use axum::middleware::Next;
-use axum::response::Response;
 
 /// The header.
 pub const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
@@ -14,24 +11,37 @@ pub const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
 /// The trace of a request, and its span in that trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceContext {
-    trace: u128,
-    span: u64,
-    flags: u8,
+    /// The trace.
+    pub trace: u128,
+    /// The span of the client, if it named one.
+    pub parent: Option<u64>,
+    /// The span of this request.
+    pub span: u64,
+    /// 1 if the trace is recorded, else 0.
+    pub flags: u8,
 }
 
 impl TraceContext {
     /// A new span in the trace of these headers; in a new trace where they name none.
-    fn of(headers: &HeaderMap) -> Self {
+    pub fn of(headers: &HeaderMap) -> Self {
         let mut values = headers.get_all(TRACEPARENT).iter();
-        let parent = match (values.next(), values.next()) {
+        let named = match (values.next(), values.next()) {
             (Some(value), None) => value.to_str().ok().and_then(parse),
             _ => None,
         };
-        let (trace, flags) = parent.unwrap_or_else(|| (rand::random_range(1..=u128::MAX), 0));
-        Self {
-            trace,
-            span: rand::random_range(1..=u64::MAX),
-            flags,
+        let span = rand::random_range(1..=u64::MAX);
+        match named {
+            Some(parent) => Self {
+                parent: Some(parent.span),
+                span,
+                ..parent
+            },
+            None => Self {
+                trace: rand::random_range(1..=u128::MAX),
+                parent: None,
+                span,
+                flags: 0,
+            },
         }
     }
 
@@ -40,35 +50,32 @@ impl TraceContext {
         format!("{:032x}", self.trace)
     }
 
-    fn header(&self) -> HeaderValue {
-        let text = format!(
-            "00-{:032x}-{:016x}-{:02x}",
-            self.trace, self.span, self.flags
-        );
+    /// The header.
+    pub fn header(&self) -> HeaderValue {
+        let Self {
+            trace, span, flags, ..
+        } = self;
+        let text = format!("00-{trace:032x}-{span:016x}-{flags:02x}");
         HeaderValue::try_from(text).expect("hexadecimal digits are visible ASCII")
     }
 }
 
-/// The middleware.
-pub async fn trace_request(mut request: Request, next: Next) -> Response {
-    let context = TraceContext::of(request.headers());
-    request.extensions_mut().insert(context);
-    let mut response = next.run(request).await;
-    response.headers_mut().insert(TRACEPARENT, context.header());
-    response
-}
-
-/// The id and the flags of a trace. Of a version to come, what follows the flags is left out.
-fn parse(text: &str) -> Option<(u128, u8)> {
+/// The trace and the span that the header names. Of a version to come, what follows the flags is left out.
+fn parse(text: &str) -> Option<TraceContext> {
     let mut fields = text.splitn(5, '-');
     let version = hexadecimal(fields.next()?, 2)?;
     let trace = hexadecimal(fields.next()?, 32)?;
-    let parent = hexadecimal(fields.next()?, 16)?;
+    let span = hexadecimal(fields.next()?, 16)?;
     let flags = hexadecimal(fields.next()?, 2)?;
     let ends = fields.next().is_none() || version > 0;
-    let valid = version < 0xff && trace > 0 && parent > 0 && ends;
-    // Of the flags, version 00 knows only the lowest.
-    valid.then_some((trace, (flags & 1) as u8))
+    let valid = version < 0xff && trace > 0 && span > 0 && ends;
+    valid.then_some(TraceContext {
+        trace,
+        parent: None,
+        span: span as u64,
+        // Version 00 knows only the lowest of the flags.
+        flags: (flags & 1) as u8,
+    })
 }
 
 /// A field of lower-case hexadecimal digits.
@@ -86,11 +93,16 @@ mod tests {
 
     #[test]
     fn only_valid_headers_name_a_trace() {
-        let trace = 0x4bf9_2f35_77b3_4da6_a3ce_929d_0e0e_4736;
+        let named = Some(TraceContext {
+            trace: 0x4bf9_2f35_77b3_4da6_a3ce_929d_0e0e_4736,
+            parent: None,
+            span: 0x00f0_67aa_0ba9_02b7,
+            flags: 1,
+        });
         let good = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
-        assert_eq!(parse(good), Some((trace, 1)));
-        assert_eq!(parse(&good.replace("00-4b", "cc-4b")), Some((trace, 1)));
-        assert_eq!(parse(&format!("cc{}-more", &good[2..])), Some((trace, 1)));
+        assert_eq!(parse(good), named);
+        assert_eq!(parse(&good.replace("00-4b", "cc-4b")), named);
+        assert_eq!(parse(&format!("cc{}-more", &good[2..])), named);
         for bad in [
             "",
             "00",

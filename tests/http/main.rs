@@ -6,6 +6,8 @@ mod binary;
 mod capacity;
 mod connections;
 mod expiry;
+#[cfg(feature = "otel")]
+mod export;
 mod flow;
 mod footage;
 mod forms;

@@ -22,10 +22,16 @@ pub struct Service {
 
 impl Service {
     pub async fn start(flags: &[&str]) -> Self {
+        Self::start_in(flags, &[]).await
+    }
+
+    /// With these variables.
+    pub async fn start_in(flags: &[&str], variables: &[(&str, &str)]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_bagtrack"))
             .args(["serve", "--listen", "127.0.0.1:0", "--log", "info"])
             .args(flags)
             .env("NO_COLOR", "1")
+            .envs(variables.iter().copied())
             .stderr(Stdio::piped())
             .kill_on_drop(true)
             .spawn()
