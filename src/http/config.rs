@@ -1,10 +1,15 @@
 //! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
 //! environment variable, which only the program reads.
 
+use super::advance::RequestLimits;
+use super::limits_config::LimitsConfig;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
+
+#[cfg(feature = "cli")]
+use super::limits_config::shown;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
 #[derive(Debug, Clone)]
@@ -129,12 +134,9 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub shutdown_timeout: Duration,
-}
-
-/// A duration as flags have it.
-#[cfg(feature = "cli")]
-fn shown(duration: Duration) -> String {
-    humantime::format_duration(duration).to_string()
+    /// What one request and one client may take.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub limits: LimitsConfig,
 }
 
 impl Default for Config {
@@ -162,6 +164,7 @@ impl Default for Config {
             work_timeout: Duration::from_secs(30),
             shutdown_delay: Duration::ZERO,
             shutdown_timeout: Duration::from_secs(20),
+            limits: LimitsConfig::default(),
         }
     }
 }
@@ -185,6 +188,14 @@ impl Config {
             max_side: self.max_frame_side,
             max_pixels: self.max_frame_pixels,
             max_memory: self.max_frame_memory,
+        }
+    }
+
+    /// The limits of one request.
+    pub(super) fn request_limits(&self) -> RequestLimits {
+        RequestLimits {
+            frame: self.frame_limits(),
+            max_pixels: self.limits.max_request_pixels,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::advance;
 use super::answer::ImageSize;
+use super::clients::Account;
 use super::openapi::param_limits;
 use super::openapi::problem_responses::{self, problem_responses};
 use super::openapi::request_bodies::{FormBody, JsonBody};
@@ -9,12 +10,13 @@ use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::target_box::TargetBox;
+use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::upload::texts::Texts;
 use super::upload::uploaded::Upload;
 use super::work;
-use crate::sessions::{Fingerprint, QueuePermit, SNAPSHOT_MAGIC, Session, SessionState};
+use crate::sessions::{Fingerprint, QueuePermit, SNAPSHOT_MAGIC, Session, SessionState, WorkMeter};
 use crate::tracker::{Params, Preset, Tracker};
 use axum::Json;
 use axum::extract::{FromRequest, Request, State};
@@ -22,6 +24,7 @@ use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use uuid::Uuid;
 
 /// The settings of a new session.
@@ -59,6 +62,7 @@ type CreateJson = JsonBody<CreateSettings>;
 /// A request to open a session, with its place in the queue.
 #[derive(Debug)]
 pub struct CreateRequest {
+    account: Arc<Account>,
     queue: QueuePermit,
     upload: Upload<CreateSettings>,
 }
@@ -69,9 +73,17 @@ impl FromRequest<AppState> for CreateRequest {
     async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
         let texts = Texts::of_query::<CreateSettings>(request.uri())?;
         state.registry.check_room()?;
-        let queue = state.enter(request.headers())?;
-        let upload = Upload::read(state, &queue, texts, request).await?;
-        Ok(Self { queue, upload })
+        let (parts, body) = request.into_parts();
+        let client = admit(state, &parts)?;
+        let account = client.account().clone();
+        account.check_session()?;
+        let request = Request::from_parts(parts, body);
+        let (upload, queue) = Upload::read(state, client, texts, request).await?;
+        Ok(Self {
+            account,
+            queue,
+            upload,
+        })
     }
 }
 
@@ -156,14 +168,19 @@ impl utoipa::IntoResponses for Problems {
 )]
 pub async fn create(
     State(state): State<AppState>,
-    CreateRequest { queue, upload }: CreateRequest,
+    request: CreateRequest,
 ) -> Result<Response, Problem> {
+    let CreateRequest {
+        account,
+        queue,
+        upload,
+    } = request;
     let is_snapshot = upload.is_snapshot || upload.files[0].starts_with(SNAPSHOT_MAGIC);
     let opened = match is_snapshot {
         true => restore(&state, queue, upload).await?,
         false => start(&state, queue, upload).await?,
     };
-    let session = state.registry.insert(opened)?;
+    let session = state.registry.insert(opened, account.session()?)?;
     tracing::info!(session = %session.id(), "opened");
     let location = [(LOCATION, format!("/sessions/{}", session.id()))];
     let created = Json(CreatedSession::of(&state, &session));
@@ -181,8 +198,8 @@ async fn start(
     let params = settings.params.unwrap_or_default();
     let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
-    let start = move || {
-        let frame = &advance::decode(&upload.files, &limits)?[0];
+    let start = move |meter: &WorkMeter| {
+        let frame = &advance::decode(&upload.files, &limits, meter)?[0];
         let tracker = Tracker::new(frame, target, params)?;
         let fingerprint = Fingerprint::of(&upload.files[0]);
         Ok(SessionState::new(tracker, fingerprint, target))
@@ -199,6 +216,6 @@ async fn restore(
         let detail = "A snapshot holds the box and the parameters; leave out all settings.";
         return Err(Problem::malformed(detail));
     }
-    let restore = move || Ok(SessionState::restore(&upload.files[0])?);
+    let restore = move |_: &WorkMeter| Ok(SessionState::restore(&upload.files[0])?);
     work::run(state, queue, restore).await
 }

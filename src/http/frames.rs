@@ -10,6 +10,7 @@ use super::state::AppState;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
+use crate::sessions::WorkMeter;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -45,6 +46,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
+            Kind::RequestTooCostly,
         ];
         problem_responses(&[problem_responses::UPLOAD, own])
     }
@@ -91,8 +93,8 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
     };
-    let limits = state.config.frame_limits();
-    let advance = move |locked: &mut _| next.advance(locked, &limits);
+    let limits = state.config.request_limits();
+    let advance = move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter);
     let Answered {
         estimates,
         replayed,

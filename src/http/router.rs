@@ -2,6 +2,7 @@
 
 use super::answer_problems::{answer_problems, panic_response};
 use super::api::api;
+use super::client::identify;
 use super::drain::drain_refused;
 use super::problems::problem::Problem;
 use super::request_id::{self, REQUEST_ID, remove_unusable_id};
@@ -42,6 +43,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .fallback(async || Problem::route_not_found())
         .method_not_allowed_fallback(async || Problem::method_not_allowed())
         // The last layer is the first to see a request.
+        .layer(middleware::from_fn_with_state(state.clone(), identify))
         .layer(DefaultBodyLimit::max(config.max_body_bytes))
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
         .layer(RequestBodyDeadlineLayer::new(config.body_timeout))

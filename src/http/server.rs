@@ -3,12 +3,13 @@
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
 //! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
 
+use super::client::Peer;
 use super::config::Config;
 use super::config_validation::ConfigError;
 use super::router::router;
 use super::state::AppState;
 use crate::sessions::Clock;
-use axum::Router;
+use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -135,8 +136,8 @@ async fn accept(
     loop {
         let acquired = connections.clone().acquire_owned().await;
         let permit = acquired.expect("the semaphore is never closed");
-        let stream = match listener.accept().await {
-            Ok((stream, _)) => stream,
+        let (stream, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
             Err(error) => {
                 // Mostly too many open files: wait for connections to end.
                 tracing::warn!(%error, "cannot accept");
@@ -147,7 +148,7 @@ async fn accept(
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
-        let service = TowerToHyperService::new(service.clone());
+        let service = TowerToHyperService::new(service.clone().layer(Extension(Peer(peer))));
         let connection = builder.serve_connection(TokioIo::new(stream), service);
         let connection = graceful.watch(connection);
         let mut cut_off = cut_off.clone();

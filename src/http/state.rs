@@ -1,10 +1,8 @@
 //! What all handlers share.
 
+use super::clients::Clients;
 use super::config::Config;
-use super::problems::problem::Problem;
-use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
-use axum::http::HeaderMap;
-use axum::http::header::CONTENT_LENGTH;
+use crate::sessions::{Admission, ByteBudget, Clock, Registry, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -21,6 +19,10 @@ pub struct Shared {
     pub registry: Registry,
     /// Which requests may work.
     pub admission: Admission,
+    /// The memory of all uploads together.
+    pub uploads: ByteBudget,
+    /// What each client has in use.
+    pub clients: Clients,
     /// Set from the moment that the service was asked to end.
     draining: AtomicBool,
 }
@@ -42,7 +44,9 @@ impl AppState {
                 config.session_idle,
                 clock,
             ),
-            admission: Admission::new(config.queue, config.max_upload_bytes, config.worker_count()),
+            admission: Admission::new(config.queue, config.worker_count()),
+            uploads: ByteBudget::new(config.max_upload_bytes),
+            clients: Clients::new(&config),
             draining: AtomicBool::new(false),
             config,
         }))
@@ -56,20 +60,6 @@ impl AppState {
     /// Whether the service was asked to end.
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Acquire)
-    }
-
-    /// Takes a place in the queue for a request, and the bytes of its body from the byte budget.
-    ///
-    /// # Errors
-    /// The queue is full or the byte budget is used up.
-    pub fn enter(&self, headers: &HeaderMap) -> Result<QueuePermit, Problem> {
-        let max = self.config.max_body_bytes;
-        let length = headers
-            .get(CONTENT_LENGTH)
-            .and_then(|length| length.to_str().ok());
-        let length = length.and_then(|length| length.parse::<usize>().ok());
-        let bytes = length.map_or(max, |length| length.min(max));
-        Ok(self.admission.enter(bytes)?)
     }
 
     /// When the session expires, in RFC 3339.

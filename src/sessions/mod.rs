@@ -4,8 +4,9 @@
 //! [`Registry`], found by its id.
 //!
 //! A request for a session takes these steps: [`Registry::get`] finds it, [`Session::enter`] takes one of its few
-//! permits, [`Admission::enter`] takes a place in the queue before the workers, [`SessionPermit::lock`] waits for the
-//! session in order of arrival, and [`Admission::run`] works with its state on a worker thread.
+//! permits, [`ByteCharge::grow`] charges the bytes of its body as they arrive, [`Admission::enter`] takes a place in the
+//! queue before the workers, [`SessionPermit::lock`] waits for the session in order of arrival, and [`Admission::run`]
+//! works with its state on a worker thread.
 //!
 //! What can go wrong, and what is done about it:
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
@@ -17,18 +18,24 @@
 //! - A snapshot comes back damaged or forged. It is checked as a whole: see [`SnapshotError`].
 
 mod admission;
+mod byte_budget;
 mod clock;
+mod fair_queue;
 mod registry;
 mod replay;
 mod session;
 mod snapshot;
 mod state;
+mod work_limit;
 mod workers;
 
-pub use admission::{Admission, QueueFull, QueuePermit, WorkLost};
+pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
+pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
+pub use fair_queue::Lane;
 pub use registry::{Registry, TooManySessions};
 pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
 pub use session::{LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
 pub use snapshot::{MAGIC as SNAPSHOT_MAGIC, SnapshotError};
-pub use state::SessionState;
+pub use state::{SessionState, StepError};
+pub use work_limit::{Stopped, WorkLimit, WorkMeter};

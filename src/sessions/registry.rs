@@ -1,5 +1,6 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
+use super::admission::Held;
 use super::clock::Clock;
 use super::session::Session;
 use super::state::SessionState;
@@ -50,13 +51,13 @@ impl Registry {
         Ok(())
     }
 
-    /// Adds a session under a new id.
+    /// Adds a session under a new id. It keeps `held` until it is freed.
     ///
     /// # Errors
     /// There is no room.
-    pub fn insert(&self, state: SessionState) -> Result<Arc<Session>, TooManySessions> {
+    pub fn insert(&self, state: SessionState, held: Held) -> Result<Arc<Session>, TooManySessions> {
         self.check_room()?;
-        let session = Session::new(state, self.max_requests, self.clock.clone());
+        let session = Session::new(state, held, self.max_requests, self.clock.clone());
         let mut sessions = self.map();
         if sessions.len() >= self.max_sessions {
             return Err(TooManySessions(self.max_sessions));
@@ -135,7 +136,7 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::{Admission, Fingerprint};
+    use crate::sessions::{Admission, Fingerprint, Lane};
     use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
     use std::sync::mpsc;
 
@@ -158,7 +159,7 @@ mod tests {
     fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
         let clock = Clock::default();
         let registry = Arc::new(Registry::new(9, 9, IDLE, clock.clone()));
-        let session = registry.insert(state()).unwrap();
+        let session = registry.insert(state(), Box::new(())).unwrap();
         let (freed, was_free) = mpsc::channel();
         let map = registry.clone();
         let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
@@ -186,15 +187,16 @@ mod tests {
     #[tokio::test]
     async fn a_session_whose_work_panicked_has_ended() {
         let registry = Registry::new(9, 9, IDLE, Clock::default());
-        let session = registry.insert(state()).unwrap();
+        let session = registry.insert(state(), Box::new(())).unwrap();
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
-        let admission = Admission::new(9, 0, 1);
+        let admission = Admission::new(9, 1);
         let work = move || {
             let _state = locked.state();
             panic!("a test panics in the work");
         };
-        let panicked: Result<(), _> = admission.run(admission.enter(0).unwrap(), work).await;
+        let place = admission.enter(Lane(0), Box::new(())).unwrap();
+        let panicked: Result<(), _> = admission.run(place, work).await;
         assert!(panicked.is_err());
         assert!(waiting.lock().await.is_err(), "those who wait are told");
         assert!(registry.get(session.id()).is_none());

@@ -4,6 +4,7 @@
 //! the [`LockedSession`] into the work on a worker thread. The lock is fair: requests are served in the order in which
 //! they asked for it.
 
+use super::admission::Held;
 use super::clock::Clock;
 use super::state::SessionState;
 use crate::tracker::{Estimate, Params};
@@ -33,6 +34,8 @@ pub struct Session {
     /// The permits that are free. Each request at this session has one, the one at work included.
     permits: Arc<Semaphore>,
     max_requests: usize,
+    /// The place of the session in its client's quota.
+    _held: Held,
     /// The last answer, to be read without waiting for the lock.
     latest: Mutex<Estimate>,
     clock: Clock,
@@ -62,7 +65,12 @@ impl Drop for Session {
 }
 
 impl Session {
-    pub(super) fn new(state: SessionState, max_requests: usize, clock: Clock) -> Arc<Self> {
+    pub(super) fn new(
+        state: SessionState,
+        held: Held,
+        max_requests: usize,
+        clock: Clock,
+    ) -> Arc<Self> {
         let session = Self {
             id: Uuid::new_v4(),
             source_size: state.tracker().source_size(),
@@ -71,6 +79,7 @@ impl Session {
             state: Arc::new(AsyncMutex::new(state)),
             permits: Arc::new(Semaphore::new(max_requests)),
             max_requests,
+            _held: held,
             clock,
             last_used_ms: AtomicU64::new(0),
             closed: AtomicBool::new(false),

@@ -2,16 +2,20 @@
 
 mod application;
 mod binary;
+mod bombs;
 mod capacity;
 mod connections;
 mod expiry;
 mod flow;
 mod footage;
 mod forms;
+mod heavy;
 mod openapi;
 mod pictures;
 mod problems;
 mod provoke;
+mod quotas;
 mod raw;
 mod replay;
 mod snapshots;
+mod uploads;
