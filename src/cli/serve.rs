@@ -1,6 +1,7 @@
 //! `bagtrack serve`: the HTTP service until SIGTERM or SIGINT.
 
 use super::log::{Log, LogFormat};
+use super::open_files;
 use bagtrack::http::{Application, Config};
 use std::error::Error;
 
@@ -28,10 +29,21 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     runtime.block_on(serve(args.config, &log))
 }
 
-async fn serve(config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+    open_files::fit(&mut config);
+    let bound = config.memory_bound();
     let application = Application::bind(config).await?;
     let shutdown = shutdown_signal()?;
     tracing::info!("listening on http://{}", application.local_addr()?);
+    let mib = |bytes: u64| bytes >> 20;
+    tracing::info!(
+        uploads = mib(bound.uploads),
+        work = mib(bound.work),
+        sessions = mib(bound.sessions),
+        connections = mib(bound.connections),
+        "resident memory stays below {} MiB",
+        mib(bound.total())
+    );
     let reports = tokio::spawn(log.dropped().report_regularly());
     let ended = application.serve(shutdown).await;
     reports.abort();

@@ -3,6 +3,7 @@
 
 use super::advance::RequestLimits;
 use super::limits_config::LimitsConfig;
+use super::memory_bound::MemoryBound;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -10,6 +11,9 @@ use std::time::Duration;
 
 #[cfg(feature = "cli")]
 use super::limits_config::shown;
+
+/// What a session with usual parameters is charged at most.
+const USUAL_SESSION_BYTES: usize = 512 << 10;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
 #[derive(Debug, Clone)]
@@ -189,6 +193,17 @@ impl Config {
             max_pixels: self.max_frame_pixels,
             max_memory: self.max_frame_memory,
         }
+    }
+
+    /// Most bytes that the states of all sessions may take together, with its default.
+    pub fn session_bytes(&self) -> usize {
+        let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
+        self.limits.max_session_bytes.unwrap_or(default)
+    }
+
+    /// What the service takes in memory at most.
+    pub fn memory_bound(&self) -> MemoryBound {
+        MemoryBound::of(self)
     }
 
     /// The limits of one request.

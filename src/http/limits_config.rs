@@ -53,6 +53,10 @@ pub struct LimitsConfig {
     /// Most sessions of one client [default: a quarter of `max-sessions`].
     #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_SESSIONS"))]
     pub client_sessions: Option<usize>,
+    /// Most bytes that the states of all sessions take together; larger parameters take more of it [default: 512 KiB
+    /// for each of `max-sessions`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_MAX_SESSION_BYTES"))]
+    pub max_session_bytes: Option<usize>,
     /// Most requests with a frame of one client at the same time [default: a quarter of `queue`].
     #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_REQUESTS"))]
     pub client_requests: Option<usize>,
@@ -99,6 +103,7 @@ impl Default for LimitsConfig {
             half_close_timeout: Duration::from_secs(5),
             client_connections: None,
             client_sessions: None,
+            max_session_bytes: None,
             client_requests: None,
             client_upload_bytes: None,
             client_frame_rate: 0,
@@ -114,7 +119,7 @@ impl LimitsConfig {
         &self,
         moment: &std::ops::RangeInclusive<Duration>,
         body: usize,
-    ) -> [(&'static str, bool, &'static str); 10] {
+    ) -> [(&'static str, bool, &'static str); 11] {
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let share = |share: Option<usize>| share.is_none_or(|share| share >= 1);
@@ -143,6 +148,7 @@ impl LimitsConfig {
                 positive,
             ),
             ("client-sessions", share(self.client_sessions), positive),
+            ("max-session-bytes", share(self.max_session_bytes), positive),
             ("client-requests", share(self.client_requests), positive),
             (
                 "client-upload-bytes",

@@ -19,6 +19,7 @@
 //! # }
 //! ```
 
+mod activity;
 mod advance;
 mod answer;
 mod answer_problems;
@@ -27,13 +28,18 @@ mod client;
 mod clients;
 mod config;
 mod config_validation;
+mod connection_io;
+mod connections;
 mod create;
 mod docs;
 mod drain;
 mod forwarded;
 mod frames;
+mod head_problems;
 mod health;
+mod host;
 mod limits_config;
+mod memory_bound;
 mod openapi;
 mod page;
 mod problems;
@@ -54,6 +60,7 @@ pub use client::Client;
 pub use config::Config;
 pub use config_validation::ConfigError;
 pub use limits_config::LimitsConfig;
+pub use memory_bound::MemoryBound;
 pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

@@ -4,6 +4,7 @@ use super::answer_problems::{answer_problems, panic_response};
 use super::api::api;
 use super::client::identify;
 use super::drain::drain_refused;
+use super::host::one_host;
 use super::problems::problem::Problem;
 use super::request_id::{self, REQUEST_ID, remove_unusable_id};
 use super::state::AppState;
@@ -48,6 +49,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
         .layer(RequestBodyDeadlineLayer::new(config.body_timeout))
         .layer(cors(&config.cors_origins))
+        .layer(middleware::from_fn(one_host))
         .layer(CatchPanicLayer::custom(panic_response))
         .layer(middleware::from_fn(answer_problems))
         .layer(SetResponseHeaderLayer::if_not_present(

@@ -43,7 +43,8 @@ impl AppState {
                 config.session_queue,
                 config.session_idle,
                 clock,
-            ),
+            )
+            .with_memory(config.session_bytes()),
             admission: Admission::new(config.queue, config.worker_count()),
             uploads: ByteBudget::new(config.max_upload_bytes),
             clients: Clients::new(&config),

@@ -35,6 +35,11 @@ impl ByteBudget {
         self.0.available_permits().saturating_mul(BYTES_PER_PERMIT)
     }
 
+    /// Takes bytes until the returned value is dropped; none if there are too few left.
+    pub(super) fn hold(&self, bytes: usize) -> Option<OwnedSemaphorePermit> {
+        self.take(u32::try_from(bytes.div_ceil(BYTES_PER_PERMIT)).ok()?)
+    }
+
     fn take(&self, permits: u32) -> Option<OwnedSemaphorePermit> {
         self.0.clone().try_acquire_many_owned(permits).ok()
     }

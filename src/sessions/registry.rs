@@ -1,6 +1,7 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
 use super::admission::Held;
+use super::byte_budget::ByteBudget;
 use super::clock::Clock;
 use super::session::Session;
 use super::state::SessionState;
@@ -22,6 +23,7 @@ pub struct Registry {
     max_requests: usize,
     idle: Duration,
     clock: Clock,
+    memory: ByteBudget,
 }
 
 impl Registry {
@@ -34,7 +36,14 @@ impl Registry {
             max_requests,
             idle,
             clock,
+            memory: ByteBudget::new(usize::MAX),
         }
+    }
+
+    /// The states of all sessions together take at most so many bytes.
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = ByteBudget::new(bytes);
+        self
     }
 
     /// Whether there is room for one more session, after the expired ones have gone.
@@ -54,9 +63,12 @@ impl Registry {
     /// Adds a session under a new id. It keeps `held` until it is freed.
     ///
     /// # Errors
-    /// There is no room.
+    /// There is no room, or no memory for a state with its parameters.
     pub fn insert(&self, state: SessionState, held: Held) -> Result<Arc<Session>, TooManySessions> {
         self.check_room()?;
+        let memory = self.memory.hold(state.tracker().params().session_bytes());
+        let memory = memory.ok_or(TooManySessions(self.max_sessions))?;
+        let held: Held = Box::new((held, memory));
         let session = Session::new(state, held, self.max_requests, self.clock.clone());
         let mut sessions = self.map();
         if sessions.len() >= self.max_sessions {

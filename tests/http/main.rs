@@ -10,6 +10,7 @@ mod flow;
 mod footage;
 mod forms;
 mod heavy;
+mod hostile_connections;
 mod openapi;
 mod pictures;
 mod problems;

@@ -23,6 +23,24 @@ impl RawConnection {
         self.stream.write_all(bytes.as_ref()).await.unwrap();
     }
 
+    /// Sends, if the connection still takes it.
+    pub async fn try_send(&mut self, bytes: impl AsRef<[u8]>) -> std::io::Result<()> {
+        self.stream.write_all(bytes.as_ref()).await
+    }
+
+    /// Closes its own side of the connection.
+    pub async fn close_sending(&mut self) {
+        self.stream.shutdown().await.unwrap();
+    }
+
+    /// What comes next, or nothing where the connection was closed.
+    pub async fn read_some(&mut self) -> String {
+        let mut bytes = Vec::new();
+        let read = self.stream.read_buf(&mut bytes);
+        let _ = timeout(PATIENCE, read).await.expect("something comes");
+        String::from_utf8(bytes).unwrap()
+    }
+
     /// Announces a body of `length` bytes and waits until the service asks for it: from then on the request is
     /// inside, and it stays there until the body is sent.
     pub async fn hold(address: SocketAddr, method: &str, target: &str, length: usize) -> Self {

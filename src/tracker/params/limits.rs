@@ -29,6 +29,14 @@ impl Params {
         self.bag_size as usize * (self.history as usize + 1)
     }
 
+    /// Bytes that a session with these parameters keeps at most: the vectors of the bag and its background as numbers
+    /// of four bytes, those that the bag is made of as one byte a value, and what does not depend on the sizes.
+    pub(crate) fn session_bytes(&self) -> usize {
+        let vectors = self.bag_size as usize * (self.basis_dim as usize + 1);
+        let kept = vectors + self.background_samples as usize;
+        (256 << 10) + self.feature_len() * (4 * kept + self.bag_vectors())
+    }
+
     /// Checks what sizes cost together. No product overflows once each size is in its range.
     pub(crate) fn validate_products(&self) -> Result<(), ParamsError> {
         let len = self.feature_len();
