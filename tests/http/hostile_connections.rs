@@ -124,7 +124,7 @@ async fn a_half_closed_connection_gets_its_answer() {
 #[tokio::test]
 async fn a_head_that_is_not_http_gets_a_problem_document() {
     let app = TestApplication::start().await;
-    let long = "a".repeat(70_000);
+    let long = "a".repeat(200_000);
     for (head, status, slug) in [
         ("NONSENSE\r\n\r\n".to_owned(), "400", "malformed-request"),
         (
