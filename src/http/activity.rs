@@ -22,7 +22,7 @@ const ANSWERING: u8 = 2;
 #[derive(Debug)]
 pub struct Activity {
     state: AtomicU8,
-    /// Milliseconds from [`START`] to when it became idle.
+    /// Nanoseconds from [`START`] to when it became idle.
     idle_since: AtomicU64,
     /// Told when the connection is to end.
     pub shed: Notify,
@@ -41,16 +41,17 @@ impl Activity {
     }
 
     fn idle(&self) {
-        let now = u64::try_from(START.elapsed().as_millis()).unwrap_or(u64::MAX);
+        let now = u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX);
         self.idle_since.store(now, Ordering::Relaxed);
         self.state.store(IDLE, Ordering::Release);
     }
 
-    /// For how long no request has been in progress; none while one is. A head that has begun is not yet a request.
-    pub fn idle_for(&self) -> Option<Duration> {
-        let since = Duration::from_millis(self.idle_since.load(Ordering::Relaxed));
+    /// Since when no request has been in progress, from some fixed moment; none while one is. A head that has begun is
+    /// not yet a request.
+    pub fn idle_since(&self) -> Option<Duration> {
+        let since = Duration::from_nanos(self.idle_since.load(Ordering::Relaxed));
         let is_idle = self.state.load(Ordering::Acquire) == IDLE;
-        is_idle.then(|| START.elapsed().saturating_sub(since))
+        is_idle.then_some(since)
     }
 
     /// Whether a whole request has come whose answer is still being made or sent.

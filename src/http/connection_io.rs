@@ -51,7 +51,7 @@ impl ConnectionIo {
 
     /// Whether `bytes` are an answer of hyper's own. Then its document is to be written.
     fn takes_over(&mut self, bytes: &[u8]) -> bool {
-        if self.activity.idle_for().is_none() {
+        if self.activity.idle_since().is_none() {
             return false;
         }
         match head_problems::document_for(bytes) {

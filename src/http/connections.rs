@@ -5,6 +5,7 @@
 
 use super::activity::Activity;
 use super::client::Client;
+use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -100,10 +101,10 @@ impl Open {
             .connections
             .iter()
             .filter_map(|(number, (client, activity))| {
-                let idle_for = activity.idle_for().filter(|_| of(client))?;
-                Some(((self.counts.get(client), idle_for), *number))
+                let since = activity.idle_since().filter(|_| of(client))?;
+                Some((self.counts.get(client), Reverse((since, *number))))
             });
-        let (_, number) = idle.max()?;
+        let (_, Reverse((_, number))) = idle.max()?;
         self.remove(number)?.shed.notify_one();
         Some(())
     }
