@@ -9,6 +9,7 @@ mod eval;
 mod export;
 mod health;
 mod log;
+mod open_files;
 mod output;
 mod params;
 mod progress;

@@ -4,6 +4,7 @@
 //! signal ended it at once.
 
 use super::log::{Log, LogFormat};
+use super::open_files;
 use super::signals::{self, Signals};
 use bagtrack::http::{Application, Config};
 use std::error::Error;
@@ -34,7 +35,9 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     result
 }
 
-async fn serve(config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+    open_files::fit(&mut config);
+    let bound = config.memory_bound();
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let application = Application::bind(config).await?;
     let keys = application.api_keys();
@@ -44,6 +47,15 @@ async fn serve(config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
     tracing::info!("listening on http://{}", application.local_addr()?);
+    let mib = |bytes: u64| bytes >> 20;
+    tracing::info!(
+        uploads = mib(bound.uploads),
+        work = mib(bound.work),
+        sessions = mib(bound.sessions),
+        connections = mib(bound.connections),
+        "resident memory stays below {} MiB",
+        mib(bound.total())
+    );
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload_keys(keys));
     let ended = tokio::select! {

@@ -3,7 +3,7 @@
 use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
-use crate::sessions::{Fingerprint, LockedSession, ReplayDecision};
+use crate::sessions::{Fingerprint, LockedSession, ReplayDecision, StepError, WorkMeter};
 use crate::tracker::{Estimate, GrayFrame, Rect, TrackerError};
 use axum::body::Bytes;
 use std::time::Instant;
@@ -29,15 +29,17 @@ pub struct Answered {
 }
 
 impl NextFrames {
-    /// The answers: the stored ones if the request was answered before, else those of the tracker. All frames are
-    /// decoded before the first is tracked.
+    /// The answers: the stored ones if the request was answered before, else those of the tracker. The sizes of all
+    /// frames are checked before the first is decoded, and all are decoded before the first is tracked. Between frames
+    /// `meter` says whether to go on.
     ///
     /// # Errors
-    /// The problem of the first bad frame. The session is unchanged.
+    /// The problem of the first bad frame, or of a request that costs too much. The session is unchanged.
     pub fn advance(
         &self,
         locked: &mut LockedSession,
-        limits: &Limits,
+        limits: &RequestLimits,
+        meter: &WorkMeter,
         metrics: &TrackingMetrics,
     ) -> Result<Answered, Problem> {
         let fingerprints: Vec<Fingerprint> = self
@@ -55,8 +57,8 @@ impl NextFrames {
                 replayed: true,
             });
         }
-        let decoded = decode(&self.files, limits, metrics)?;
-        self.check_sizes(&decoded, locked.session().source_size())?;
+        self.check_sizes(limits, locked.session().source_size())?;
+        let decoded = decode(&self.files, &limits.frame, meter, metrics)?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let (before, started) = (locked.session().latest(), Instant::now());
         let state = locked.state();
@@ -66,15 +68,20 @@ impl NextFrames {
                 let estimate = state.retarget(*fingerprint, frame, target);
                 estimate
                     .map(|estimate| vec![estimate])
-                    .map_err(|error| (0, error))
+                    .map_err(|error| StepError::Refused { index: 0, error })
             }
-            None => state.step(&frames),
+            None => state.step(&frames, meter),
         };
         let took = started.elapsed();
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
-        let refused = |(index, error)| Problem::from(error).of_frame(index, self.files.len());
+        let refused = |error| match error {
+            StepError::Refused { index, error } => {
+                Problem::from(error).of_frame(index, self.files.len())
+            }
+            StepError::Stopped(stopped) => stopped.into(),
+        };
         let estimates = estimates.map_err(refused)?;
         metrics.tracked(before, &estimates, took);
         Ok(Answered {
@@ -83,37 +90,56 @@ impl NextFrames {
         })
     }
 
-    /// Refuses a frame whose size is not the session's.
+    /// Refuses a frame whose size is not the session's, and a request with too many pixels, by their headers alone.
     fn check_sizes(
         &self,
-        frames: &[GrayFrame],
+        limits: &RequestLimits,
         (width, height): (u32, u32),
     ) -> Result<(), Problem> {
-        let mut sizes = frames.iter().map(GrayFrame::source_size);
-        let Some(index) = sizes.position(|size| size != (width, height)) else {
-            return Ok(());
-        };
-        let (got_width, got_height) = frames[index].source_size();
-        let error = TrackerError::FrameSize {
-            width,
-            height,
-            got_width,
-            got_height,
-        };
-        Err(Problem::from(error).of_frame(index, frames.len()))
+        let mut pixels = 0;
+        for (index, file) in self.files.iter().enumerate() {
+            let of_frame = |problem: Problem| problem.of_frame(index, self.files.len());
+            let size = ingest::size(file, &limits.frame);
+            let (got_width, got_height) = size.map_err(|error| of_frame(error.into()))?;
+            if (got_width, got_height) != (width, height) {
+                let error = TrackerError::FrameSize {
+                    width,
+                    height,
+                    got_width,
+                    got_height,
+                };
+                return Err(of_frame(error.into()));
+            }
+            pixels += u64::from(width) * u64::from(height);
+        }
+        if self.files.len() > 1 && pixels > limits.max_pixels {
+            return Err(Problem::too_many_pixels(pixels, limits.max_pixels));
+        }
+        Ok(())
     }
 }
 
-/// Decodes all files of a request.
+/// What the frames of one request may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct RequestLimits {
+    /// The limits of each frame.
+    pub frame: Limits,
+    /// Most pixels of several frames together. A single frame has its own limit.
+    pub max_pixels: u64,
+}
+
+/// Decodes all files of a request. Between them `meter` says whether to go on.
 ///
 /// # Errors
-/// The problem of the first bad file.
+/// The problem of the first bad file, or that the work was stopped.
 pub fn decode(
     files: &[Bytes],
     limits: &Limits,
+    meter: &WorkMeter,
     metrics: &TrackingMetrics,
 ) -> Result<Vec<GrayFrame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {
+        meter.check()?;
         metrics
             .decoding(|| ingest::decode(file, limits))
             .map_err(|error| Problem::from(error).of_frame(index, files.len()))

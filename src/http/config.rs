@@ -1,11 +1,20 @@
 //! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
 //! environment variable, which only the program reads.
 
+use super::advance::RequestLimits;
 use super::auth::config::AccessConfig;
+use super::limits_config::LimitsConfig;
+use super::memory_bound::MemoryBound;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
+
+#[cfg(feature = "cli")]
+use super::limits_config::shown;
+
+/// What a session with usual parameters is charged at most.
+const USUAL_SESSION_BYTES: usize = 512 << 10;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
 #[derive(Debug, Clone)]
@@ -137,15 +146,12 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub shutdown_timeout: Duration,
+    /// What one request and one client may take.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub limits: LimitsConfig,
     /// Who may use the service.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub access: AccessConfig,
-}
-
-/// A duration as flags have it.
-#[cfg(feature = "cli")]
-fn shown(duration: Duration) -> String {
-    humantime::format_duration(duration).to_string()
 }
 
 impl Default for Config {
@@ -174,6 +180,7 @@ impl Default for Config {
             work_timeout: Duration::from_secs(30),
             shutdown_delay: Duration::from_secs(5),
             shutdown_timeout: Duration::from_secs(20),
+            limits: LimitsConfig::default(),
             access: AccessConfig::default(),
         }
     }
@@ -198,6 +205,25 @@ impl Config {
             max_side: self.max_frame_side,
             max_pixels: self.max_frame_pixels,
             max_memory: self.max_frame_memory,
+        }
+    }
+
+    /// Most bytes that the states of all sessions may take together, with its default.
+    pub fn session_bytes(&self) -> usize {
+        let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
+        self.limits.max_session_bytes.unwrap_or(default)
+    }
+
+    /// What the service takes in memory at most.
+    pub fn memory_bound(&self) -> MemoryBound {
+        MemoryBound::of(self)
+    }
+
+    /// The limits of one request.
+    pub(super) fn request_limits(&self) -> RequestLimits {
+        RequestLimits {
+            frame: self.frame_limits(),
+            max_pixels: self.limits.max_request_pixels,
         }
     }
 }

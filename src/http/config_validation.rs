@@ -101,7 +101,12 @@ impl Config {
                 "at most 1 year",
             ),
         ];
-        match checks.into_iter().find(|(_, holds, _)| !holds) {
+        let limits = self.limits.checks(&moment, self.max_body_bytes);
+        match checks
+            .into_iter()
+            .chain(limits)
+            .find(|(_, holds, _)| !holds)
+        {
             None => Ok(()),
             Some((flag, _, expected)) => Err(ConfigError {
                 flag,

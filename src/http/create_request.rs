@@ -1,10 +1,12 @@
 //! A request to open a session, as it is read.
 
 use super::auth::caller::Caller;
+use super::clients::Account;
 use super::idempotency;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::target_box::TargetBox;
+use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::upload::texts::Texts;
@@ -12,6 +14,7 @@ use super::upload::uploaded::Upload;
 use crate::sessions::{Fingerprint, QueuePermit};
 use axum::extract::{FromRequest, FromRequestParts, Request};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// The settings of a new session.
 #[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
@@ -49,6 +52,8 @@ pub struct CreateRequest {
     pub caller: Caller,
     /// The idempotency key.
     pub key: Option<String>,
+    /// What the client has in use.
+    pub account: Arc<Account>,
     /// The place in the queue.
     pub queue: QueuePermit,
     /// The frame and the settings.
@@ -68,12 +73,17 @@ impl FromRequest<AppState> for CreateRequest {
         if key.is_none() {
             check_room(state)?;
         }
-        let queue = state.enter(&parts.headers)?;
+        let client = admit(state, &parts)?;
+        let account = client.account().clone();
+        if key.is_none() {
+            account.check_session()?;
+        }
         let request = Request::from_parts(parts, body);
-        let upload = Upload::read(state, &queue, texts, request).await?;
+        let (upload, queue) = Upload::read(state, client, texts, request).await?;
         Ok(Self {
             caller,
             key,
+            account,
             queue,
             upload,
         })

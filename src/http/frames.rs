@@ -10,6 +10,7 @@ use super::state::AppState;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
+use crate::sessions::WorkMeter;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -44,6 +45,7 @@ impl utoipa::IntoResponses for Problems {
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
+            Kind::RequestTooCostly,
         ];
         problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
     }
@@ -93,9 +95,10 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
     };
-    let limits = state.config.frame_limits();
+    let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
-    let advance = move |locked: &mut _| next.advance(locked, &limits, &metrics);
+    let advance =
+        move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter, &metrics);
     let Answered {
         estimates,
         replayed,

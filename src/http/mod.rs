@@ -20,13 +20,18 @@
 //! # }
 //! ```
 
+mod activity;
 mod advance;
 mod answer;
 mod answer_problems;
 mod api;
 mod auth;
+mod client;
+mod clients;
 mod config;
 mod config_validation;
+mod connection_io;
+mod connections;
 mod cors;
 mod create;
 mod create_request;
@@ -35,9 +40,14 @@ mod drain;
 mod draining;
 #[cfg(feature = "otel")]
 mod exported_span;
+mod forwarded;
 mod frames;
+mod head_problems;
 mod health;
+mod host;
 mod idempotency;
+mod limits_config;
+mod memory_bound;
 mod metrics;
 mod openapi;
 mod opening;
@@ -64,8 +74,11 @@ pub use api::document as openapi_document;
 pub use auth::access::AccessError;
 pub use auth::config::{AccessConfig, Secret};
 pub use auth::keys::{ApiKeys, KeysError};
+pub use client::Client;
 pub use config::Config;
 pub use config_validation::ConfigError;
+pub use limits_config::LimitsConfig;
+pub use memory_bound::MemoryBound;
 pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError, Shutdown};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

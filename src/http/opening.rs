@@ -10,7 +10,7 @@ use super::target_box::TargetBox;
 use super::upload::overrides::ParamOverrides;
 use super::upload::uploaded::Upload;
 use super::work;
-use crate::sessions::{Fingerprint, QueuePermit, SNAPSHOT_MAGIC, Session, SessionState};
+use crate::sessions::{Fingerprint, QueuePermit, SNAPSHOT_MAGIC, Session, SessionState, WorkMeter};
 use crate::tracker::{Params, Preset, Tracker};
 use axum::body::Bytes;
 use axum::http::StatusCode;
@@ -90,6 +90,7 @@ impl Opened {
 pub async fn open(state: &AppState, request: CreateRequest) -> Result<Opened, Problem> {
     let CreateRequest {
         caller,
+        account,
         queue,
         upload,
         ..
@@ -99,7 +100,8 @@ pub async fn open(state: &AppState, request: CreateRequest) -> Result<Opened, Pr
         true => restore(state, queue, upload).await?,
         false => start(state, queue, upload).await?,
     };
-    let session = state.registry.insert(opened, caller.owner().clone())?;
+    let (owner, held) = (caller.owner().clone(), account.session()?);
+    let session = state.registry.insert(opened, owner, held)?;
     tracing::info!(session = session.short_id(), "opened");
     let body = serde_json::to_vec(&CreatedSession::of(state, &session));
     Ok(Opened {
@@ -122,8 +124,8 @@ async fn start(
     let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
     let metrics = state.metrics.tracking.clone();
-    let start = move || {
-        let frame = &advance::decode(&upload.files, &limits, &metrics)?[0];
+    let start = move |meter: &WorkMeter| {
+        let frame = &advance::decode(&upload.files, &limits, meter, &metrics)?[0];
         let tracker = Tracker::new(frame, target, params)?;
         let fingerprint = Fingerprint::of(&upload.files[0]);
         Ok(SessionState::new(tracker, fingerprint, target))
@@ -141,6 +143,7 @@ async fn restore(
         return Err(Problem::malformed(detail));
     }
     let (keys, max_recent) = (state.access.snapshots.clone(), state.config.max_frames);
-    let restore = move || Ok(SessionState::restore(&upload.files[0], &keys, max_recent)?);
+    let restore =
+        move |_: &WorkMeter| Ok(SessionState::restore(&upload.files[0], &keys, max_recent)?);
     work::run(state, queue, restore).await
 }

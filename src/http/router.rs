@@ -4,9 +4,11 @@ use super::answer_problems::{answer_problems, panic_response};
 use super::api;
 use super::auth::layer::authenticate;
 use super::auth::origin::check_origin;
+use super::client::identify;
 use super::cors::cors;
 use super::drain::drain_refused;
 use super::draining::mark_draining;
+use super::host::one_host;
 use super::metrics::layer::count_request;
 use super::problems::problem::Problem;
 use super::request_id::{REQUEST_ID, remove_unusable_id};
@@ -38,6 +40,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
         .layer(RequestBodyDeadlineLayer::new(config.body_timeout))
         .layer(cors(&config.cors_origins))
+        .layer(middleware::from_fn(one_host))
         .layer(CatchPanicLayer::custom(panic_response))
         .layer(middleware::from_fn_with_state(
             state.clone(),
@@ -60,6 +63,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
 /// with no key.
 fn routes(state: &AppState) -> Router<AppState> {
     let with_key = || middleware::from_fn_with_state(state.clone(), authenticate);
+    let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
     let (sessions, _) = api::sessions().split_for_parts();
     let (metrics, _) = api::metrics().split_for_parts();
@@ -72,7 +76,7 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))
-        .merge(sessions.route_layer(with_key()))
+        .merge(sessions.route_layer(of_client).route_layer(with_key()))
         .route_layer(from_origin)
         .merge(metrics.route_layer(with_key()))
         .merge(probes)

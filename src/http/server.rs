@@ -1,28 +1,43 @@
 //! Accepting connections, and ending.
 //!
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
+//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a bounded time to end.
 
 use super::auth::access::{Access, AccessError};
 use super::auth::keys::ApiKeys;
+use super::client::Peer;
 use super::config::Config;
 use super::config_validation::ConfigError;
+use super::connection_io::ConnectionIo;
+use super::connections::{Connections, NoRoom};
+use super::forwarded::is_trusted;
+use super::head_problems;
+use super::problems::problem::Problem;
 use super::router::router;
 use super::state::AppState;
 use crate::sessions::Clock;
-use axum::Router;
+use axum::body::Body;
+use axum::{Extension, Router};
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
-use std::io;
+use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
-use std::sync::Arc;
 use std::time::Duration;
-use tokio::net::TcpListener;
-use tokio::sync::{Semaphore, watch};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
 use tokio::time::{interval, sleep, timeout};
+
+/// Most bytes that a connection keeps of what it read, and of what it is to write.
+pub const MAX_BUFFER_BYTES: usize = 64 << 10;
+
+/// How long to wait before looking for room again.
+const RETRY: Duration = Duration::from_millis(100);
 
 /// Why the service could not start.
 #[derive(Debug, thiserror::Error)]
@@ -155,39 +170,78 @@ async fn accept(
     graceful: &GracefulShutdown,
     cut_off: watch::Receiver<()>,
 ) {
-    let connections = Arc::new(Semaphore::new(config.max_connections));
+    let limits = &config.limits;
+    let of_address = limits.client_connections;
+    let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
+    let connections = Connections::new(config.max_connections, of_address);
     let mut builder = http1::Builder::new();
     builder
         .timer(TokioTimer::new())
+        .max_buf_size(MAX_BUFFER_BYTES)
         .header_read_timeout(config.header_timeout);
     loop {
-        let acquired = connections.clone().acquire_owned().await;
-        let permit = acquired.expect("the semaphore is never closed");
-        let stream = match listener.accept().await {
-            Ok((stream, _)) => stream,
+        let (stream, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
             Err(error) => {
                 // Mostly too many open files: wait for connections to end.
                 tracing::warn!(%error, "cannot accept");
-                sleep(Duration::from_millis(100)).await;
+                sleep(RETRY).await;
                 continue;
             }
+        };
+        let is_proxy = is_trusted(peer.ip().to_canonical(), &limits.trusted_proxies);
+        let permit = loop {
+            match connections.enter(peer.ip(), is_proxy) {
+                Err(NoRoom::All) => {
+                    let _ = timeout(RETRY, connections.ended.notified()).await;
+                }
+                other => break other,
+            }
+        };
+        let Ok(permit) = permit else {
+            refuse(stream);
+            continue;
         };
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
-        let service = TowerToHyperService::new(service.clone());
-        let connection = builder.serve_connection(TokioIo::new(stream), service);
+        let activity = permit.activity.clone();
+        let io = ConnectionIo::new(
+            stream,
+            activity.clone(),
+            limits.write_timeout,
+            limits.half_close_timeout,
+        );
+        let service = TowerToHyperService::new(service.clone().layer(Extension(Peer(peer))));
+        let watched = service_fn(move |request: Request<Incoming>| {
+            let activity = activity.clone();
+            let request = request.map(|body| activity.receive(Body::new(body)));
+            let answer = service.call(request);
+            async move { answer.await.map(|answer| activity.answer(answer)) }
+        });
+        let connection = builder.serve_connection(TokioIo::new(io), watched);
         let connection = graceful.watch(connection);
         let mut cut_off = cut_off.clone();
         tokio::spawn(async move {
+            let shed = permit.activity.clone();
             let _permit = permit;
             tokio::select! {
                 result = connection => if let Err(error) = result {
                     tracing::debug!(%error, "connection ended");
                 },
+                () = shed.shed.notified() => tracing::debug!("idle connection closed for another"),
                 _ = cut_off.changed() => tracing::warn!("connection cut off"),
             }
         });
+    }
+}
+
+/// Tells a client that it has too many connections, as far as its system takes that at once.
+fn refuse(stream: TcpStream) {
+    let answer = head_problems::answer_of(&Problem::too_many_connections());
+    if let Ok(mut stream) = stream.into_std() {
+        // It does not wait: the stream is not in blocking mode.
+        let _ = stream.write(&answer);
     }
 }
 

@@ -1,14 +1,12 @@
 //! What all handlers share.
 
 use super::auth::access::Access;
+use super::clients::Clients;
 use super::config::Config;
 use super::idempotency::IdempotencyStore;
 use super::metrics::registry::Metrics;
-use super::problems::problem::Problem;
 use super::saturation::Saturation;
-use crate::sessions::{Admission, Clock, Lease, QueuePermit, Registry, Session};
-use axum::http::HeaderMap;
-use axum::http::header::CONTENT_LENGTH;
+use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
@@ -26,6 +24,10 @@ pub struct Shared {
     pub registry: Registry,
     /// Which requests may work.
     pub admission: Admission,
+    /// The memory of all uploads together.
+    pub uploads: ByteBudget,
+    /// What each client has in use.
+    pub clients: Clients,
     /// Keys and secrets.
     pub access: Access,
     /// What is counted and measured.
@@ -59,13 +61,16 @@ impl AppState {
                 config.session_queue,
                 lease,
                 clock.clone(),
-            ),
+            )
+            .with_memory(config.session_bytes()),
+            admission: Admission::new(config.queue, config.worker_count()),
+            uploads: ByteBudget::new(config.max_upload_bytes),
+            clients: Clients::new(&config),
             access,
             metrics: Metrics::new(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             saturation: Saturation::default(),
             clock,
-            admission: Admission::new(config.queue, config.max_upload_bytes, config.worker_count()),
             draining: AtomicBool::new(false),
             config,
         }))
@@ -79,20 +84,6 @@ impl AppState {
     /// Whether the service was asked to end.
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Acquire)
-    }
-
-    /// Takes a place in the queue for a request, and the bytes of its body from the byte budget.
-    ///
-    /// # Errors
-    /// The queue is full or the byte budget is used up.
-    pub fn enter(&self, headers: &HeaderMap) -> Result<QueuePermit, Problem> {
-        let max = self.config.max_body_bytes;
-        let length = headers
-            .get(CONTENT_LENGTH)
-            .and_then(|length| length.to_str().ok());
-        let length = length.and_then(|length| length.parse::<usize>().ok());
-        let bytes = length.map_or(max, |length| length.min(max));
-        Ok(self.admission.enter(bytes)?)
     }
 
     /// The time.

@@ -11,6 +11,7 @@ use super::target_box::TargetBox;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
+use crate::sessions::WorkMeter;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -105,9 +106,10 @@ pub async fn put(
         files: request.upload.files,
         correction: Some(target.into()),
     };
-    let limits = state.config.frame_limits();
+    let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
-    let correct = move |locked: &mut _| next.advance(locked, &limits, &metrics);
+    let correct =
+        move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter, &metrics);
     let Answered {
         estimates,
         replayed,

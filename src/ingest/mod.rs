@@ -40,6 +40,6 @@ mod stored_luma;
 #[cfg(feature = "turbo")]
 mod turbo;
 
-pub use decode::{decode, recycle};
+pub use decode::{decode, recycle, size};
 pub use error::IngestError;
 pub use limits::Limits;

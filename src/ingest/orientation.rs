@@ -20,6 +20,14 @@ pub(super) fn swaps_sides(orientation: Orientation) -> bool {
     )
 }
 
+/// Width and height once the image is turned.
+pub(super) fn upright((width, height): (u32, u32), orientation: Orientation) -> (u32, u32) {
+    match swaps_sides(orientation) {
+        true => (height, width),
+        false => (width, height),
+    }
+}
+
 /// Turns and mirrors the image of this `size` upright. `size` becomes that of the upright image.
 pub(super) fn apply(luma: Vec<u8>, size: &mut (u32, u32), orientation: Orientation) -> Vec<u8> {
     let stored = GrayImage::from_raw(size.0, size.1, luma).expect("a decoder gives every pixel");

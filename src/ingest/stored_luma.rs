@@ -32,9 +32,7 @@ impl StoredLuma<'_> {
                 &mut size,
                 orientation,
             ));
-            if orientation::swaps_sides(orientation) {
-                source = (source.1, source.0);
-            }
+            source = orientation::upright(source, orientation);
         }
         GrayFrame::from_reduced(source, size, &luma, working)
     }

@@ -3,9 +3,10 @@
 //! In: a [`SessionState`], which is a tracker and the answers to its last request. Out: a [`Session`] in the
 //! [`Registry`], found by its id.
 //!
-//! A request for a session takes these steps: [`Registry::find`] finds it for its owner, [`Session::enter`] takes one of its few
-//! permits, [`Admission::enter`] takes a place in the queue before the workers, [`SessionPermit::lock`] waits for the
-//! session in order of arrival, and [`Admission::run`] works with its state on a worker thread.
+//! A request for a session takes these steps: [`Registry::find`] finds it for its owner, [`Session::enter`] takes one of
+//! its few permits, [`ByteCharge::grow`] charges the bytes of its body as they arrive, [`Admission::enter`] takes a place
+//! in the queue before the workers, [`SessionPermit::lock`] waits for the session in order of arrival, and
+//! [`Admission::run`] works with its state on a worker thread.
 //!
 //! What can go wrong, and what is done about it:
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
@@ -18,8 +19,10 @@
 //!   is checked and bounded: see [`SnapshotError`].
 
 mod admission;
+mod byte_budget;
 mod clock;
 mod expired;
+mod fair_queue;
 mod mac;
 mod owner;
 mod registry;
@@ -27,10 +30,13 @@ mod replay;
 mod session;
 mod snapshot;
 mod state;
+mod work_limit;
 mod workers;
 
-pub use admission::{Admission, QueueFull, QueuePermit, WorkLost};
+pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
+pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
+pub use fair_queue::Lane;
 pub use mac::{MAC_BYTES, MacKeys};
 pub use owner::Owner;
 pub use registry::{NoSession, Registry, TooManySessions};
@@ -39,4 +45,5 @@ pub use session::{
     Lease, LockedSession, Session, SessionBusy, SessionClosed, SessionPermit, short_id,
 };
 pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
-pub use state::SessionState;
+pub use state::{SessionState, StepError};
+pub use work_limit::{Stopped, WorkLimit, WorkMeter};

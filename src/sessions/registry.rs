@@ -1,5 +1,7 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
+use super::admission::Held;
+use super::byte_budget::ByteBudget;
 use super::clock::Clock;
 use super::expired::ExpiredIds;
 use super::owner::Owner;
@@ -36,6 +38,7 @@ pub struct Registry {
     max_requests: usize,
     lease: Lease,
     clock: Clock,
+    memory: ByteBudget,
 }
 
 impl Registry {
@@ -49,7 +52,14 @@ impl Registry {
             max_requests,
             lease,
             clock,
+            memory: ByteBudget::new(usize::MAX),
         }
+    }
+
+    /// The states of all sessions together take at most so many bytes.
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = ByteBudget::new(bytes);
+        self
     }
 
     /// Whether there is room for one more session, after the expired ones have gone.
@@ -66,18 +76,22 @@ impl Registry {
         Ok(())
     }
 
-    /// Adds a session of this owner under a new id.
+    /// Adds a session of this owner under a new id. It keeps `held` until it is freed.
     ///
     /// # Errors
-    /// There is no room.
+    /// There is no room, or no memory for a state with its parameters.
     pub fn insert(
         &self,
         state: SessionState,
         owner: Owner,
+        held: Held,
     ) -> Result<Arc<Session>, TooManySessions> {
         self.check_room()?;
+        let memory = self.memory.hold(state.tracker().params().session_bytes());
+        let memory = memory.ok_or(TooManySessions(self.max_sessions))?;
+        let held: Held = Box::new((held, memory));
         let clock = self.clock.clone();
-        let session = Session::new(state, owner, self.max_requests, self.lease, clock);
+        let session = Session::new(state, owner, held, self.max_requests, self.lease, clock);
         let mut sessions = self.map();
         if sessions.len() >= self.max_sessions {
             return Err(TooManySessions(self.max_sessions));
@@ -181,7 +195,7 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::{Admission, Fingerprint};
+    use crate::sessions::{Admission, Fingerprint, Lane};
     use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
     use std::sync::mpsc;
     use std::time::Duration;
@@ -209,7 +223,9 @@ mod tests {
     fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
         let clock = Clock::default();
         let registry = Arc::new(Registry::new(9, 9, LEASE, clock.clone()));
-        let session = registry.insert(state(), Owner::default()).unwrap();
+        let session = registry
+            .insert(state(), Owner::default(), Box::new(()))
+            .unwrap();
         let (freed, was_free) = mpsc::channel();
         let map = registry.clone();
         let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
@@ -240,15 +256,18 @@ mod tests {
     #[tokio::test]
     async fn a_session_whose_work_panicked_has_ended() {
         let registry = Registry::new(9, 9, LEASE, Clock::default());
-        let session = registry.insert(state(), Owner::default()).unwrap();
+        let session = registry
+            .insert(state(), Owner::default(), Box::new(()))
+            .unwrap();
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
-        let admission = Admission::new(9, 0, 1);
+        let admission = Admission::new(9, 1);
         let work = move || {
             let _state = locked.state();
             panic!("a test panics in the work");
         };
-        let panicked: Result<(), _> = admission.run(admission.enter(0).unwrap(), work).await;
+        let place = admission.enter(Lane(0), Box::new(())).unwrap();
+        let panicked: Result<(), _> = admission.run(place, work).await;
         assert!(panicked.is_err());
         assert!(waiting.lock().await.is_err(), "those who wait are told");
         let found = registry.find(session.id(), &Owner::default());

@@ -4,6 +4,7 @@
 //! the [`LockedSession`] into the work on a worker thread. The lock is fair: requests are served in the order in which
 //! they asked for it.
 
+use super::admission::Held;
 use super::clock::Clock;
 use super::owner::Owner;
 use super::state::SessionState;
@@ -44,6 +45,8 @@ pub struct Session {
     /// The permits that are free. Each request at this session has one, the one at work included.
     permits: Arc<Semaphore>,
     max_requests: usize,
+    /// The place of the session in its client's quota.
+    _held: Held,
     /// The last answer, to be read without waiting for the lock.
     latest: Mutex<Estimate>,
     clock: Clock,
@@ -78,6 +81,7 @@ impl Session {
     pub(super) fn new(
         state: SessionState,
         owner: Owner,
+        held: Held,
         max_requests: usize,
         lease: Lease,
         clock: Clock,
@@ -92,6 +96,7 @@ impl Session {
             state: Arc::new(AsyncMutex::new(state)),
             permits: Arc::new(Semaphore::new(max_requests)),
             max_requests,
+            _held: held,
             clock,
             idle: lease.idle,
             expires_ms: AtomicU64::new(milliseconds(first)),

@@ -2,6 +2,7 @@
 
 use super::caller::Caller;
 use super::token;
+use crate::http::client::Client;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
@@ -20,6 +21,10 @@ pub async fn authenticate(
 ) -> Response {
     match caller(&state, request.headers()) {
         Some(caller) => {
+            // Who has a key shares its quotas, wherever the requests come from.
+            if let Some(name) = caller.owner().name() {
+                request.extensions_mut().insert(Client::Key(name.into()));
+            }
             request.extensions_mut().insert(caller);
             next.run(request).await
         }

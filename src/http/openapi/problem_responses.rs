@@ -32,6 +32,7 @@ pub const UPLOAD: &[Kind] = &[
     Kind::TooManyFrames,
     Kind::UnsupportedImage,
     Kind::FrameDamaged,
+    Kind::QuotaExceeded,
     Kind::QueueFull,
     Kind::WorkTimeout,
     Kind::Internal,
@@ -106,6 +107,9 @@ fn example(kind: Kind) -> Problem {
             expected: 4,
         }),
         Kind::BodyTooLarge => Problem::body_too_large(33_554_432),
+        Kind::UriTooLong => Problem::uri_too_long(),
+        Kind::HeadTooLarge => Problem::head_too_large(),
+        Kind::RequestTooCostly => Problem::too_many_pixels(500_000_000, 160_000_000),
         Kind::FrameTooLarge => {
             let limit = "a side of 9000 px is over the limit of 8192 px".to_owned();
             IngestError::TooLarge(limit).into()
@@ -128,6 +132,7 @@ fn example(kind: Kind) -> Problem {
         }
         Kind::InvalidSnapshot => SnapshotError::Damaged.into(),
         Kind::SessionBusy => SessionBusy.into(),
+        Kind::QuotaExceeded => Problem::quota_exceeded("requests in flight", 64),
         Kind::Internal => Problem::panicked(),
         Kind::QueueFull => QueueFull.into(),
         Kind::TooManySessions => TooManySessions(1024).into(),

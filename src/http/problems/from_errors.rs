@@ -4,8 +4,8 @@ use super::kind::Kind;
 use super::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
-    NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions,
-    WorkLost,
+    BytesFull, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
+    Stopped, TooManySessions, WorkLost,
 };
 use crate::tracker::TrackerError;
 use std::sync::Arc;
@@ -76,11 +76,40 @@ impl From<QueueFull> for Problem {
     }
 }
 
+impl From<BytesFull> for Problem {
+    fn from(full: BytesFull) -> Self {
+        match full {
+            BytesFull::All => QueueFull.into(),
+            BytesFull::Client => {
+                let detail = "The bodies of this client's requests take as much memory as one client's may. Try again \
+                    after the time in `Retry-After`. Nothing was changed.";
+                Self::new(Kind::QuotaExceeded, detail)
+            }
+        }
+    }
+}
+
 impl From<TooManySessions> for Problem {
     fn from(_: TooManySessions) -> Self {
         let detail =
             "Delete sessions that have ended, or try again after the time in `Retry-After`.";
         Self::new(Kind::TooManySessions, detail)
+    }
+}
+
+impl From<Stopped> for Problem {
+    fn from(stopped: Stopped) -> Self {
+        match stopped {
+            Stopped::Cost(limit) => {
+                let detail = format!(
+                    "The frames of this request took more than {limit:?} of processor time. Send fewer or smaller \
+                     frames in a request. None of them was tracked."
+                );
+                Self::new(Kind::RequestTooCostly, detail)
+            }
+            // Nobody reads the answer to work that was abandoned.
+            Stopped::Deadline | Stopped::Abandoned => Self::work_timeout(),
+        }
     }
 }
 

@@ -19,6 +19,7 @@ pub enum Kind {
     FrameOutOfOrder,
     SessionExpired,
     BodyTooLarge,
+    RequestTooCostly,
     FrameTooLarge,
     TooManyFrames,
     UnsupportedImage,
@@ -30,7 +31,10 @@ pub enum Kind {
     InvalidParameter,
     InvalidSnapshot,
     IdempotencyKeyReused,
+    UriTooLong,
+    HeadTooLarge,
     SessionBusy,
+    QuotaExceeded,
     Internal,
     QueueFull,
     TooManySessions,
@@ -62,7 +66,9 @@ impl Kind {
     /// Seconds after which trying again makes sense, where it does.
     pub fn retry_after(self) -> Option<u32> {
         match self {
-            Self::SessionBusy | Self::QueueFull | Self::WorkTimeout => Some(1),
+            Self::SessionBusy | Self::QuotaExceeded | Self::QueueFull | Self::WorkTimeout => {
+                Some(1)
+            }
             Self::NotReady => Some(5),
             Self::TooManySessions => Some(10),
             _ => None,
@@ -85,6 +91,7 @@ impl Kind {
             Self::FrameOutOfOrder => (409, "frame-out-of-order", "The frame number is out of order"),
             Self::SessionExpired => (410, "session-expired", "The session has expired"),
             Self::BodyTooLarge => (413, "body-too-large", "The body is too large"),
+            Self::RequestTooCostly => (413, "request-too-costly", "The frames of the request cost too much together"),
             Self::FrameTooLarge => (413, "frame-too-large", "The frame is too large"),
             Self::TooManyFrames => (413, "too-many-frames", "There are too many frames in the request"),
             Self::UnsupportedImage => (415, "unsupported-image", "The frame is not a JPEG, PNG or WebP image"),
@@ -96,7 +103,10 @@ impl Kind {
             Self::InvalidParameter => (422, "invalid-parameter", "A parameter cannot be used"),
             Self::InvalidSnapshot => (422, "invalid-snapshot", "The snapshot cannot be restored"),
             Self::IdempotencyKeyReused => (422, "idempotency-key-reused", "The idempotency key was used for another request"),
+            Self::UriTooLong => (414, "uri-too-long", "The path and query are too long"),
+            Self::HeadTooLarge => (431, "head-too-large", "The head of the request is too large"),
             Self::SessionBusy => (429, "session-busy", "Too many requests wait for this session"),
+            Self::QuotaExceeded => (429, "quota-exceeded", "The client has used up its share"),
             Self::Internal => (500, "internal", "The service failed"),
             Self::QueueFull => (503, "queue-full", "The service is busy"),
             Self::TooManySessions => (503, "too-many-sessions", "The service holds as many sessions as it may"),

@@ -4,6 +4,7 @@ use super::kind::Kind;
 use axum::response::{IntoResponse, Response};
 use std::error::Error;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What went wrong with a request.
 #[derive(Debug, Clone)]
@@ -14,6 +15,8 @@ pub struct Problem {
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     index: Option<usize>,
+    /// When trying again makes sense, where it is known better than by the kind.
+    retry_after: Option<Duration>,
     /// The cause, for the log only.
     cause: Option<Arc<dyn Error + Send + Sync>>,
 }
@@ -25,6 +28,7 @@ impl Problem {
             detail: detail.into(),
             expected_frame: None,
             index: None,
+            retry_after: None,
             cause: None,
         }
     }
@@ -109,6 +113,23 @@ impl Problem {
         )
     }
 
+    /// The path and query have more bytes than they may.
+    pub fn uri_too_long() -> Self {
+        Self::new(Kind::UriTooLong, "Send settings in the body.")
+    }
+
+    /// The head has more bytes or lines than it may.
+    pub fn head_too_large() -> Self {
+        Self::new(Kind::HeadTooLarge, "Send fewer or shorter headers.")
+    }
+
+    /// The address has as many connections as it may, and all of them are busy.
+    pub fn too_many_connections() -> Self {
+        let detail = "This address has as many connections as one may, all of them busy. Use them again, or try again \
+            after the time in `Retry-After`.";
+        Self::new(Kind::QuotaExceeded, detail)
+    }
+
     /// The body did not arrive in time.
     pub fn body_timeout() -> Self {
         let detail = "Send the whole body faster, or a smaller frame. The session is unchanged.";
@@ -120,6 +141,23 @@ impl Problem {
         let detail =
             format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
         Self::new(Kind::BodyTooLarge, detail)
+    }
+
+    /// The frames of the request have more pixels than those of one request may.
+    pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
+        let detail = format!(
+            "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
+             in a request. None of them was tracked."
+        );
+        Self::new(Kind::RequestTooCostly, detail)
+    }
+
+    /// The client has as many of something as one client may have.
+    pub fn quota_exceeded(what: &str, limit: usize) -> Self {
+        let detail = format!(
+            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
+        );
+        Self::new(Kind::QuotaExceeded, detail)
     }
 
     /// The request has more frames than it may.
@@ -188,6 +226,22 @@ impl Problem {
     pub(super) fn expecting_frame(mut self, number: u64) -> Self {
         self.expected_frame = Some(number);
         self
+    }
+
+    /// Says when trying again makes sense.
+    pub fn retry_after(mut self, wait: Duration) -> Self {
+        self.retry_after = Some(wait);
+        self
+    }
+
+    /// Seconds after which trying again makes sense, where it does; at least 1.
+    pub fn retry_seconds(&self) -> Option<u32> {
+        let known = self
+            .retry_after
+            .map(|wait| wait.as_secs_f64().ceil() as u32);
+        known
+            .map(|seconds| seconds.max(1))
+            .or_else(|| self.kind.retry_after())
     }
 
     /// Its kind.

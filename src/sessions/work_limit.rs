@@ -1,0 +1,134 @@
+//! When work on several frames stops early: between two of them.
+//!
+//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Why work was stopped. What it had done was undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Stopped {
+    /// Nobody waits for the answer any more.
+    #[error("the client has gone")]
+    Abandoned,
+    /// The time of the request is over.
+    #[error("the deadline has passed")]
+    Deadline,
+    /// The work took more processor time than a request may; the number is that maximum.
+    #[error("the work took more than {0:?} of processor time")]
+    Cost(Duration),
+}
+
+/// What a request's work may take. Clones share whether it was abandoned.
+#[derive(Debug, Clone)]
+pub struct WorkLimit {
+    deadline: Instant,
+    max_cpu: Duration,
+    abandoned: Arc<AtomicBool>,
+}
+
+impl WorkLimit {
+    /// Until `deadline`, with at most `max_cpu` of processor time.
+    pub fn new(deadline: Instant, max_cpu: Duration) -> Self {
+        Self {
+            deadline,
+            max_cpu,
+            abandoned: Arc::default(),
+        }
+    }
+
+    /// The work counts as abandoned when the returned value is dropped.
+    pub fn abandon_on_drop(&self) -> AbandonOnDrop {
+        AbandonOnDrop(self.abandoned.clone())
+    }
+
+    /// Begins to count this thread's processor time.
+    pub fn start(&self) -> WorkMeter<'_> {
+        WorkMeter {
+            limit: self,
+            started: thread_cpu_time(),
+        }
+    }
+}
+
+/// Marks work as abandoned when it is dropped.
+#[derive(Debug)]
+pub struct AbandonOnDrop(Arc<AtomicBool>);
+
+impl Drop for AbandonOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// Counts what work takes on this thread.
+#[derive(Debug)]
+pub struct WorkMeter<'a> {
+    limit: &'a WorkLimit,
+    started: Duration,
+}
+
+impl WorkMeter<'_> {
+    /// Whether the work may go on.
+    ///
+    /// # Errors
+    /// It may not.
+    pub fn check(&self) -> Result<(), Stopped> {
+        let limit = self.limit;
+        if limit.abandoned.load(Ordering::Acquire) {
+            return Err(Stopped::Abandoned);
+        }
+        if Instant::now() >= limit.deadline {
+            return Err(Stopped::Deadline);
+        }
+        if thread_cpu_time().saturating_sub(self.started) > limit.max_cpu {
+            return Err(Stopped::Cost(limit.max_cpu));
+        }
+        Ok(())
+    }
+}
+
+/// Processor time of this thread since some fixed moment.
+#[cfg(unix)]
+fn thread_cpu_time() -> Duration {
+    use rustix::time::{ClockId, clock_gettime};
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    let nanoseconds = u32::try_from(time.tv_nsec).unwrap_or(0);
+    Duration::new(seconds, nanoseconds)
+}
+
+/// Elsewhere the time of day stands in for it.
+#[cfg(not(unix))]
+fn thread_cpu_time() -> Duration {
+    use std::sync::OnceLock;
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LONG: Duration = Duration::from_secs(600);
+
+    #[test]
+    fn each_limit_stops_the_work() {
+        let soon = || Instant::now() + LONG;
+        let limit = WorkLimit::new(soon(), LONG);
+        let client = limit.abandon_on_drop();
+        assert_eq!(limit.start().check(), Ok(()));
+        drop(client);
+        assert_eq!(limit.start().check(), Err(Stopped::Abandoned));
+        let late = WorkLimit::new(Instant::now(), LONG);
+        assert_eq!(late.start().check(), Err(Stopped::Deadline));
+        let limit = WorkLimit::new(soon(), Duration::from_micros(10));
+        let meter = limit.start();
+        let mut checked = meter.check();
+        while checked.is_ok() {
+            checked = meter.check();
+        }
+        assert_eq!(checked, Err(Stopped::Cost(Duration::from_micros(10))));
+    }
+}
