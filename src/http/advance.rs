@@ -37,7 +37,7 @@ impl NextFrames {
         &self,
         locked: &mut LockedSession,
         limits: &RequestLimits,
-        meter: &WorkMeter,
+        meter: &mut WorkMeter,
     ) -> Result<Answered, Problem> {
         let fingerprints: Vec<Fingerprint> = self
             .files
@@ -128,7 +128,7 @@ pub struct RequestLimits {
 pub fn decode(
     files: &[Bytes],
     limits: &Limits,
-    meter: &WorkMeter,
+    meter: &mut WorkMeter,
 ) -> Result<Vec<GrayFrame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {
         meter.check()?;

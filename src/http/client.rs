@@ -1,6 +1,8 @@
 //! Who a request comes from, as far as quotas and turns go.
 
 use super::forwarded::address;
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
 use super::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::request::Parts;
@@ -9,9 +11,13 @@ use axum::response::Response;
 use ipnet::Ipv6Net;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Bits of an IPv6 address that a provider gives to one customer (RFC 6177).
 const IPV6_PREFIX: u8 = 64;
+
+/// How long an answer that refuses a client for its quota is held back.
+const REFUSAL_DELAY: Duration = Duration::from_millis(250);
 
 /// The address at the other end of the connection.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +65,11 @@ pub async fn identify(State(state): State<AppState>, mut request: Request, next:
     let has_quotas = request.uri().path().starts_with("/sessions");
     let client = request.extensions().get::<Client>().cloned();
     let mut response = next.run(request).await;
+    let problem = response.extensions().get::<Problem>();
+    if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
+        // Whoever does not wait before it asks again costs the network threads time.
+        tokio::time::sleep(REFUSAL_DELAY).await;
+    }
     if let (true, Some(client)) = (has_quotas, client) {
         state.clients.write_headers(&client, response.headers_mut());
     }

@@ -198,7 +198,7 @@ async fn start(
     let params = settings.params.unwrap_or_default();
     let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
-    let start = move |meter: &WorkMeter| {
+    let start = move |meter: &mut WorkMeter| {
         let frame = &advance::decode(&upload.files, &limits, meter)?[0];
         let tracker = Tracker::new(frame, target, params)?;
         let fingerprint = Fingerprint::of(&upload.files[0]);
@@ -216,6 +216,6 @@ async fn restore(
         let detail = "A snapshot holds the box and the parameters; leave out all settings.";
         return Err(Problem::malformed(detail));
     }
-    let restore = move |_: &WorkMeter| Ok(SessionState::restore(&upload.files[0])?);
+    let restore = move |_: &mut WorkMeter| Ok(SessionState::restore(&upload.files[0])?);
     work::run(state, queue, restore).await
 }

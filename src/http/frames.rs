@@ -94,7 +94,7 @@ pub async fn post(
         correction: None,
     };
     let limits = state.config.request_limits();
-    let advance = move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter);
+    let advance = move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter);
     let Answered {
         estimates,
         replayed,

@@ -37,7 +37,8 @@ impl MemoryBound {
             + WORKER;
         Self {
             uploads: count(config.max_upload_bytes),
-            work: count(config.worker_count()) * (worker + images),
+            // As many threads as workers may wait between two frames.
+            work: count(config.worker_count()) * (worker + WORKER + 2 * images),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * (2 * count(MAX_BUFFER_BYTES) + CONNECTION),
         }

@@ -71,7 +71,7 @@ pub async fn get(
     let mut charge = ByteCharge::new(&state.uploads, client.bytes());
     let queue = state.admission.enter(client.lane(), Box::new(client))?;
     let permit = session.enter()?;
-    let take = |locked: &mut LockedSession, _: &WorkMeter| Ok(locked.state().snapshot());
+    let take = |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot());
     let bytes = work::on_session(&state, permit, queue, take).await?;
     // The bytes stay in memory until the client has taken them.
     charge.grow(bytes.len())?;

@@ -105,7 +105,7 @@ pub async fn put(
         correction: Some(target.into()),
     };
     let limits = state.config.request_limits();
-    let correct = move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter);
+    let correct = move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter);
     let Answered {
         estimates,
         replayed,

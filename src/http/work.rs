@@ -13,11 +13,13 @@ use tokio::time::timeout;
 pub async fn run<T, F>(state: &AppState, queue: QueuePermit, work: F) -> Result<T, Problem>
 where
     T: Send + 'static,
-    F: FnOnce(&WorkMeter) -> Result<T, Problem> + Send + 'static,
+    F: FnOnce(&mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
     let limit = limit(state);
     let _client = limit.abandon_on_drop();
-    let work = state.admission.run(queue, move || work(&limit.start()));
+    let work = state
+        .admission
+        .run(queue, move |turn| work(&mut limit.start(turn)));
     timeout(state.config.work_timeout, work)
         .await
         .map_err(|_| Problem::work_timeout())??
@@ -32,7 +34,7 @@ pub async fn on_session<T, F>(
 ) -> Result<T, Problem>
 where
     T: Send + 'static,
-    F: FnOnce(&mut LockedSession, &WorkMeter) -> Result<T, Problem> + Send + 'static,
+    F: FnOnce(&mut LockedSession, &mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
     let limit = limit(state);
     let _client = limit.abandon_on_drop();
@@ -40,7 +42,7 @@ where
         let mut locked = permit.lock().await?;
         state
             .admission
-            .run(queue, move || work(&mut locked, &limit.start()))
+            .run(queue, move |turn| work(&mut locked, &mut limit.start(turn)))
             .await?
     };
     timeout(state.config.work_timeout, waiting)

@@ -32,7 +32,7 @@ mod workers;
 pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
 pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
-pub use fair_queue::Lane;
+pub use fair_queue::{Lane, Turn};
 pub use registry::{Registry, TooManySessions};
 pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
 pub use session::{LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
