@@ -37,6 +37,15 @@ pub fn frames() -> Outcome<Vec<Vec<u8>>> {
     Ok(pictures::jpegs(1)?)
 }
 
+/// The box of the target in the first of them.
+pub fn target_box() -> String {
+    let target = pictures::target(1);
+    format!(
+        "{},{},{},{}",
+        target.x, target.y, target.width, target.height
+    )
+}
+
 impl GoodClients {
     /// So many of them, each with a session.
     pub async fn start(target: &Target, count: u8) -> Outcome<Self> {

@@ -1,7 +1,7 @@
 //! A client that closes its side after a whole request gets its answer; one that then is gone holds nothing.
 
-use crate::good::frames;
-use crate::target::{BOX, Target};
+use crate::good::{frames, target_box};
+use crate::target::Target;
 use crate::{Options, Outcome, Verdict, raw};
 use std::time::Duration;
 use tokio::io::AsyncWriteExt;
@@ -11,7 +11,8 @@ pub const SETTINGS: &[&str] = &[];
 pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
     let frame = &frames()?[0];
     let head = format!(
-        "POST /sessions?box={BOX} HTTP/1.1\r\nHost: x\r\nContent-Length: {}\r\n\r\n",
+        "POST /sessions?box={} HTTP/1.1\r\nHost: x\r\nContent-Length: {}\r\n\r\n",
+        target_box(),
         frame.len()
     );
     let mut stream = raw::send(target.address, [head.as_bytes(), frame].concat()).await?;

@@ -51,6 +51,7 @@ impl Verdict {
     }
 }
 
+/// What to attack, and for how long.
 #[derive(Debug, Parser)]
 pub struct Options {
     /// Each attack for some seconds, with shorter time limits of the server.

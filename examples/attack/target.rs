@@ -1,14 +1,12 @@
 //! The server that is attacked.
 
+use crate::good::target_box;
 use crate::{Options, Outcome};
 use reqwest::{Client, RequestBuilder};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-
-/// A box in the frames that are sent.
-pub const BOX: &str = "120,80,60,60";
 
 /// A server.
 pub struct Target {
@@ -98,7 +96,7 @@ impl Target {
 
     /// Opens a session of this client; gives its path.
     pub async fn open(&self, client: &str, frame: &[u8], query: &str) -> Outcome<String> {
-        let request = self.post(client, &format!("/sessions?box={BOX}{query}"));
+        let request = self.post(client, &format!("/sessions?box={}{query}", target_box()));
         let answer = request.body(frame.to_vec()).send().await?;
         let status = answer.status();
         let path = answer.headers().get("location").cloned();
@@ -106,12 +104,19 @@ impl Target {
         Ok(path.to_str()?.to_owned())
     }
 
-    /// Whether `/healthz` answers, and after how long.
+    /// Whether `/healthz` answers, and after how long. A connection that was idle may be closed while it is used again;
+    /// then another one is tried.
     pub async fn health(&self) -> Outcome<Duration> {
         let sent = std::time::Instant::now();
-        let answer = self.http.get(format!("{}/healthz", self.url)).send();
-        answer.await?.error_for_status()?;
-        Ok(sent.elapsed())
+        let mut tries = 0;
+        loop {
+            let answer = self.http.get(format!("{}/healthz", self.url)).send().await;
+            tries += 1;
+            if answer.is_ok() || tries == 5 {
+                answer?.error_for_status()?;
+                return Ok(sent.elapsed());
+            }
+        }
     }
 
     /// A value of `/proc/PID/status` in bytes, of a server of this program's own.

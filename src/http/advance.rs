@@ -6,7 +6,6 @@ use crate::ingest::{self, Limits};
 use crate::sessions::{Fingerprint, LockedSession, ReplayDecision, StepError, WorkMeter};
 use crate::tracker::{Estimate, GrayFrame, Rect, TrackerError};
 use axum::body::Bytes;
-use std::time::Instant;
 
 /// The next frames of a session, as they were received.
 #[derive(Debug)]
@@ -39,7 +38,7 @@ impl NextFrames {
         &self,
         locked: &mut LockedSession,
         limits: &RequestLimits,
-        meter: &WorkMeter,
+        meter: &mut WorkMeter,
         metrics: &TrackingMetrics,
     ) -> Result<Answered, Problem> {
         let fingerprints: Vec<Fingerprint> = self
@@ -60,7 +59,7 @@ impl NextFrames {
         self.check_sizes(limits, locked.session().source_size())?;
         let decoded = decode(&self.files, &limits.frame, meter, metrics)?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
-        let (before, started) = (locked.session().latest(), Instant::now());
+        let (before, started) = (locked.session().latest(), meter.cpu_time());
         let state = locked.state();
         let estimates = match self.correction {
             Some(target) => {
@@ -72,7 +71,7 @@ impl NextFrames {
             }
             None => state.step(&frames, meter),
         };
-        let took = started.elapsed();
+        let took = meter.cpu_time().saturating_sub(started);
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
@@ -135,7 +134,7 @@ pub struct RequestLimits {
 pub fn decode(
     files: &[Bytes],
     limits: &Limits,
-    meter: &WorkMeter,
+    meter: &mut WorkMeter,
     metrics: &TrackingMetrics,
 ) -> Result<Vec<GrayFrame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {

@@ -2,7 +2,8 @@
 //!
 //! - *A client that takes nothing* of an answer is let go after a time.
 //! - *A client that has closed its side* may still wait for its answer, or have gone: TCP does not tell. It gets some
-//!   time for the answer to a whole request; then it counts as gone, and its request is dropped.
+//!   time for the answer to a whole request; then it counts as gone, and its request is dropped. Whether the request is
+//!   whole shows when its handler has read the body, for which there is a moment.
 //! - *hyper's own answers* to heads that it cannot read get a problem document.
 
 use super::activity::Activity;
@@ -14,16 +15,19 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
-use tokio::time::{Sleep, sleep};
+use tokio::time::{Instant, Sleep, sleep_until};
 use tokio_io_timeout::TimeoutStream;
+
+/// Time for a handler to read the body that has come.
+const READING: Duration = Duration::from_millis(500);
 
 /// The stream of a connection.
 pub struct ConnectionIo {
     stream: Pin<Box<TimeoutStream<TcpStream>>>,
     activity: Arc<Activity>,
     half_close_timeout: Duration,
-    /// Set when the client has closed its side: until then it is still answered.
-    half_closed: Option<Pin<Box<Sleep>>>,
+    /// Set when the client has closed its side: since when, and what wakes the connection.
+    half_closed: Option<(Instant, Pin<Box<Sleep>>)>,
     /// What is written in place of an answer of hyper's own, and how much of it is written.
     document: Vec<u8>,
     written: usize,
@@ -86,11 +90,18 @@ impl AsyncRead for ConnectionIo {
         let before = buffer.filled().len();
         ready!(self.stream.as_mut().poll_read(cx, buffer))?;
         let is_closed = buffer.filled().len() == before && buffer.remaining() > 0;
-        if is_closed && self.activity.is_answering() {
-            let timeout = self.half_close_timeout;
-            let gone = self
-                .half_closed
-                .get_or_insert_with(|| Box::pin(sleep(timeout)));
+        if is_closed && self.activity.idle_since().is_none() {
+            let patience = match self.activity.is_answering() {
+                true => self.half_close_timeout,
+                false => self.half_close_timeout.min(READING),
+            };
+            let (since, gone) = self.half_closed.get_or_insert_with(|| {
+                let now = Instant::now();
+                (now, Box::pin(sleep_until(now)))
+            });
+            if gone.deadline() != *since + patience {
+                gone.as_mut().reset(*since + patience);
+            }
             ready!(gone.as_mut().poll(cx));
         }
         Poll::Ready(Ok(()))

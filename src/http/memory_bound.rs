@@ -1,8 +1,9 @@
 //! How much memory the service takes at most, by its settings.
 
 use super::config::Config;
-use super::server::MAX_BUFFER_BYTES;
 
+/// Most bytes that a connection keeps of what it read, and of what it is to write.
+pub const MAX_BUFFER_BYTES: usize = 64 << 10;
 /// The program, its tables, the log's queue, and what the allocator keeps for itself.
 const PROGRAM: u64 = 96 << 20;
 /// What a worker keeps from frame to frame: buffers of the decoder and the tracker's workspace.
@@ -25,6 +26,13 @@ pub struct MemoryBound {
     pub connections: u64,
 }
 
+impl Config {
+    /// What the service takes in memory at most.
+    pub fn memory_bound(&self) -> MemoryBound {
+        MemoryBound::of(self)
+    }
+}
+
 impl MemoryBound {
     /// Of a service with these settings.
     pub fn of(config: &Config) -> Self {
@@ -37,7 +45,8 @@ impl MemoryBound {
             + WORKER;
         Self {
             uploads: count(config.max_upload_bytes),
-            work: count(config.worker_count()) * (worker + images),
+            // As many threads as workers may wait between two frames.
+            work: count(config.worker_count()) * (worker + WORKER + 2 * images),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * (2 * count(MAX_BUFFER_BYTES) + CONNECTION),
         }

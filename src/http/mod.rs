@@ -46,6 +46,7 @@ mod head_problems;
 mod health;
 mod host;
 mod idempotency;
+mod identify;
 mod limits_config;
 mod memory_bound;
 mod metrics;

@@ -124,7 +124,7 @@ async fn start(
     let params = params.resolve(preset, settings.seed.map(|seed| seed.0))?;
     let limits = state.config.frame_limits();
     let metrics = state.metrics.tracking.clone();
-    let start = move |meter: &WorkMeter| {
+    let start = move |meter: &mut WorkMeter| {
         let frame = &advance::decode(&upload.files, &limits, meter, &metrics)?[0];
         let tracker = Tracker::new(frame, target, params)?;
         let fingerprint = Fingerprint::of(&upload.files[0]);
@@ -144,6 +144,6 @@ async fn restore(
     }
     let (keys, max_recent) = (state.access.snapshots.clone(), state.config.max_frames);
     let restore =
-        move |_: &WorkMeter| Ok(SessionState::restore(&upload.files[0], &keys, max_recent)?);
+        move |_: &mut WorkMeter| Ok(SessionState::restore(&upload.files[0], &keys, max_recent)?);
     work::run(state, queue, restore).await
 }

@@ -12,6 +12,7 @@ use super::connection_io::ConnectionIo;
 use super::connections::{Connections, NoRoom};
 use super::forwarded::is_trusted;
 use super::head_problems;
+use super::memory_bound::MAX_BUFFER_BYTES;
 use super::problems::problem::Problem;
 use super::router::router;
 use super::state::AppState;
@@ -32,9 +33,6 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::time::{interval, sleep, timeout};
-
-/// Most bytes that a connection keeps of what it read, and of what it is to write.
-pub const MAX_BUFFER_BYTES: usize = 64 << 10;
 
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);

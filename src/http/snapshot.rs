@@ -72,7 +72,8 @@ pub async fn get(
     let queue = state.admission.enter(client.lane(), Box::new(client))?;
     let permit = session.visit()?;
     let keys = state.access.snapshots.clone();
-    let take = move |locked: &mut LockedSession, _: &WorkMeter| Ok(locked.state().snapshot(&keys));
+    let take =
+        move |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot(&keys));
     let bytes = work::on_session(&state, permit, queue, take).await?;
     // The bytes stay in memory until the client has taken them.
     charge.grow(bytes.len())?;

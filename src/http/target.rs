@@ -109,7 +109,7 @@ pub async fn put(
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
     let correct =
-        move |locked: &mut _, meter: &WorkMeter| next.advance(locked, &limits, meter, &metrics);
+        move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
     let Answered {
         estimates,
         replayed,

@@ -13,16 +13,16 @@ use tokio::time::timeout;
 pub async fn run<T, F>(state: &AppState, queue: QueuePermit, work: F) -> Result<T, Problem>
 where
     T: Send + 'static,
-    F: FnOnce(&WorkMeter) -> Result<T, Problem> + Send + 'static,
+    F: FnOnce(&mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
     let limit = limit(state);
     let _client = limit.abandon_on_drop();
     let (asked, waited) = (Instant::now(), state.metrics.queue_wait.clone());
-    let work = move || {
+    let work = state.admission.run(queue, move |turn| {
         waited.record(asked.elapsed().as_secs_f64());
-        work(&limit.start())
-    };
-    timeout(state.config.work_timeout, state.admission.run(queue, work))
+        work(&mut limit.start(turn))
+    });
+    timeout(state.config.work_timeout, work)
         .await
         .map_err(|_| Problem::work_timeout())??
 }
@@ -36,7 +36,7 @@ pub async fn on_session<T, F>(
 ) -> Result<T, Problem>
 where
     T: Send + 'static,
-    F: FnOnce(&mut LockedSession, &WorkMeter) -> Result<T, Problem> + Send + 'static,
+    F: FnOnce(&mut LockedSession, &mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
     let limit = limit(state);
     let _client = limit.abandon_on_drop();
@@ -45,9 +45,9 @@ where
         let mut locked = permit.lock().await?;
         state
             .admission
-            .run(queue, move || {
+            .run(queue, move |turn| {
                 waited.record(asked.elapsed().as_secs_f64());
-                work(&mut locked, &limit.start())
+                work(&mut locked, &mut limit.start(turn))
             })
             .await?
     };

@@ -5,7 +5,7 @@
 //! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
 //! has ended, and never more threads work than there are workers.
 
-use super::fair_queue::{FairQueue, Lane};
+use super::fair_queue::{FairQueue, Lane, Turn};
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -60,7 +60,8 @@ impl Admission {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
             workers: FairQueue::new(workers),
-            threads: Arc::new(Workers::new(workers)),
+            // As many again may wait between two frames.
+            threads: Arc::new(Workers::new(2 * workers)),
         }
     }
 
@@ -88,7 +89,7 @@ impl Admission {
         })
     }
 
-    /// Waits for a worker and runs `work` on its thread. If the future is dropped before a worker
+    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is dropped before a worker
     /// is free, the work is not done; afterwards it runs to its end and keeps its permits.
     ///
     /// # Errors
@@ -96,15 +97,15 @@ impl Admission {
     pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
     where
         T: Send + 'static,
-        F: FnOnce() -> T + Send + 'static,
+        F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
         let turn = self.workers.acquire(queue.lane).await;
-        let permits = (queue, turn);
+        let mut permits = (queue, turn);
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         self.threads.start(Box::new(move || {
             // A panic drops `work`, so no half-changed value is read.
-            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut permits.1))));
             drop(permits);
             // It cannot be sent when the client has gone.
             let _ = send.send(outcome);
@@ -154,7 +155,7 @@ mod tests {
         let request = tokio::spawn({
             let admission = admission.clone();
             async move {
-                let work = move || {
+                let work = move |_: &mut Turn| {
                     started_tx.send(()).unwrap();
                     finish_rx.recv().unwrap();
                 };
@@ -178,7 +179,7 @@ mod tests {
         let here = std::thread::current().id();
         for _ in 0..20 {
             let queue = enter(&admission).unwrap();
-            let there = admission.run(queue, || std::thread::current().id());
+            let there = admission.run(queue, |_| std::thread::current().id());
             assert_ne!(there.await.unwrap(), here);
         }
         assert_eq!((admission.queue_places(), admission.free_workers()), (9, 2));
@@ -188,7 +189,7 @@ mod tests {
     async fn a_panic_is_an_error_and_frees_the_permits() {
         let admission = Admission::new(1, 1);
         let queue = enter(&admission).unwrap();
-        let result = admission.run(queue, || panic!("a test panics")).await;
+        let result = admission.run(queue, |_| panic!("a test panics")).await;
         let panicked: Result<(), WorkLost> = result;
         assert_eq!(
             panicked,

@@ -3,6 +3,9 @@
 //! This is start-time fair queueing (Goyal, Vin, Cheng 1996) with measured instead of announced lengths: a client's
 //! requests wait in a lane of their own, in order of arrival, and each lane counts the time that its work took. A lane
 //! that was empty starts at the time of the lane served last, so that waiting saves up no claims.
+//!
+//! Work on many frames gives its worker up between two of them when another lane has the better claim. Its thread waits
+//! meanwhile, so there are more threads than workers.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,6 +26,9 @@ pub(super) struct FairQueue(Arc<Mutex<State>>);
 #[derive(Debug)]
 struct State {
     free: usize,
+    /// Requests that gave their worker up between two frames, and how many may.
+    stepped_back: usize,
+    max_stepped_back: usize,
     /// Time used by the lane that was served last, when it was served.
     now: Duration,
     lanes: HashMap<Lane, Waiting>,
@@ -37,7 +43,7 @@ struct Waiting {
 
 /// A worker, given back when this is dropped.
 #[derive(Debug)]
-pub(super) struct Turn {
+pub struct Turn {
     /// None once the worker was handed on.
     queue: Option<FairQueue>,
     lane: Lane,
@@ -49,6 +55,8 @@ impl FairQueue {
     pub(super) fn new(workers: usize) -> Self {
         Self(Arc::new(Mutex::new(State {
             free: workers,
+            stepped_back: 0,
+            max_stepped_back: workers,
             now: Duration::ZERO,
             lanes: HashMap::new(),
         })))
@@ -82,6 +90,26 @@ impl FairQueue {
     /// Workers that are free.
     pub(super) fn free(&self) -> usize {
         self.lock().free
+    }
+
+    /// Gives the worker of `lane` to a lane with a better claim, if there is one. Returns what gets a worker again.
+    fn step_back(&self, lane: Lane, time: Duration) -> Option<oneshot::Receiver<Turn>> {
+        let given = {
+            let mut state = self.lock();
+            let own = state.lanes.get(&lane)?;
+            let claim = (own.running - 1, own.used + time);
+            let mut waiting = state.lanes.values().filter(|w| !w.requests.is_empty());
+            let has_better = waiting.any(|w| (w.running, w.used) < claim);
+            if !has_better || state.stepped_back >= state.max_stepped_back {
+                return None;
+            }
+            state.stepped_back += 1;
+            let (give, given) = oneshot::channel();
+            state.lanes.get_mut(&lane)?.requests.push_front(give);
+            given
+        };
+        self.hand_on(lane, time);
+        Some(given)
     }
 
     fn turn(&self, lane: Lane) -> Turn {
@@ -150,6 +178,24 @@ impl State {
     }
 }
 
+impl Turn {
+    /// Lets a request of another lane go first, where that has the better claim. Blocks this thread until there is a
+    /// worker again; it must not be one that runs tasks.
+    pub(super) fn step_back(&mut self) {
+        let Some(queue) = self.queue.clone() else {
+            return;
+        };
+        let Some(given) = queue.step_back(self.lane, self.started.elapsed()) else {
+            return;
+        };
+        // Its worker was handed on.
+        self.queue = None;
+        let turn = given.blocking_recv();
+        queue.lock().stepped_back -= 1;
+        *self = turn.expect("every lane with requests is served in the end");
+    }
+}
+
 impl Drop for Turn {
     fn drop(&mut self) {
         if let Some(queue) = self.queue.take() {
@@ -195,6 +241,35 @@ mod tests {
         }
         assert_eq!(served[0], 2, "{served:?}");
         assert_eq!(queue.free(), 1);
+    }
+
+    #[tokio::test]
+    async fn work_on_many_frames_lets_others_go_between_two_of_them() {
+        let queue = FairQueue::new(1);
+        let mut long = queue.acquire(Lane(1)).await;
+        // Nobody waits.
+        long.step_back();
+        assert_eq!(queue.free(), 0);
+        let (done, order) = std::sync::mpsc::channel();
+        let short = tokio::spawn({
+            let (queue, done) = (queue.clone(), done.clone());
+            async move {
+                let turn = queue.acquire(Lane(2)).await;
+                done.send("short").unwrap();
+                drop(turn);
+            }
+        });
+        while !queue.lock().lanes.contains_key(&Lane(2)) {
+            tokio::task::yield_now().await;
+        }
+        let frames = tokio::task::spawn_blocking(move || {
+            long.step_back();
+            done.send("long").unwrap();
+        });
+        short.await.unwrap();
+        frames.await.unwrap();
+        assert_eq!(order.iter().collect::<Vec<_>>(), ["short", "long"]);
+        assert_eq!((queue.free(), queue.lock().stepped_back), (1, 0));
     }
 
     #[tokio::test]

@@ -36,7 +36,7 @@ mod workers;
 pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
 pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
-pub use fair_queue::Lane;
+pub use fair_queue::{Lane, Turn};
 pub use mac::{MAC_BYTES, MacKeys};
 pub use owner::Owner;
 pub use registry::{NoSession, Registry, TooManySessions};

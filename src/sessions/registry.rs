@@ -195,7 +195,7 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::{Admission, Fingerprint, Lane};
+    use crate::sessions::{Admission, Fingerprint, Lane, Turn};
     use crate::tracker::{GrayFrame, Preset, Rect, Tracker};
     use std::sync::mpsc;
     use std::time::Duration;
@@ -262,7 +262,7 @@ mod tests {
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
         let admission = Admission::new(9, 1);
-        let work = move || {
+        let work = move |_: &mut Turn| {
             let _state = locked.state();
             panic!("a test panics in the work");
         };

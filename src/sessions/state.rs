@@ -91,7 +91,7 @@ impl SessionState {
     pub fn step(
         &mut self,
         frames: &[(Fingerprint, GrayFrame)],
-        meter: &WorkMeter,
+        meter: &mut WorkMeter,
     ) -> Result<Vec<Estimate>, StepError> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());

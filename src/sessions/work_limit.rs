@@ -1,7 +1,9 @@
 //! When work on several frames stops early: between two of them.
 //!
-//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on.
+//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
+//! it also lets other clients' requests go first.
 
+use super::fair_queue::Turn;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -43,10 +45,11 @@ impl WorkLimit {
         AbandonOnDrop(self.abandoned.clone())
     }
 
-    /// Begins to count this thread's processor time.
-    pub fn start(&self) -> WorkMeter<'_> {
+    /// Begins to count this thread's processor time, while the work has this turn.
+    pub fn start<'a>(&'a self, turn: &'a mut Turn) -> WorkMeter<'a> {
         WorkMeter {
             limit: self,
+            turn,
             started: thread_cpu_time(),
         }
     }
@@ -66,23 +69,30 @@ impl Drop for AbandonOnDrop {
 #[derive(Debug)]
 pub struct WorkMeter<'a> {
     limit: &'a WorkLimit,
+    turn: &'a mut Turn,
     started: Duration,
 }
 
 impl WorkMeter<'_> {
-    /// Whether the work may go on.
+    /// Processor time that the work has taken.
+    pub fn cpu_time(&self) -> Duration {
+        thread_cpu_time().saturating_sub(self.started)
+    }
+
+    /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.
     ///
     /// # Errors
     /// It may not.
-    pub fn check(&self) -> Result<(), Stopped> {
+    pub fn check(&mut self) -> Result<(), Stopped> {
         let limit = self.limit;
+        self.turn.step_back();
         if limit.abandoned.load(Ordering::Acquire) {
             return Err(Stopped::Abandoned);
         }
         if Instant::now() >= limit.deadline {
             return Err(Stopped::Deadline);
         }
-        if thread_cpu_time().saturating_sub(self.started) > limit.max_cpu {
+        if self.cpu_time() > limit.max_cpu {
             return Err(Stopped::Cost(limit.max_cpu));
         }
         Ok(())
@@ -109,22 +119,24 @@ fn thread_cpu_time() -> Duration {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fair_queue::{FairQueue, Lane};
     use super::*;
 
     const LONG: Duration = Duration::from_secs(600);
 
-    #[test]
-    fn each_limit_stops_the_work() {
+    #[tokio::test]
+    async fn each_limit_stops_the_work() {
+        let mut turn = FairQueue::new(1).acquire(Lane(0)).await;
         let soon = || Instant::now() + LONG;
         let limit = WorkLimit::new(soon(), LONG);
         let client = limit.abandon_on_drop();
-        assert_eq!(limit.start().check(), Ok(()));
+        assert_eq!(limit.start(&mut turn).check(), Ok(()));
         drop(client);
-        assert_eq!(limit.start().check(), Err(Stopped::Abandoned));
+        assert_eq!(limit.start(&mut turn).check(), Err(Stopped::Abandoned));
         let late = WorkLimit::new(Instant::now(), LONG);
-        assert_eq!(late.start().check(), Err(Stopped::Deadline));
+        assert_eq!(late.start(&mut turn).check(), Err(Stopped::Deadline));
         let limit = WorkLimit::new(soon(), Duration::from_micros(10));
-        let meter = limit.start();
+        let mut meter = limit.start(&mut turn);
         let mut checked = meter.check();
         while checked.is_ok() {
             checked = meter.check();

@@ -31,7 +31,7 @@ impl TrackingMetrics {
             decode: make.seconds("bagtrack_frame_decode_seconds", "Time to decode a frame."),
             step: make.seconds(
                 "bagtrack_frame_step_seconds",
-                "Time to track through a frame.",
+                "Processor time to track through a frame.",
             ),
             tracking: frames("tracking"),
             uncertain: frames("uncertain"),
@@ -52,7 +52,7 @@ impl TrackingMetrics {
         result
     }
 
-    /// Frames were tracked, in this time together. `before` is the answer to the frame before them.
+    /// Frames were tracked, with this processor time together. `before` is the answer to the frame before them.
     pub fn tracked(&self, before: Estimate, answers: &[Estimate], time: Duration) {
         if answers.is_empty() {
             return;

@@ -77,7 +77,7 @@ impl<S: Settings> Upload<S> {
         let held = Box::new((charge, permit.clone()));
         let queue = state.admission.enter(lane, held)?;
         if let Some(bytes) = json {
-            let parse = move |_: &WorkMeter| {
+            let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;
                 Ok(fields)
             };
