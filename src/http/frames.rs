@@ -93,12 +93,13 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
     };
+    let queue = request.queue.for_frames(next.files.len());
     let limits = state.config.request_limits();
     let advance = move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter);
     let Answered {
         estimates,
         replayed,
-    } = work::on_session(&state, request.permit, request.queue, advance).await?;
+    } = work::on_session(&state, request.permit, queue, advance).await?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))
 }
