@@ -2,7 +2,7 @@
 
 use super::log::{Log, LogFormat};
 use super::open_files;
-use bagtrack::http::{Application, Config};
+use bagtrack::http::{Application, Config, MemoryBound};
 use std::error::Error;
 
 /// Flags of `serve`.
@@ -31,7 +31,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 
 async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
-    let bound = config.memory_bound();
+    let bound = MemoryBound::of(&config);
     let application = Application::bind(config).await?;
     let shutdown = shutdown_signal()?;
     tracing::info!("listening on http://{}", application.local_addr()?);

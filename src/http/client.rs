@@ -1,23 +1,12 @@
 //! Who a request comes from, as far as quotas and turns go.
 
-use super::forwarded::address;
-use super::problems::kind::Kind;
-use super::problems::problem::Problem;
-use super::state::AppState;
-use axum::extract::{Request, State};
 use axum::http::request::Parts;
-use axum::middleware::Next;
-use axum::response::Response;
 use ipnet::Ipv6Net;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Bits of an IPv6 address that a provider gives to one customer (RFC 6177).
 const IPV6_PREFIX: u8 = 64;
-
-/// How long an answer that refuses a client for its quota is held back.
-const REFUSAL_DELAY: Duration = Duration::from_millis(250);
 
 /// The address at the other end of the connection.
 #[derive(Debug, Clone, Copy)]
@@ -46,34 +35,11 @@ impl Client {
         Self::Address(address)
     }
 
-    /// The client of a request that has passed [`identify`].
+    /// The client of a request that has passed [`identify`](super::identify::identify).
     pub fn of(parts: &Parts) -> Self {
         let client = parts.extensions.get::<Self>().cloned();
         client.unwrap_or_else(|| Self::at(Ipv4Addr::UNSPECIFIED.into()))
     }
-}
-
-/// Middleware: notes the client of a request that has none yet, and tells the client what is left of its quotas.
-pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
-    if request.extensions().get::<Client>().is_none() {
-        let peer = request.extensions().get::<Peer>();
-        let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
-        let trusted = &state.config.limits.trusted_proxies;
-        let client = Client::at(address(peer, request.headers(), trusted));
-        request.extensions_mut().insert(client);
-    }
-    let has_quotas = request.uri().path().starts_with("/sessions");
-    let client = request.extensions().get::<Client>().cloned();
-    let mut response = next.run(request).await;
-    let problem = response.extensions().get::<Problem>();
-    if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
-        // Whoever does not wait before it asks again costs the network threads time.
-        tokio::time::sleep(REFUSAL_DELAY).await;
-    }
-    if let (true, Some(client)) = (has_quotas, client) {
-        state.clients.write_headers(&client, response.headers_mut());
-    }
-    response
 }
 
 #[cfg(test)]

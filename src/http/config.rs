@@ -3,7 +3,6 @@
 
 use super::advance::RequestLimits;
 use super::limits_config::LimitsConfig;
-use super::memory_bound::MemoryBound;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -199,11 +198,6 @@ impl Config {
     pub fn session_bytes(&self) -> usize {
         let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
         self.limits.max_session_bytes.unwrap_or(default)
-    }
-
-    /// What the service takes in memory at most.
-    pub fn memory_bound(&self) -> MemoryBound {
-        MemoryBound::of(self)
     }
 
     /// The limits of one request.

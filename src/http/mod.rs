@@ -38,6 +38,7 @@ mod frames;
 mod head_problems;
 mod health;
 mod host;
+mod identify;
 mod limits_config;
 mod memory_bound;
 mod openapi;

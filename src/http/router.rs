@@ -2,9 +2,9 @@
 
 use super::answer_problems::{answer_problems, panic_response};
 use super::api::api;
-use super::client::identify;
 use super::drain::drain_refused;
 use super::host::one_host;
+use super::identify::identify;
 use super::problems::problem::Problem;
 use super::request_id::{self, REQUEST_ID, remove_unusable_id};
 use super::state::AppState;
