@@ -6,7 +6,7 @@
 use super::log::{Log, LogFormat};
 use super::open_files;
 use super::signals::{self, Signals};
-use bagtrack::http::{Application, Config};
+use bagtrack::http::{Application, Config, MemoryBound};
 use std::error::Error;
 
 /// Flags of `serve`.
@@ -37,7 +37,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 
 async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
-    let bound = config.memory_bound();
+    let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let application = Application::bind(config).await?;
     let keys = application.api_keys();

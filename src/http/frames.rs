@@ -95,6 +95,7 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
     };
+    let queue = request.queue.for_frames(next.files.len());
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
     let advance =
@@ -102,7 +103,7 @@ pub async fn post(
     let Answered {
         estimates,
         replayed,
-    } = work::on_session(&state, request.permit, request.queue, advance).await?;
+    } = work::on_session(&state, request.permit, queue, advance).await?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))
 }

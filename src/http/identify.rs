@@ -1,4 +1,4 @@
-//! Finds out which client a request comes from, where the layer that authenticates has not.
+//! Notes which client a request is from, and tells the client what is left of its quotas.
 
 use super::client::{Client, Peer};
 use super::forwarded::address;
@@ -14,7 +14,7 @@ use std::time::Duration;
 /// How long an answer that refuses a client for its quota is held back.
 const REFUSAL_DELAY: Duration = Duration::from_millis(250);
 
-/// Middleware: notes the client of a request that has none yet, and tells the client what is left of its quotas.
+/// The middleware. A request that has its client already keeps it.
 pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
     if request.extensions().get::<Client>().is_none() {
         let peer = request.extensions().get::<Peer>();

@@ -26,13 +26,6 @@ pub struct MemoryBound {
     pub connections: u64,
 }
 
-impl Config {
-    /// What the service takes in memory at most.
-    pub fn memory_bound(&self) -> MemoryBound {
-        MemoryBound::of(self)
-    }
-}
-
 impl MemoryBound {
     /// Of a service with these settings.
     pub fn of(config: &Config) -> Self {

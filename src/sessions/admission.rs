@@ -5,7 +5,8 @@
 //! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
 //! has ended, and never more threads work than there are workers.
 
-use super::fair_queue::{FairQueue, Lane, Turn};
+use super::fair_queue::{FairQueue, Turn};
+use super::lanes::{Lane, Length};
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -43,7 +44,19 @@ pub type Held = Box<dyn Any + Send + Sync>;
 #[derive(Debug, Clone)]
 pub struct QueuePermit {
     lane: Lane,
+    length: Length,
     _held: Arc<(OwnedSemaphorePermit, Held)>,
+}
+
+impl QueuePermit {
+    /// For work on so many frames, which gives way to shorter work between two of them.
+    pub fn for_frames(mut self, count: usize) -> Self {
+        self.length = match count {
+            0 | 1 => Length::Short,
+            _ => Length::Long,
+        };
+        self
+    }
 }
 
 /// A queue before the workers. Clones share both.
@@ -85,6 +98,7 @@ impl Admission {
         let place = place.map_err(|_| QueueFull)?;
         Ok(QueuePermit {
             lane,
+            length: Length::Short,
             _held: Arc::new((place, held)),
         })
     }
@@ -99,7 +113,7 @@ impl Admission {
         T: Send + 'static,
         F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
-        let turn = self.workers.acquire(queue.lane).await;
+        let turn = self.workers.acquire(queue.lane, queue.length).await;
         let mut permits = (queue, turn);
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
@@ -169,7 +183,7 @@ mod tests {
         assert!(request.await.unwrap_err().is_cancelled());
         assert_eq!((admission.queue_places(), admission.free_workers()), (0, 0));
         finish.send(()).unwrap();
-        drop(admission.workers.acquire(Lane(0)).await);
+        drop(admission.workers.acquire(Lane(0), Length::Short).await);
         assert_eq!(admission.free_workers(), 1);
     }
 

@@ -4,42 +4,20 @@
 //! requests wait in a lane of their own, in order of arrival, and each lane counts the time that its work took. A lane
 //! that was empty starts at the time of the lane served last, so that waiting saves up no claims.
 //!
-//! Work on many frames gives its worker up between two of them when another lane has the better claim. Its thread waits
-//! meanwhile, so there are more threads than workers.
+//! Work on several frames gives its worker up between two of them when another lane has the better claim. Its thread
+//! waits meanwhile, so there are more threads than workers, and only as much such work is begun as there are workers.
 
-use std::collections::{HashMap, VecDeque};
+use super::lanes::{Lane, Lanes, Length};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
-/// Lanes above which those without work and without debt are forgotten.
-const MAX_IDLE_LANES: usize = 1024;
-
-/// Whose requests wait for each other only.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Lane(pub u64);
+/// Gives a request its worker.
+type Give = oneshot::Sender<Turn>;
 
 /// The queue. Clones are the same one.
 #[derive(Debug, Clone)]
-pub(super) struct FairQueue(Arc<Mutex<State>>);
-
-#[derive(Debug)]
-struct State {
-    free: usize,
-    /// Requests that gave their worker up between two frames, and how many may.
-    stepped_back: usize,
-    max_stepped_back: usize,
-    /// Time used by the lane that was served last, when it was served.
-    now: Duration,
-    lanes: HashMap<Lane, Waiting>,
-}
-
-#[derive(Debug, Default)]
-struct Waiting {
-    used: Duration,
-    running: usize,
-    requests: VecDeque<oneshot::Sender<Turn>>,
-}
+pub(super) struct FairQueue(Arc<Mutex<Lanes<Give>>>);
 
 /// A worker, given back when this is dropped.
 #[derive(Debug)]
@@ -47,23 +25,18 @@ pub struct Turn {
     /// None once the worker was handed on.
     queue: Option<FairQueue>,
     lane: Lane,
+    length: Length,
     started: Instant,
 }
 
 impl FairQueue {
     /// For so many workers.
     pub(super) fn new(workers: usize) -> Self {
-        Self(Arc::new(Mutex::new(State {
-            free: workers,
-            stepped_back: 0,
-            max_stepped_back: workers,
-            now: Duration::ZERO,
-            lanes: HashMap::new(),
-        })))
+        Self(Arc::new(Mutex::new(Lanes::new(workers))))
     }
 
     /// Waits for a worker. Dropping the future gives up the place.
-    pub(super) async fn acquire(&self, lane: Lane) -> Turn {
+    pub(super) async fn acquire(&self, lane: Lane, length: Length) -> Turn {
         let given = {
             let mut state = self.lock();
             state.forget_idle_lanes();
@@ -72,14 +45,14 @@ impl FairQueue {
             if waiting.requests.is_empty() && waiting.running == 0 {
                 waiting.used = waiting.used.max(now);
             }
-            if state.free > 0 {
+            if state.free > 0 && state.may_begin(length) {
                 state.free -= 1;
-                state.serve(lane);
-                return self.turn(lane);
+                state.serve(lane, length);
+                return self.turn(lane, length);
             }
             let (give, given) = oneshot::channel();
             let waiting = state.lanes.entry(lane).or_default();
-            waiting.requests.push_back(give);
+            waiting.requests.push_back((length, give));
             given
         };
         given
@@ -98,35 +71,37 @@ impl FairQueue {
             let mut state = self.lock();
             let own = state.lanes.get(&lane)?;
             let claim = (own.running - 1, own.used + time);
-            let mut waiting = state.lanes.values().filter(|w| !w.requests.is_empty());
-            let has_better = waiting.any(|w| (w.running, w.used) < claim);
-            if !has_better || state.stepped_back >= state.max_stepped_back {
+            let mut waiting = state.lanes.values().filter(|w| state.is_next(w));
+            if !waiting.any(|w| (w.running, w.used) < claim) {
                 return None;
             }
-            state.stepped_back += 1;
             let (give, given) = oneshot::channel();
-            state.lanes.get_mut(&lane)?.requests.push_front(give);
+            let own = state.lanes.get_mut(&lane)?;
+            own.requests.push_front((Length::Begun, give));
             given
         };
-        self.hand_on(lane, time);
+        self.hand_on(lane, time, false);
         Some(given)
     }
 
-    fn turn(&self, lane: Lane) -> Turn {
+    fn turn(&self, lane: Lane, length: Length) -> Turn {
         Turn {
             queue: Some(self.clone()),
             lane,
+            length,
             started: Instant::now(),
         }
     }
 
-    /// Counts the time that `lane` had a worker for, and gives that worker to the next request.
-    fn hand_on(&self, lane: Lane, time: Duration) {
-        let mut ended = Some((lane, time));
+    /// Counts the time that `lane` had a worker for, and gives that worker to the next request. `ends` says whether work
+    /// on several frames has ended.
+    fn hand_on(&self, lane: Lane, time: Duration, ends: bool) {
+        let mut ended = Some((lane, time, ends));
         loop {
-            let (lane, give) = {
+            let (lane, length, give) = {
                 let mut state = self.lock();
-                if let Some((lane, time)) = ended.take() {
+                if let Some((lane, time, ends)) = ended.take() {
+                    state.long -= usize::from(ends);
                     let waiting = state.lanes.entry(lane).or_default();
                     waiting.used += time;
                     waiting.running -= 1;
@@ -139,42 +114,18 @@ impl FairQueue {
                     }
                 }
             };
-            let Err(mut refused) = give.send(self.turn(lane)) else {
+            let Err(mut refused) = give.send(self.turn(lane, length)) else {
                 return;
             };
             // Its client has gone. The worker is still to be given away.
             refused.queue = None;
-            ended = Some((lane, Duration::ZERO));
+            ended = Some((lane, Duration::ZERO, length != Length::Short));
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, Lanes<Give>> {
         // Nothing panics while it is held.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl State {
-    fn next(&mut self) -> Option<(Lane, oneshot::Sender<Turn>)> {
-        let waiting = self.lanes.iter().filter(|(_, w)| !w.requests.is_empty());
-        let lane = *waiting.min_by_key(|(_, w)| (w.running, w.used))?.0;
-        let give = self.lanes.get_mut(&lane)?.requests.pop_front()?;
-        self.serve(lane);
-        Some((lane, give))
-    }
-
-    fn serve(&mut self, lane: Lane) {
-        let waiting = self.lanes.entry(lane).or_default();
-        waiting.running += 1;
-        self.now = self.now.max(waiting.used);
-    }
-
-    fn forget_idle_lanes(&mut self) {
-        if self.lanes.len() > MAX_IDLE_LANES {
-            let now = self.now;
-            self.lanes
-                .retain(|_, w| w.running > 0 || !w.requests.is_empty() || w.used > now);
-        }
     }
 }
 
@@ -182,7 +133,8 @@ impl Turn {
     /// Lets a request of another lane go first, where that has the better claim. Blocks this thread until there is a
     /// worker again; it must not be one that runs tasks.
     pub(super) fn step_back(&mut self) {
-        let Some(queue) = self.queue.clone() else {
+        // Work on one frame ends sooner than it would come back.
+        let (Some(queue), Length::Long | Length::Begun) = (self.queue.clone(), self.length) else {
             return;
         };
         let Some(given) = queue.step_back(self.lane, self.started.elapsed()) else {
@@ -191,7 +143,6 @@ impl Turn {
         // Its worker was handed on.
         self.queue = None;
         let turn = given.blocking_recv();
-        queue.lock().stepped_back -= 1;
         *self = turn.expect("every lane with requests is served in the end");
     }
 }
@@ -199,7 +150,8 @@ impl Turn {
 impl Drop for Turn {
     fn drop(&mut self) {
         if let Some(queue) = self.queue.take() {
-            queue.hand_on(self.lane, self.started.elapsed());
+            let ends = self.length != Length::Short;
+            queue.hand_on(self.lane, self.started.elapsed(), ends);
         }
     }
 }
@@ -211,12 +163,12 @@ mod tests {
     #[tokio::test]
     async fn a_client_with_one_request_does_not_wait_behind_all_of_another() {
         let queue = FairQueue::new(1);
-        let first = queue.acquire(Lane(1)).await;
+        let first = queue.acquire(Lane(1), Length::Short).await;
         let (done, mut order) = tokio::sync::mpsc::unbounded_channel();
         let ask = |lane: u64| {
             let (queue, done) = (queue.clone(), done.clone());
             tokio::spawn(async move {
-                let turn = queue.acquire(Lane(lane)).await;
+                let turn = queue.acquire(Lane(lane), Length::Short).await;
                 done.send(lane).unwrap();
                 drop(turn);
             })
@@ -246,7 +198,7 @@ mod tests {
     #[tokio::test]
     async fn work_on_many_frames_lets_others_go_between_two_of_them() {
         let queue = FairQueue::new(1);
-        let mut long = queue.acquire(Lane(1)).await;
+        let mut long = queue.acquire(Lane(1), Length::Long).await;
         // Nobody waits.
         long.step_back();
         assert_eq!(queue.free(), 0);
@@ -254,7 +206,7 @@ mod tests {
         let short = tokio::spawn({
             let (queue, done) = (queue.clone(), done.clone());
             async move {
-                let turn = queue.acquire(Lane(2)).await;
+                let turn = queue.acquire(Lane(2), Length::Short).await;
                 done.send("short").unwrap();
                 drop(turn);
             }
@@ -269,16 +221,34 @@ mod tests {
         short.await.unwrap();
         frames.await.unwrap();
         assert_eq!(order.iter().collect::<Vec<_>>(), ["short", "long"]);
-        assert_eq!((queue.free(), queue.lock().stepped_back), (1, 0));
+        assert_eq!((queue.free(), queue.lock().long), (1, 0));
+    }
+
+    #[tokio::test]
+    async fn work_on_one_frame_keeps_its_worker() {
+        let queue = FairQueue::new(1);
+        let mut short = queue.acquire(Lane(1), Length::Short).await;
+        let other = tokio::spawn({
+            let queue = queue.clone();
+            async move { drop(queue.acquire(Lane(2), Length::Long).await) }
+        });
+        while !queue.lock().lanes.contains_key(&Lane(2)) {
+            tokio::task::yield_now().await;
+        }
+        // It would wait for ever for the other, which runs on this thread.
+        short.step_back();
+        drop(short);
+        other.await.unwrap();
+        assert_eq!((queue.free(), queue.lock().long), (1, 0));
     }
 
     #[tokio::test]
     async fn requests_whose_clients_have_gone_lose_no_worker() {
         let queue = FairQueue::new(1);
-        let turn = queue.acquire(Lane(1)).await;
+        let turn = queue.acquire(Lane(1), Length::Short).await;
         let gone = tokio::spawn({
             let queue = queue.clone();
-            async move { queue.acquire(Lane(2)).await }
+            async move { queue.acquire(Lane(2), Length::Short).await }
         });
         while !queue.lock().lanes.contains_key(&Lane(2)) {
             tokio::task::yield_now().await;
@@ -287,7 +257,7 @@ mod tests {
         assert!(gone.await.unwrap_err().is_cancelled());
         drop(turn);
         assert_eq!(queue.free(), 1);
-        drop(queue.acquire(Lane(2)).await);
+        drop(queue.acquire(Lane(2), Length::Short).await);
         assert_eq!(queue.free(), 1);
     }
 }

@@ -119,14 +119,15 @@ fn thread_cpu_time() -> Duration {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fair_queue::{FairQueue, Lane};
+    use super::super::fair_queue::FairQueue;
+    use super::super::lanes::{Lane, Length};
     use super::*;
 
     const LONG: Duration = Duration::from_secs(600);
 
     #[tokio::test]
     async fn each_limit_stops_the_work() {
-        let mut turn = FairQueue::new(1).acquire(Lane(0)).await;
+        let mut turn = FairQueue::new(1).acquire(Lane(0), Length::Short).await;
         let soon = || Instant::now() + LONG;
         let limit = WorkLimit::new(soon(), LONG);
         let client = limit.abandon_on_drop();
