@@ -161,3 +161,20 @@ fn the_resolution_follows_the_target() {
     assert_eq!(size(Rect::new(600.0, 400.0, 128.0, 128.0)), (640, 480));
     assert_eq!(size(Rect::new(300.0, 200.0, 640.0, 480.0)), (320, 240));
 }
+
+/// The largest state there is: full resolution, colour, a full bag.
+#[test]
+fn a_session_of_full_resolution_keeps_at_most_256_kib() {
+    let rgb: Vec<u8> = (0..3 * 1280 * 960)
+        .map(|i| ((i % 4999) * (i % 4999) / 97 % 251) as u8)
+        .collect();
+    let frame = Frame::from_rgb(1280, 960, &rgb).expect("a frame of this size");
+    let target = Rect::new(600.0, 400.0, 60.0, 60.0);
+    let mut tracker = Tracker::new(&frame, target, Preset::Robust.params()).expect("a box inside");
+    for _ in 0..60 {
+        tracker.step(&frame).expect("frames of one size");
+    }
+    assert_eq!(tracker.frame_format().size, (1280, 960));
+    let bytes = tracker.snapshot().len();
+    assert!(bytes <= 256 * 1024, "{bytes}");
+}

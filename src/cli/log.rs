@@ -8,7 +8,9 @@ use std::io::{self, BufWriter, IsTerminal};
 use std::panic::PanicHookInfo;
 use std::time::Duration;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{EnvFilter, fmt, registry};
 
 /// Lines that wait to be written. A line has some hundred bytes.
 const MAX_LINES: usize = 4096;
@@ -29,6 +31,9 @@ pub enum LogFormat {
 /// The log. Lines that wait are written when it is dropped, if that takes no longer than a second.
 #[derive(Debug)]
 pub struct Log {
+    /// Dropped before the writer: it may have something to tell.
+    #[cfg(feature = "otel")]
+    _export: Option<super::export::Export>,
     _writer: WorkerGuard,
     dropped: DroppedLines,
 }
@@ -44,7 +49,7 @@ impl Log {
     /// Sends all events that `filter` lets through, and all panics, to standard error.
     ///
     /// # Errors
-    /// The filter cannot be read.
+    /// The filter cannot be read, or the variables of the export.
     pub fn start(filter: &str, format: LogFormat) -> Result<Self, String> {
         let filter = EnvFilter::try_new(filter)
             .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
@@ -55,17 +60,24 @@ impl Log {
             .thread_name("bagtrack-log")
             .finish(stderr);
         let counter = lines.error_counter();
-        let log = tracing_subscriber::fmt()
-            .with_env_filter(filter)
+        let log = fmt::layer()
             .with_ansi(io::stderr().is_terminal())
             .with_writer(lines);
+        let events = registry().with(filter);
+        #[cfg(feature = "otel")]
+        let export = super::export::Export::start()?;
+        #[cfg(feature = "otel")]
+        let events = events.with(export.as_ref().map(super::export::Export::layer));
         match format {
-            LogFormat::Text => log.init(),
-            LogFormat::Json => log.json().init(),
+            LogFormat::Text => events.with(log).init(),
+            // The span of the request is there once, not again in a list of all spans.
+            LogFormat::Json => events.with(log.json().with_span_list(false)).init(),
         }
         // The default hook writes to standard error itself, and would wait for its reader.
         std::panic::set_hook(Box::new(log_panic));
         Ok(Self {
+            #[cfg(feature = "otel")]
+            _export: export,
             _writer: writer,
             dropped: DroppedLines { counter, told: 0 },
         })

@@ -5,13 +5,17 @@
 
 mod draw;
 mod eval;
+#[cfg(feature = "otel")]
+mod export;
 mod health;
 mod log;
+mod open_files;
 mod output;
 mod params;
 mod progress;
 mod sample;
 mod serve;
+mod signals;
 mod track;
 
 use clap::{Parser, Subcommand};
@@ -37,7 +41,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run the HTTP service (the default).
-    Serve(serve::Args),
+    Serve(Box<serve::Args>),
     /// Track through a folder of frames.
     Track(track::Args),
     /// Measure accuracy and speed on annotated sequences.
@@ -50,8 +54,8 @@ enum Command {
 
 /// Runs the command.
 pub fn run(cli: Cli) -> ExitCode {
-    let result = match cli.command.unwrap_or(Command::Serve(cli.serve)) {
-        Command::Serve(args) => serve::run(args),
+    let result = match cli.command.unwrap_or(Command::Serve(Box::new(cli.serve))) {
+        Command::Serve(args) => serve::run(*args),
         Command::Track(args) => track::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Sample(args) => sample::run(args),

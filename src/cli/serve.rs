@@ -1,7 +1,12 @@
 //! `bagtrack serve`: the HTTP service until SIGTERM or SIGINT.
+//!
+//! It ends with status 0 when all open requests have ended in time, and with 1 when some were cut off, or when a second
+//! signal ended it at once.
 
 use super::log::{Log, LogFormat};
-use bagtrack::http::{Application, Config};
+use super::open_files;
+use super::signals::{self, Signals};
+use bagtrack::http::{Application, Config, MemoryBound};
 use std::error::Error;
 
 /// Flags of `serve`.
@@ -24,41 +29,48 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
         .worker_threads(args.config.network_threads())
         .enable_all()
         .build()?;
+    let result = runtime.block_on(serve(args.config, &log));
     // Work that does not end in time does not delay the exit: its threads end with the process.
-    runtime.block_on(serve(args.config, &log))
+    runtime.shutdown_background();
+    result
 }
 
-async fn serve(config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
+    open_files::fit(&mut config);
+    let bound = MemoryBound::of(&config);
+    let (no_auth, listen) = (config.access.no_auth, config.listen);
     let application = Application::bind(config).await?;
-    let shutdown = shutdown_signal()?;
+    let keys = application.api_keys();
+    let mut signals = Signals::listen()?;
+    let (mut first, again) = (signals.clone(), &mut signals);
+    if no_auth && !listen.ip().is_loopback() {
+        tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
+    }
     tracing::info!("listening on http://{}", application.local_addr()?);
+    let mib = |bytes: u64| bytes >> 20;
+    tracing::info!(
+        uploads = mib(bound.uploads),
+        work = mib(bound.work),
+        sessions = mib(bound.sessions),
+        connections = mib(bound.connections),
+        "resident memory stays below {} MiB",
+        mib(bound.total())
+    );
     let reports = tokio::spawn(log.dropped().report_regularly());
-    let ended = application.serve(shutdown).await;
+    let reloads = tokio::spawn(signals::reload_keys(keys));
+    let ended = tokio::select! {
+        ended = application.serve(first.shutdown()) => ended,
+        () = again.second_shutdown() => {
+            tracing::warn!("a second signal: ending at once");
+            false
+        }
+    };
     reports.abort();
+    reloads.abort();
     log.dropped().report();
     tracing::info!(ended, "bye");
-    Ok(())
-}
-
-#[cfg(unix)]
-fn shutdown_signal() -> std::io::Result<impl Future<Output = ()>> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    Ok(async move {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
-    })
-}
-
-#[cfg(not(unix))]
-fn shutdown_signal() -> std::io::Result<impl Future<Output = ()>> {
-    Ok(async {
-        if let Err(error) = tokio::signal::ctrl_c().await {
-            tracing::error!(%error, "cannot wait for ctrl-c; end the process by other means");
-            std::future::pending::<()>().await;
-        }
-    })
+    match ended {
+        true => Ok(()),
+        false => Err("requests were cut off".into()),
+    }
 }

@@ -1,8 +1,9 @@
 //! A session's next frames: decode them, then track through them or take the box that the user gives.
 
+use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
-use crate::sessions::{Fingerprint, LockedSession, ReplayDecision};
+use crate::sessions::{Fingerprint, LockedSession, ReplayDecision, StepError, WorkMeter};
 use crate::tracker::{Estimate, Frame, FrameFormat, Rect, TrackerError};
 use axum::body::Bytes;
 
@@ -27,15 +28,18 @@ pub struct Answered {
 }
 
 impl NextFrames {
-    /// The answers: the stored ones if the request was answered before, else those of the tracker. All frames are
-    /// decoded before the first is tracked.
+    /// The answers: the stored ones if the request was answered before, else those of the tracker. The sizes of all
+    /// frames are checked before the first is decoded, and all are decoded before the first is tracked. Between frames
+    /// `meter` says whether to go on.
     ///
     /// # Errors
-    /// The problem of the first bad frame. The session is unchanged.
+    /// The problem of the first bad frame, or of a request that costs too much. The session is unchanged.
     pub fn advance(
         &self,
         locked: &mut LockedSession,
-        limits: &Limits,
+        limits: &RequestLimits,
+        meter: &mut WorkMeter,
+        metrics: &TrackingMetrics,
     ) -> Result<Answered, Problem> {
         let fingerprints: Vec<Fingerprint> = self
             .files
@@ -52,10 +56,11 @@ impl NextFrames {
                 replayed: true,
             });
         }
+        self.check_sizes(limits, locked.session().source_size())?;
         let format = locked.session().frame_format();
-        let decoded = decode(&self.files, limits, &|_| format)?;
-        self.check_sizes(&decoded, locked.session().source_size())?;
+        let decoded = decode(&self.files, &limits.frame, &|_| format, meter, metrics)?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
+        let (before, started) = (locked.session().latest(), meter.cpu_time());
         let state = locked.state();
         let estimates = match self.correction {
             Some(target) => {
@@ -63,48 +68,81 @@ impl NextFrames {
                 let estimate = state.retarget(*fingerprint, frame, target);
                 estimate
                     .map(|estimate| vec![estimate])
-                    .map_err(|error| (0, error))
+                    .map_err(|error| StepError::Refused { index: 0, error })
             }
-            None => state.step(&frames),
+            None => state.step(&frames, meter),
         };
+        let took = meter.cpu_time().saturating_sub(started);
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
-        let refused = |(index, error)| Problem::from(error).of_frame(index, self.files.len());
+        let refused = |error| match error {
+            StepError::Refused { index, error } => {
+                Problem::from(error).of_frame(index, self.files.len())
+            }
+            StepError::Stopped(stopped) => stopped.into(),
+        };
+        let estimates = estimates.map_err(refused)?;
+        metrics.tracked(before, &estimates, took);
         Ok(Answered {
-            estimates: estimates.map_err(refused)?,
+            estimates,
             replayed: false,
         })
     }
 
-    /// Refuses a frame whose size is not the session's.
-    fn check_sizes(&self, frames: &[Frame], (width, height): (u32, u32)) -> Result<(), Problem> {
-        let mut sizes = frames.iter().map(Frame::source_size);
-        let Some(index) = sizes.position(|size| size != (width, height)) else {
-            return Ok(());
-        };
-        let (got_width, got_height) = frames[index].source_size();
-        let error = TrackerError::FrameSize {
-            width,
-            height,
-            got_width,
-            got_height,
-        };
-        Err(Problem::from(error).of_frame(index, frames.len()))
+    /// Refuses a frame whose size is not the session's, and a request with too many pixels, by their headers alone.
+    fn check_sizes(
+        &self,
+        limits: &RequestLimits,
+        (width, height): (u32, u32),
+    ) -> Result<(), Problem> {
+        let mut pixels = 0;
+        for (index, file) in self.files.iter().enumerate() {
+            let of_frame = |problem: Problem| problem.of_frame(index, self.files.len());
+            let size = ingest::size(file, &limits.frame);
+            let (got_width, got_height) = size.map_err(|error| of_frame(error.into()))?;
+            if (got_width, got_height) != (width, height) {
+                let error = TrackerError::FrameSize {
+                    width,
+                    height,
+                    got_width,
+                    got_height,
+                };
+                return Err(of_frame(error.into()));
+            }
+            pixels += u64::from(width) * u64::from(height);
+        }
+        if self.files.len() > 1 && pixels > limits.max_pixels {
+            return Err(Problem::too_many_pixels(pixels, limits.max_pixels));
+        }
+        Ok(())
     }
 }
 
-/// Decodes all files of a request in the format that `format` says for uploads of a size.
+/// What the frames of one request may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct RequestLimits {
+    /// The limits of each frame.
+    pub frame: Limits,
+    /// Most pixels of several frames together. A single frame has its own limit.
+    pub max_pixels: u64,
+}
+
+/// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says whether to go on.
 ///
 /// # Errors
-/// The problem of the first bad file.
+/// The problem of the first bad file, or that the work was stopped.
 pub fn decode(
     files: &[Bytes],
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
+    meter: &mut WorkMeter,
+    metrics: &TrackingMetrics,
 ) -> Result<Vec<Frame>, Problem> {
     let decode_one = |(index, file): (usize, &Bytes)| {
-        ingest::decode_to(file, limits, format)
+        meter.check()?;
+        metrics
+            .decoding(|| ingest::decode_to(file, limits, format))
             .map_err(|error| Problem::from(error).of_frame(index, files.len()))
     };
     files.iter().enumerate().map(decode_one).collect()

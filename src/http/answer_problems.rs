@@ -3,8 +3,9 @@
 use super::problems::document::respond;
 use super::problems::problem::Problem;
 use super::request_id;
+use super::state::AppState;
 use axum::body::Body;
-use axum::extract::Request;
+use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use axum::http::header::CONTENT_LENGTH;
 use axum::middleware::Next;
@@ -12,12 +13,17 @@ use axum::response::{IntoResponse, Response};
 use std::any::Any;
 
 /// The middleware.
-pub async fn answer_problems(request: Request, next: Next) -> Response {
+pub async fn answer_problems(
+    State(state): State<AppState>,
+    request: Request,
+    next: Next,
+) -> Response {
     let (path, id) = (request.uri().path().to_owned(), request_id::of(&request));
     let mut response = next.run(request).await;
     let Some(problem) = response.extensions_mut().remove::<Problem>() else {
         return response;
     };
+    state.metrics.problem(problem.kind());
     log_problem(&problem);
     let mut written = respond(&problem, path, id);
     // The first response's headers stay: it may have some that the problem does not know, like `Allow`.

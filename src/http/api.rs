@@ -1,9 +1,11 @@
 //! The routes that are in the OpenAPI document, and the document itself, which is generated from their handlers.
 
+use super::metrics::page as metrics_page;
 use super::problems::document::ProblemDocument;
 use super::state::AppState;
-use super::{create, frames, health, session, snapshot, target};
+use super::{create, frames, health, session, snapshot, target, token};
 use utoipa::OpenApi;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -16,29 +18,63 @@ use utoipa_axum::routes;
             A frame is sent as a raw body (the settings are in the query), as `multipart/form-data`, or as JSON \
             with base64. Its type is taken from its bytes: JPEG, PNG or WebP. Boxes are in the pixels of the \
             uploaded frame. Every error is a problem document (RFC 9457) and leaves the session as it was, but for \
-            `work-timeout`, which says what to do. Paths that do not exist answer `route-not-found` (404)."
+            `work-timeout`, which says what to do. Paths that do not exist answer `route-not-found` (404). \
+            Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
+            to hosts that are not allowed `host-not-allowed` (421).\n\n\
+            Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \
+            While the service is about to end, all answers have the header `Draining: true`."
     ),
     tags(
         (name = "sessions", description = "Open a session, send frames, end it"),
         (name = "service", description = "The service itself")
     ),
-    components(schemas(ProblemDocument))
+    components(schemas(ProblemDocument)),
+    modifiers(&Bearer),
+    // A service without keys needs none.
+    security((), ("bearer" = []))
 )]
 struct Api;
 
-/// The routes, with what the document says about them.
-pub fn api() -> OpenApiRouter<AppState> {
-    OpenApiRouter::with_openapi(Api::openapi())
+struct Bearer;
+
+impl utoipa::Modify for Bearer {
+    fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
+        let text = "An API key, or a session token, which is good for one session. Needed where the service has keys.";
+        let scheme = HttpBuilder::new().scheme(HttpAuthScheme::Bearer);
+        let scheme = SecurityScheme::Http(scheme.description(Some(text)).build());
+        let components = document.components.get_or_insert_default();
+        components.add_security_scheme("bearer", scheme);
+    }
+}
+
+/// The routes of sessions, with what the document says about them.
+pub fn sessions() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
         .routes(routes!(create::create))
         .routes(routes!(session::get, session::delete))
         .routes(routes!(frames::post))
         .routes(routes!(target::put))
         .routes(routes!(snapshot::get))
+        .routes(routes!(token::create))
+}
+
+/// `/metrics`.
+pub fn metrics() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(metrics_page::get))
+}
+
+/// The probes, which everybody may use.
+pub fn probes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
         .routes(routes!(health::live))
         .routes(routes!(health::ready))
 }
 
 /// The OpenAPI document.
 pub fn document() -> utoipa::openapi::OpenApi {
-    api().into_openapi()
+    OpenApiRouter::with_openapi(Api::openapi())
+        .merge(sessions())
+        .merge(metrics())
+        .merge(probes())
+        .into_openapi()
 }

@@ -1,10 +1,19 @@
 //! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
 //! environment variable, which only the program reads.
 
+use super::advance::RequestLimits;
+use super::auth::config::AccessConfig;
+use super::limits_config::LimitsConfig;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
+
+#[cfg(feature = "cli")]
+use super::limits_config::shown;
+
+/// What a session with usual parameters is charged at most.
+const USUAL_SESSION_BYTES: usize = 512 << 10;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
 #[derive(Debug, Clone)]
@@ -31,13 +40,20 @@ pub struct Config {
         default_value_t = Config::default().session_queue
     ))]
     pub session_queue: usize,
-    /// A session that is not used for this long expires.
+    /// A session expires when no frame comes for this long.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SESSION_IDLE",
         default_value = shown(Config::default().session_idle),
         value_parser = humantime::parse_duration
     ))]
     pub session_idle: Duration,
+    /// A new session expires when its first frame does not come for this long.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_SESSION_FIRST",
+        default_value = shown(Config::default().session_first),
+        value_parser = humantime::parse_duration
+    ))]
+    pub session_first: Duration,
     /// Most bytes of a request body.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_MAX_BODY_BYTES",
@@ -87,7 +103,7 @@ pub struct Config {
     ))]
     pub max_connections: usize,
     /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
-    /// commas; `*` for all.
+    /// commas; `*` for all. Requests of other pages are refused.
     #[cfg_attr(
         feature = "cli",
         arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')
@@ -114,8 +130,8 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub work_timeout: Duration,
-    /// On SIGTERM, /readyz answers 503 for this long before connections are refused, so that a load
-    /// balancer notices.
+    /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
+    /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SHUTDOWN_DELAY",
         default_value = shown(Config::default().shutdown_delay),
@@ -129,12 +145,12 @@ pub struct Config {
         value_parser = humantime::parse_duration
     ))]
     pub shutdown_timeout: Duration,
-}
-
-/// A duration as flags have it.
-#[cfg(feature = "cli")]
-fn shown(duration: Duration) -> String {
-    humantime::format_duration(duration).to_string()
+    /// What one request and one client may take.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub limits: LimitsConfig,
+    /// Who may use the service.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub access: AccessConfig,
 }
 
 impl Default for Config {
@@ -148,6 +164,7 @@ impl Default for Config {
             max_sessions: 1024,
             session_queue: 8,
             session_idle: Duration::from_secs(600),
+            session_first: Duration::from_secs(60),
             max_body_bytes: 32 << 20,
             max_upload_bytes: 512 << 20,
             max_frames: 64,
@@ -160,8 +177,10 @@ impl Default for Config {
             header_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             work_timeout: Duration::from_secs(30),
-            shutdown_delay: Duration::ZERO,
+            shutdown_delay: Duration::from_secs(5),
             shutdown_timeout: Duration::from_secs(20),
+            limits: LimitsConfig::default(),
+            access: AccessConfig::default(),
         }
     }
 }
@@ -185,6 +204,20 @@ impl Config {
             max_side: self.max_frame_side,
             max_pixels: self.max_frame_pixels,
             max_memory: self.max_frame_memory,
+        }
+    }
+
+    /// Most bytes that the states of all sessions may take together, with its default.
+    pub fn session_bytes(&self) -> usize {
+        let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
+        self.limits.max_session_bytes.unwrap_or(default)
+    }
+
+    /// The limits of one request.
+    pub(super) fn request_limits(&self) -> RequestLimits {
+        RequestLimits {
+            frame: self.frame_limits(),
+            max_pixels: self.limits.max_request_pixels,
         }
     }
 }

@@ -49,6 +49,11 @@ impl Config {
                 moment.contains(&self.session_idle),
                 duration,
             ),
+            (
+                "session-first",
+                moment.contains(&self.session_first),
+                duration,
+            ),
             ("max-body-bytes", self.max_body_bytes >= 1, positive),
             (
                 "max-upload-bytes",
@@ -96,7 +101,12 @@ impl Config {
                 "at most 1 year",
             ),
         ];
-        match checks.into_iter().find(|(_, holds, _)| !holds) {
+        let limits = self.limits.checks(&moment, self.max_body_bytes);
+        match checks
+            .into_iter()
+            .chain(limits)
+            .find(|(_, holds, _)| !holds)
+        {
             None => Ok(()),
             Some((flag, _, expected)) => Err(ConfigError {
                 flag,

@@ -2,11 +2,13 @@
 
 use super::api;
 use super::problems::problem::Problem;
+use super::security_headers::DOCS_POLICY;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::http::header::{CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE};
 use axum::response::{IntoResponse, Redirect, Response};
+use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 use utoipa_swagger_ui::Config;
 
@@ -43,11 +45,17 @@ pub async fn asset(path: Result<Path<String>, PathRejection>) -> Result<Response
 fn file(path: &str) -> Result<Response, Problem> {
     match utoipa_swagger_ui::serve(path, SWAGGER.clone()) {
         Ok(Some(file)) => {
+            // No copy for each answer: a client may leave it unread.
+            let bytes = match file.bytes {
+                Cow::Borrowed(bytes) => Bytes::from_static(bytes),
+                Cow::Owned(bytes) => bytes.into(),
+            };
             let headers = [
                 (CONTENT_TYPE, file.content_type),
                 (CACHE_CONTROL, "max-age=3600".to_owned()),
+                (CONTENT_SECURITY_POLICY, DOCS_POLICY.to_owned()),
             ];
-            Ok((headers, Bytes::from(file.bytes.into_owned())).into_response())
+            Ok((headers, bytes).into_response())
         }
         Ok(None) => Err(Problem::route_not_found()),
         Err(error) => Err(Problem::internal(Arc::new(std::io::Error::other(

@@ -1,9 +1,9 @@
 //! Reads the rest of a body that a handler refused, and throws it away.
 //!
 //! If a server answers and closes while the client still sends, the client's system reports a broken connection, and
-//! the problem document is lost. So when an error is answered before the body was read, the rest is read, within
-//! bounds: at most as many bytes as a body may have, until the deadline of the body. A client that waits for `100
-//! Continue` has sent nothing, and is answered at once.
+//! the problem document is lost. So when an error is answered before the body was read, the rest is read beside the
+//! answer, within bounds: at most as many bytes as a body may have, until the deadline of the body. A client that waits
+//! for `100 Continue` has sent nothing, and nothing is read from it.
 
 use super::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};
@@ -39,7 +39,7 @@ pub async fn drain_refused(
         && !body.is_end_stream()
     {
         let mut rest = Limited::new(body, state.config.max_body_bytes);
-        while let Some(Ok(_)) = rest.frame().await {}
+        tokio::spawn(async move { while let Some(Ok(_)) = rest.frame().await {} });
     }
     response
 }

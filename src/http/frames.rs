@@ -10,6 +10,7 @@ use super::state::AppState;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
+use crate::sessions::WorkMeter;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -40,13 +41,13 @@ impl utoipa::IntoResponses for Problems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
-            Kind::SessionNotFound,
             Kind::FrameOutOfOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
+            Kind::RequestTooCostly,
         ];
-        problem_responses(&[problem_responses::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
     }
 }
 
@@ -77,7 +78,10 @@ impl utoipa::IntoResponses for Problems {
     responses(
         (
             status = 200, description = "Where the target is", body = FrameAnswers,
-            headers(("Replayed" = bool, description = "`true` where these answers were given before"))
+            headers(
+                ("Replayed" = bool, description = "`true` where these answers were given before"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
         ),
         Problems
     )
@@ -91,12 +95,15 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
     };
-    let limits = state.config.frame_limits();
-    let advance = move |locked: &mut _| next.advance(locked, &limits);
+    let queue = request.queue.for_frames(next.files.len());
+    let limits = state.config.request_limits();
+    let metrics = state.metrics.tracking.clone();
+    let advance =
+        move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
     let Answered {
         estimates,
         replayed,
-    } = work::on_session(&state, request.permit, request.queue, advance).await?;
+    } = work::on_session(&state, request.permit, queue, advance).await?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))
 }

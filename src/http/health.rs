@@ -38,7 +38,7 @@ impl utoipa::IntoResponses for ReadyProblems {
 
 /// Whether the process runs
 #[utoipa::path(
-    get, path = "/healthz", tag = "service", operation_id = "getHealth",
+    get, path = "/healthz", tag = "service", operation_id = "getHealth", security(()),
     responses((status = 200, description = "It runs", body = Health), LiveProblems)
 )]
 pub async fn live() -> Json<Health> {
@@ -47,14 +47,19 @@ pub async fn live() -> Json<Health> {
 
 /// Whether the service wants requests
 ///
-/// A load balancer should send none from the moment that this answers 503: the service was asked to end.
+/// A load balancer should send none while this answers 503: the service was asked to end, or its queue is full. A queue
+/// that was full counts as full until half of it is free.
 #[utoipa::path(
-    get, path = "/readyz", tag = "service", operation_id = "getReadiness",
+    get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health), ReadyProblems)
 )]
 pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Problem> {
-    match state.is_draining() {
-        true => Err(Problem::not_ready()),
+    if state.is_draining() {
+        return Err(Problem::not_ready());
+    }
+    let (free, all) = (state.admission.queue_places(), state.config.queue);
+    match state.saturation.update(free, all) {
+        true => Err(Problem::saturated()),
         false => Ok(OK),
     }
 }

@@ -5,8 +5,9 @@
 //! and back.
 //!
 //! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
-//! work than there are cores; a connection breaks after a frame was taken. [`Application`] bounds the first, [`Config`]
-//! names every bound, numbered frames can be sent again, and the cause of an error is in the log only.
+//! work than there are cores; a connection breaks after a frame was taken; a client has no key. [`Application`] bounds
+//! the first, [`Config`] names every bound, numbered frames can be sent again, the room `auth` says who may call, and the
+//! cause of an error is in the log only.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,27 +15,50 @@
 //!
 //! let application = Application::bind(Config::default()).await?;
 //! println!("listening on http://{}", application.local_addr()?);
-//! application.serve(std::future::pending()).await;
+//! application.serve(std::future::pending::<()>()).await;
 //! # Ok(())
 //! # }
 //! ```
 
+mod activity;
 mod advance;
 mod answer;
 mod answer_problems;
 mod api;
+mod auth;
+mod client;
+mod clients;
 mod config;
 mod config_validation;
+mod connection_io;
+mod connections;
+mod cors;
 mod create;
+mod create_request;
 mod docs;
 mod drain;
+mod draining;
+#[cfg(feature = "otel")]
+mod exported_span;
+mod forwarded;
 mod frames;
+mod head_problems;
 mod health;
+mod host;
+mod idempotency;
+mod identify;
+mod limits_config;
+mod memory_bound;
+mod metrics;
 mod openapi;
+mod opening;
 mod page;
 mod problems;
 mod request_id;
+mod request_log;
 mod router;
+mod saturation;
+mod security_headers;
 mod server;
 mod session;
 mod session_path;
@@ -42,12 +66,20 @@ mod snapshot;
 mod state;
 mod target;
 mod target_box;
+mod token;
+mod trace_context;
 mod upload;
 mod work;
 
 pub use api::document as openapi_document;
+pub use auth::access::AccessError;
+pub use auth::config::{AccessConfig, Secret};
+pub use auth::keys::{ApiKeys, KeysError};
+pub use client::Client;
 pub use config::Config;
 pub use config_validation::ConfigError;
+pub use limits_config::LimitsConfig;
+pub use memory_bound::MemoryBound;
 pub use problems::kind::Kind as ProblemKind;
-pub use server::{Application, BindError};
+pub use server::{Application, BindError, Shutdown};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;

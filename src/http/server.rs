@@ -1,26 +1,41 @@
 //! Accepting connections, and ending.
 //!
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are counted, too. On shutdown, busy ones get a bounded time to end.
+//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a bounded time to end.
 
+use super::auth::access::{Access, AccessError};
+use super::auth::keys::ApiKeys;
+use super::client::Peer;
 use super::config::Config;
 use super::config_validation::ConfigError;
+use super::connection_io::ConnectionIo;
+use super::connections::{Connections, NoRoom};
+use super::forwarded::is_trusted;
+use super::head_problems;
+use super::memory_bound::MAX_BUFFER_BYTES;
+use super::problems::problem::Problem;
 use super::router::router;
 use super::state::AppState;
 use crate::sessions::Clock;
-use axum::Router;
+use axum::body::Body;
+use axum::{Extension, Router};
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
-use std::io;
+use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
-use std::sync::Arc;
 use std::time::Duration;
-use tokio::net::TcpListener;
-use tokio::sync::{Semaphore, watch};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
 use tokio::time::{interval, sleep, timeout};
+
+/// How long to wait before looking for room again.
+const RETRY: Duration = Duration::from_millis(100);
 
 /// Why the service could not start.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +43,9 @@ pub enum BindError {
     /// A setting is out of its range.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The keys cannot be used, or the service would be open to a network.
+    #[error(transparent)]
+    Access(#[from] AccessError),
     /// The address cannot be listened on.
     #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
     Listen {
@@ -36,6 +54,21 @@ pub enum BindError {
         /// What the system says.
         source: io::Error,
     },
+}
+
+/// How a service ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shutdown {
+    /// After the configured delay, in which sessions are still served.
+    Gradual,
+    /// Without the delay.
+    Prompt,
+}
+
+impl From<()> for Shutdown {
+    fn from((): ()) -> Self {
+        Self::Gradual
+    }
 }
 
 /// The service, bound to its address.
@@ -62,10 +95,11 @@ impl Application {
     pub async fn bind_with_clock(config: Config, clock: Clock) -> Result<Self, BindError> {
         config.validate()?;
         let address = config.listen;
+        let access = Access::load(&config.access, address)?;
         let listener = TcpListener::bind(address).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
-            state: AppState::new(config, clock),
+            state: AppState::new(config, access, clock),
             extra: Router::new(),
         })
     }
@@ -78,16 +112,21 @@ impl Application {
         self.listener.local_addr()
     }
 
+    /// The API keys, to read them again.
+    pub fn api_keys(&self) -> ApiKeys {
+        self.state.access.keys.clone()
+    }
+
     /// Serves these routes too, behind the same layers.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
     }
 
-    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once. After the configured delay no connection
-    /// is accepted any more, and open requests get the configured time to end; then they are cut off. Returns whether
-    /// all of them ended in time.
-    pub async fn serve(self, shutdown: impl Future<Output = ()>) -> bool {
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
+    /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests get
+    /// the configured time to end; then they are cut off. Returns whether all of them ended in time.
+    pub async fn serve<S: Into<Shutdown>>(self, shutdown: impl Future<Output = S>) -> bool {
         let Self {
             listener,
             state,
@@ -103,11 +142,13 @@ impl Application {
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
-                () = shutdown => {
+                how = shutdown => {
                     tracing::info!("shutting down");
                     state.drain();
                     // New connections are still served: a load balancer asks for /readyz on them.
-                    let _ = timeout(config.shutdown_delay, accepting).await;
+                    if how.into() == Shutdown::Gradual {
+                        let _ = timeout(config.shutdown_delay, accepting).await;
+                    }
                 }
             }
         }
@@ -127,39 +168,78 @@ async fn accept(
     graceful: &GracefulShutdown,
     cut_off: watch::Receiver<()>,
 ) {
-    let connections = Arc::new(Semaphore::new(config.max_connections));
+    let limits = &config.limits;
+    let of_address = limits.client_connections;
+    let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
+    let connections = Connections::new(config.max_connections, of_address);
     let mut builder = http1::Builder::new();
     builder
         .timer(TokioTimer::new())
+        .max_buf_size(MAX_BUFFER_BYTES)
         .header_read_timeout(config.header_timeout);
     loop {
-        let acquired = connections.clone().acquire_owned().await;
-        let permit = acquired.expect("the semaphore is never closed");
-        let stream = match listener.accept().await {
-            Ok((stream, _)) => stream,
+        let (stream, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
             Err(error) => {
                 // Mostly too many open files: wait for connections to end.
                 tracing::warn!(%error, "cannot accept");
-                sleep(Duration::from_millis(100)).await;
+                sleep(RETRY).await;
                 continue;
             }
+        };
+        let is_proxy = is_trusted(peer.ip().to_canonical(), &limits.trusted_proxies);
+        let permit = loop {
+            match connections.enter(peer.ip(), is_proxy) {
+                Err(NoRoom::All) => {
+                    let _ = timeout(RETRY, connections.ended.notified()).await;
+                }
+                other => break other,
+            }
+        };
+        let Ok(permit) = permit else {
+            refuse(stream);
+            continue;
         };
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
-        let service = TowerToHyperService::new(service.clone());
-        let connection = builder.serve_connection(TokioIo::new(stream), service);
+        let activity = permit.activity.clone();
+        let io = ConnectionIo::new(
+            stream,
+            activity.clone(),
+            limits.write_timeout,
+            limits.half_close_timeout,
+        );
+        let service = TowerToHyperService::new(service.clone().layer(Extension(Peer(peer))));
+        let watched = service_fn(move |request: Request<Incoming>| {
+            let activity = activity.clone();
+            let request = request.map(|body| activity.receive(Body::new(body)));
+            let answer = service.call(request);
+            async move { answer.await.map(|answer| activity.answer(answer)) }
+        });
+        let connection = builder.serve_connection(TokioIo::new(io), watched);
         let connection = graceful.watch(connection);
         let mut cut_off = cut_off.clone();
         tokio::spawn(async move {
+            let shed = permit.activity.clone();
             let _permit = permit;
             tokio::select! {
                 result = connection => if let Err(error) = result {
                     tracing::debug!(%error, "connection ended");
                 },
+                () = shed.shed.notified() => tracing::debug!("idle connection closed for another"),
                 _ = cut_off.changed() => tracing::warn!("connection cut off"),
             }
         });
+    }
+}
+
+/// Tells a client that it has too many connections, as far as its system takes that at once.
+fn refuse(stream: TcpStream) {
+    let answer = head_problems::answer_of(&Problem::too_many_connections());
+    if let Ok(mut stream) = stream.into_std() {
+        // It does not wait: the stream is not in blocking mode.
+        let _ = stream.write(&answer);
     }
 }
 
@@ -169,6 +249,8 @@ async fn sweep(state: AppState) {
     loop {
         ticks.tick().await;
         let expired = state.registry.sweep();
+        state.prune();
+        state.metrics.upkeep();
         if expired > 0 {
             tracing::info!(expired, live = state.registry.len(), "sessions expired");
         }

@@ -30,7 +30,7 @@ pub struct SessionView {
     /// The tracker's parameters.
     #[schema(value_type = ParamOverrides)]
     params: Params,
-    /// When the session ends if it is not used again (RFC 3339); this request counts as use.
+    /// When the session ends if no frame comes (RFC 3339); this request does not move it on.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
     expires_at: String,
 }
@@ -40,8 +40,8 @@ struct Problems;
 impl utoipa::IntoResponses for Problems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[Kind::MalformedRequest, Kind::SessionNotFound];
-        problem_responses(&[problem_responses::ALWAYS, own])
+        let own = &[Kind::MalformedRequest];
+        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
     }
 }
 
@@ -88,7 +88,7 @@ pub async fn delete(
     let session = path.find(&state)?;
     match state.registry.remove(session.id()) {
         true => {
-            tracing::info!(session = %session.id(), "deleted");
+            tracing::info!(session = session.short_id(), "deleted");
             Ok(StatusCode::NO_CONTENT)
         }
         false => Err(Problem::session_not_found()),

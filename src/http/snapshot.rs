@@ -1,5 +1,6 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
+use super::client::Client;
 use super::openapi::problem_responses::{self, problem_responses};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
@@ -7,11 +8,17 @@ use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload::texts::refuse_query;
 use super::work;
-use crate::sessions::LockedSession;
+use crate::sessions::{ByteCharge, LockedSession, WorkMeter};
+use axum::Extension;
+use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::State;
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use http_body_util::Full;
+use std::convert::Infallible;
+use std::pin::Pin;
+use std::task::{Context, Poll};
 
 /// The media type of session snapshots.
 pub const MEDIA_TYPE: &str = "application/vnd.bagtrack.snapshot";
@@ -23,19 +30,20 @@ impl utoipa::IntoResponses for Problems {
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
             Kind::MalformedRequest,
-            Kind::SessionNotFound,
             Kind::SessionBusy,
+            Kind::QuotaExceeded,
             Kind::QueueFull,
             Kind::WorkTimeout,
         ];
-        problem_responses(&[problem_responses::ALWAYS, own])
+        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
     }
 }
 
 /// Take a snapshot
 ///
-/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version, to
-/// go on from there under a new id; this session lives on.
+/// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version that has
+/// the same secret (`BAGTRACK_SNAPSHOT_KEYS`), to go on from there under a new id; this session lives on as long as it
+/// would have done.
 ///
 /// `curl -o s.snapshot http://localhost:8080/sessions/$ID/snapshot &&
 /// curl --data-binary @s.snapshot http://other:8080/sessions`
@@ -54,12 +62,50 @@ pub async fn get(
     State(state): State<AppState>,
     path: SessionPath,
     uri: Uri,
+    Extension(client): Extension<Client>,
 ) -> Result<Response, Problem> {
     refuse_query(&uri)?;
     let session = path.find(&state)?;
-    let queue = state.admission.enter(0)?;
-    let permit = session.enter()?;
-    let take = |locked: &mut LockedSession| Ok(locked.state().snapshot());
+    state.admission.check_place()?;
+    let client = state.clients.account(&client).request()?;
+    let mut charge = ByteCharge::new(&state.uploads, client.bytes());
+    let queue = state.admission.enter(client.lane(), Box::new(client))?;
+    let permit = session.visit()?;
+    let keys = state.access.snapshots.clone();
+    let take =
+        move |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot(&keys));
     let bytes = work::on_session(&state, permit, queue, take).await?;
-    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], bytes).into_response())
+    // The bytes stay in memory until the client has taken them.
+    charge.grow(bytes.len())?;
+    let body = ChargedBody {
+        bytes: Full::from(bytes),
+        _charge: charge,
+    };
+    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], Body::new(body)).into_response())
+}
+
+/// An answer with the memory that it is charged to.
+struct ChargedBody {
+    bytes: Full<Bytes>,
+    _charge: ByteCharge,
+}
+
+impl HttpBody for ChargedBody {
+    type Data = Bytes;
+    type Error = Infallible;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<http_body::Frame<Bytes>, Infallible>>> {
+        Pin::new(&mut self.bytes).poll_frame(cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.bytes.is_end_stream()
+    }
+
+    fn size_hint(&self) -> http_body::SizeHint {
+        self.bytes.size_hint()
+    }
 }

@@ -1,12 +1,15 @@
 //! What all handlers share.
 
+use super::auth::access::Access;
+use super::clients::Clients;
 use super::config::Config;
-use super::problems::problem::Problem;
-use crate::sessions::{Admission, Clock, QueuePermit, Registry, Session};
-use axum::http::HeaderMap;
-use axum::http::header::CONTENT_LENGTH;
+use super::idempotency::IdempotencyStore;
+use super::metrics::registry::Metrics;
+use super::saturation::Saturation;
+use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
 
 /// What all handlers share; clones are the same state.
 #[derive(Debug, Clone)]
@@ -21,6 +24,19 @@ pub struct Shared {
     pub registry: Registry,
     /// Which requests may work.
     pub admission: Admission,
+    /// The memory of all uploads together.
+    pub uploads: ByteBudget,
+    /// What each client has in use.
+    pub clients: Clients,
+    /// Keys and secrets.
+    pub access: Access,
+    /// What is counted and measured.
+    pub metrics: Metrics,
+    /// The answers to requests with an idempotency key.
+    pub opened: IdempotencyStore,
+    /// Whether `/readyz` has found the queue full.
+    pub saturation: Saturation,
+    clock: Clock,
     /// Set from the moment that the service was asked to end.
     draining: AtomicBool,
 }
@@ -33,16 +49,28 @@ impl std::ops::Deref for AppState {
 }
 
 impl AppState {
-    /// The state of a service with these settings and this clock.
-    pub fn new(config: Config, clock: Clock) -> Self {
+    /// The state of a service with these settings, keys and this clock.
+    pub fn new(config: Config, access: Access, clock: Clock) -> Self {
+        let lease = Lease {
+            first: config.session_first,
+            idle: config.session_idle,
+        };
         Self(Arc::new(Shared {
             registry: Registry::new(
                 config.max_sessions,
                 config.session_queue,
-                config.session_idle,
-                clock,
-            ),
-            admission: Admission::new(config.queue, config.max_upload_bytes, config.worker_count()),
+                lease,
+                clock.clone(),
+            )
+            .with_memory(config.session_bytes()),
+            admission: Admission::new(config.queue, config.worker_count()),
+            uploads: ByteBudget::new(config.max_upload_bytes),
+            clients: Clients::new(&config),
+            access,
+            metrics: Metrics::new(),
+            opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
+            saturation: Saturation::default(),
+            clock,
             draining: AtomicBool::new(false),
             config,
         }))
@@ -58,18 +86,14 @@ impl AppState {
         self.draining.load(Ordering::Acquire)
     }
 
-    /// Takes a place in the queue for a request, and the bytes of its body from the byte budget.
-    ///
-    /// # Errors
-    /// The queue is full or the byte budget is used up.
-    pub fn enter(&self, headers: &HeaderMap) -> Result<QueuePermit, Problem> {
-        let max = self.config.max_body_bytes;
-        let length = headers
-            .get(CONTENT_LENGTH)
-            .and_then(|length| length.to_str().ok());
-        let length = length.and_then(|length| length.parse::<usize>().ok());
-        let bytes = length.map_or(max, |length| length.min(max));
-        Ok(self.admission.enter(bytes)?)
+    /// The time.
+    pub fn now(&self) -> SystemTime {
+        self.clock.wall(self.clock.now())
+    }
+
+    /// Drops what is kept on behalf of sessions that have ended.
+    pub fn prune(&self) {
+        self.opened.prune(|id| self.registry.is_live(id));
     }
 
     /// When the session expires, in RFC 3339.

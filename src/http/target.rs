@@ -11,6 +11,7 @@ use super::target_box::TargetBox;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, Settings, WholeNumber};
 use super::work;
+use crate::sessions::WorkMeter;
 use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
@@ -46,14 +47,13 @@ impl utoipa::IntoResponses for Problems {
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
             Kind::MissingBox,
-            Kind::SessionNotFound,
             Kind::FrameOutOfOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::InvalidBox,
             Kind::SessionBusy,
         ];
-        problem_responses(&[problem_responses::UPLOAD, own])
+        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
     }
 }
 
@@ -87,7 +87,10 @@ impl utoipa::IntoResponses for Problems {
     responses(
         (
             status = 200, description = "The correction is taken", body = Answer,
-            headers(("Replayed" = bool, description = "`true` where this answer was given before"))
+            headers(
+                ("Replayed" = bool, description = "`true` where this answer was given before"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
         ),
         Problems
     )
@@ -103,8 +106,10 @@ pub async fn put(
         files: request.upload.files,
         correction: Some(target.into()),
     };
-    let limits = state.config.frame_limits();
-    let correct = move |locked: &mut _| next.advance(locked, &limits);
+    let limits = state.config.request_limits();
+    let metrics = state.metrics.tracking.clone();
+    let correct =
+        move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
     let Answered {
         estimates,
         replayed,

@@ -1,31 +1,132 @@
 //! The chunk structure of PNG and WebP, read before decoding: whether the file is whole. The decoders would not notice
 //! a missing end, or would allocate as many bytes as a chunk claims.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 const CUT_SHORT: &str = "it is cut short";
 
-/// Walks the chunks of a PNG up to `IEND`.
-pub(super) fn check_png_whole(bytes: &[u8]) -> Result<(), &'static str> {
-    let mut at = 8;
-    loop {
-        let header: &[u8; 8] = bytes
-            .get(at..)
-            .and_then(<[u8]>::first_chunk)
-            .ok_or(CUT_SHORT)?;
-        let [l3, l2, l1, l0, kind @ ..] = *header;
-        let length = u32::from_be_bytes([l3, l2, l1, l0]) as usize;
-        // 8 bytes of header before the data, 4 of checksum after it.
-        at = at.checked_add(length + 12).ok_or(CUT_SHORT)?;
-        if at > bytes.len() {
-            return Err(CUT_SHORT);
+/// The chunks that pixels and their orientation depend on. Others are left out before decoding: a colour profile or a
+/// text of a few hundred kilobytes may unpack to hundreds of megabytes.
+const PNG_CHUNKS: [&[u8; 4]; 6] = [b"IHDR", b"PLTE", b"tRNS", b"eXIf", b"IDAT", b"IEND"];
+
+/// A PNG whose chunks were read up to `IEND`.
+pub(super) struct Png<'a> {
+    bytes: &'a [u8],
+    /// Width and height as stored.
+    pub(super) size: (u32, u32),
+    /// The EXIF block, where one stands before the pixels.
+    pub(super) exif: Option<&'a [u8]>,
+    /// Where the chunks are that decoding needs, joined where they touch.
+    needed: Vec<Range<usize>>,
+    has_others: bool,
+}
+
+impl<'a> Png<'a> {
+    /// Walks the chunks.
+    pub(super) fn read(bytes: &'a [u8]) -> Result<Self, &'static str> {
+        let mut png = Self {
+            bytes,
+            size: (0, 0),
+            exif: None,
+            needed: Vec::new(),
+            has_others: false,
+        };
+        let (mut at, mut saw_pixels) = (8, false);
+        loop {
+            let header: &[u8; 8] = bytes
+                .get(at..)
+                .and_then(<[u8]>::first_chunk)
+                .ok_or(CUT_SHORT)?;
+            let [l3, l2, l1, l0, kind @ ..] = *header;
+            let length = u32::from_be_bytes([l3, l2, l1, l0]) as usize;
+            // 8 bytes of header before the data, 4 of checksum after it.
+            let end = at.checked_add(length + 12).ok_or(CUT_SHORT)?;
+            let data = bytes.get(at + 8..end - 4).ok_or(CUT_SHORT)?;
+            if end > bytes.len() {
+                return Err(CUT_SHORT);
+            }
+            match &kind {
+                b"IHDR" => {
+                    let sides = data.first_chunk().ok_or("its header is too short")?;
+                    let [w3, w2, w1, w0, h3, h2, h1, h0] = *sides;
+                    let side = u32::from_be_bytes;
+                    png.size = (side([w3, w2, w1, w0]), side([h3, h2, h1, h0]));
+                }
+                b"IDAT" => saw_pixels = true,
+                b"eXIf" if !saw_pixels => png.exif = png.exif.or(Some(data)),
+                _ => {}
+            }
+            png.add(&kind, at..end);
+            if &kind == b"IEND" {
+                return Ok(png);
+            }
+            at = end;
         }
-        if &kind == b"IEND" {
-            return Ok(());
+    }
+
+    fn add(&mut self, kind: &[u8; 4], chunk: Range<usize>) {
+        if !PNG_CHUNKS.contains(&kind) {
+            self.has_others = true;
+            return;
+        }
+        match self.needed.last_mut() {
+            Some(last) if last.end == chunk.start => last.end = chunk.end,
+            _ => self.needed.push(chunk),
+        }
+    }
+
+    /// The file with the chunks that decoding needs, and no others.
+    pub(super) fn without_side_chunks(&self) -> Cow<'a, [u8]> {
+        if !self.has_others {
+            return Cow::Borrowed(self.bytes);
+        }
+        let mut kept = self.bytes[..8].to_vec();
+        for chunk in &self.needed {
+            kept.extend_from_slice(&self.bytes[chunk.clone()]);
+        }
+        Cow::Owned(kept)
+    }
+}
+
+/// What decoding a WebP takes beside its output.
+#[derive(Debug, Default)]
+pub(super) struct WebP {
+    lossless: bool,
+    alpha: bool,
+    animated: bool,
+}
+
+impl WebP {
+    /// Bytes a pixel that the decoder allocates beside its output. Lossless: the image in RGBA, and what its transforms
+    /// read. Lossy: three planes, and where it has an alpha channel that channel by itself, as a lossless image. An
+    /// animation has its canvas besides, and its first image in RGBA.
+    pub(super) fn working_bytes_per_pixel(&self) -> u64 {
+        let lossy = 2 + if self.alpha { 7 } else { 0 };
+        let still = lossy.max(if self.lossless { 6 } else { 0 });
+        still + if self.animated { 8 } else { 0 }
+    }
+
+    fn add(&mut self, kind: &[u8]) {
+        match kind {
+            b"VP8L" => self.lossless = true,
+            b"ALPH" => self.alpha = true,
+            // Its image may be of either kind.
+            b"ANMF" => {
+                *self = Self {
+                    lossless: true,
+                    alpha: true,
+                    animated: true,
+                }
+            }
+            _ => {}
         }
     }
 }
 
 /// Walks the chunks of a WebP up to the length that its RIFF header notes.
-pub(super) fn check_webp_whole(bytes: &[u8]) -> Result<(), &'static str> {
+pub(super) fn read_webp(bytes: &[u8]) -> Result<WebP, &'static str> {
+    let mut webp = WebP::default();
     let length = |at: usize| -> Option<usize> {
         let field: &[u8; 4] = bytes.get(at..)?.first_chunk()?;
         usize::try_from(u32::from_le_bytes(*field)).ok()
@@ -43,7 +144,8 @@ pub(super) fn check_webp_whole(bytes: &[u8]) -> Result<(), &'static str> {
         if data_end > end {
             return Err(CUT_SHORT);
         }
+        webp.add(&bytes[at..at + 4]);
         at = data_end + data % 2;
     }
-    Ok(())
+    Ok(webp)
 }

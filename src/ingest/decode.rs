@@ -13,6 +13,20 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
+/// Width and height of an uploaded frame as it is shown. Only the file's structure is read: no pixel is decoded.
+///
+/// # Errors
+/// See [`IngestError`]. Bytes that pass may still fail to decode.
+pub fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
+    limits.check_bytes(bytes.len())?;
+    let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
+    catch_decoder_panic(format, || match format {
+        Format::Jpeg => jpeg::size(bytes, limits),
+        Format::Png => raster::size_of_png(bytes, limits),
+        Format::WebP => raster::size_of_webp(bytes, limits),
+    })
+}
+
 /// Decodes one uploaded frame in its own size, in colour where it has any.
 ///
 /// # Errors

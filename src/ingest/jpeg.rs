@@ -23,12 +23,7 @@ pub(super) fn decode<'scratch>(
     format: &dyn Fn((u32, u32)) -> FrameFormat,
     scratch: &'scratch mut Scratch,
 ) -> Result<(StoredImage<'scratch>, FrameFormat), IngestError> {
-    let damaged = |reason: &str| Format::Jpeg.damaged(reason);
-    let markers = Markers::read(bytes).map_err(damaged)?;
-    limits.check_size(markers.width, markers.height)?;
-    if markers.is_implausibly_small() {
-        return Err(damaged("it holds less data than its size needs"));
-    }
+    let markers = read_markers(bytes, limits)?;
     let source = (markers.width, markers.height);
     let orientation = orientation::of_exif(markers.exif(bytes));
     let format = format(orientation::upright(source, orientation));
@@ -57,6 +52,26 @@ pub(super) fn decode<'scratch>(
         orientation,
     };
     Ok((stored, format))
+}
+
+/// Width and height of a JPEG as it is shown.
+pub(super) fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
+    let markers = read_markers(bytes, limits)?;
+    let orientation = orientation::of_exif(markers.exif(bytes));
+    Ok(orientation::upright(
+        (markers.width, markers.height),
+        orientation,
+    ))
+}
+
+fn read_markers(bytes: &[u8], limits: &Limits) -> Result<Markers, IngestError> {
+    let damaged = |reason: &str| Format::Jpeg.damaged(reason);
+    let markers = Markers::read(bytes).map_err(damaged)?;
+    limits.check_size(markers.width, markers.height)?;
+    if markers.is_implausibly_small() {
+        return Err(damaged("it holds less data than its size needs"));
+    }
+    Ok(markers)
 }
 
 /// Luma and, where it is wanted, chroma, as the file has them.

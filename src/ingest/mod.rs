@@ -41,6 +41,6 @@ mod stored_image;
 #[cfg(feature = "turbo")]
 mod turbo;
 
-pub use decode::{decode, decode_to, recycle};
+pub use decode::{decode, decode_to, recycle, size};
 pub use error::IngestError;
 pub use limits::Limits;

@@ -20,11 +20,11 @@ pub(super) fn swaps_sides(orientation: Orientation) -> bool {
     )
 }
 
-/// Width and height of an image of `size` when it stands upright.
-pub(super) fn upright(size: (u32, u32), orientation: Orientation) -> (u32, u32) {
+/// Width and height once the image is turned.
+pub(super) fn upright((width, height): (u32, u32), orientation: Orientation) -> (u32, u32) {
     match swaps_sides(orientation) {
-        true => (size.1, size.0),
-        false => size,
+        true => (height, width),
+        false => (width, height),
     }
 }
 

@@ -1,6 +1,6 @@
 //! PNG and WebP, through the `image` crate.
 
-use super::containers::{check_png_whole, check_webp_whole};
+use super::containers::{Png, read_webp};
 use super::error::IngestError;
 use super::limits::Limits;
 use super::luma::{chroma_of, luma_of};
@@ -20,13 +20,17 @@ pub(super) fn decode_png(
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    check_png_whole(bytes).map_err(|reason| Format::Png.damaged(reason))?;
-    // Also bounds compressed side chunks (text, colour profiles), which are read with the header.
+    let png = read_png(bytes, limits)?;
+    let needed = png.without_side_chunks();
+    let copied = match &needed {
+        Cow::Borrowed(_) => 0,
+        Cow::Owned(copy) => copy.len() as u64,
+    };
     let mut decoder_limits = image::Limits::no_limits();
     decoder_limits.max_alloc = Some(limits.max_memory);
-    let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits)
+    let decoder = PngDecoder::with_limits(Cursor::new(&needed[..]), decoder_limits)
         .map_err(|error| typed(Format::Png, error))?;
-    decode(decoder, Format::Png, 0, limits, format)
+    decode(decoder, Format::Png, 0, copied, limits, format)
 }
 
 pub(super) fn decode_webp(
@@ -34,17 +38,49 @@ pub(super) fn decode_webp(
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    check_webp_whole(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
+    let webp = read_webp(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
-    // The decoder needs its planes, or an RGBA copy where the image has no alpha.
-    decode(decoder, Format::WebP, 4, limits, format)
+    decode(
+        decoder,
+        Format::WebP,
+        webp.working_bytes_per_pixel(),
+        0,
+        limits,
+        format,
+    )
 }
 
+/// Width and height of a PNG as it is shown.
+pub(super) fn size_of_png(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
+    let png = read_png(bytes, limits)?;
+    let orientation = orientation::of_exif(png.exif);
+    Ok(orientation::upright(png.size, orientation))
+}
+
+/// Width and height of a WebP as it is shown.
+pub(super) fn size_of_webp(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
+    read_webp(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
+    let mut decoder =
+        WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
+    let (width, height) = decoder.dimensions();
+    limits.check_size(width, height)?;
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    Ok(orientation::upright((width, height), orientation))
+}
+
+fn read_png<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Png<'a>, IngestError> {
+    let png = Png::read(bytes).map_err(|reason| Format::Png.damaged(reason))?;
+    limits.check_size(png.size.0, png.size.1)?;
+    Ok(png)
+}
+
+/// Decodes to luma. `copied` bytes were allocated already.
 fn decode(
     mut decoder: impl ImageDecoder,
     file: Format,
     working_bytes_per_pixel: u64,
+    copied: u64,
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
@@ -52,7 +88,8 @@ fn decode(
     limits.check_size(width, height)?;
     // The decoded image, what the decoder needs beside it, the luma, and the chroma in half of the columns and rows.
     let pixels = u64::from(width) * u64::from(height);
-    limits.check_memory(decoder.total_bytes() + (working_bytes_per_pixel + 2) * pixels)?;
+    let beside = (working_bytes_per_pixel + 2) * pixels + copied;
+    limits.check_memory(decoder.total_bytes() + beside)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let source = (width, height);
     let format = format(orientation::upright(source, orientation));

@@ -1,20 +1,19 @@
 //! Which requests may work: a queue before the workers.
 //!
-//! A request first takes a place in the queue and a share of the bytes that all bodies may have together; it is
-//! refused at once when either is used up. Then it waits for a worker. All its permits move into the work itself. A
-//! request that times out or whose client goes away does not stop work that has begun, so its permits stay taken until
-//! that work has ended, and never more threads work than there are workers.
+//! A request whose body has arrived takes a place in the queue; it is refused at once when there is none. Then it waits
+//! for a worker, which clients get [in turns](super::fair_queue). All its permits move into the work itself. A request
+//! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
+//! has ended, and never more threads work than there are workers.
 
+use super::fair_queue::{FairQueue, Turn};
+use super::lanes::{Lane, Length};
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-/// Bytes that one permit of the byte budget stands for.
-const BYTES_PER_PERMIT: usize = 1024;
-
-/// The queue is full or the byte budget is used up; try again later.
+/// The queue is full; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the queue is full")]
 pub struct QueueFull;
@@ -38,50 +37,73 @@ impl WorkLost {
     }
 }
 
+/// What a request holds until its work has ended: its share of memory, its place in a quota.
+pub type Held = Box<dyn Any + Send + Sync>;
+
 /// A place in the queue, given back when the last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct QueuePermit {
-    _permits: Arc<[OwnedSemaphorePermit; 2]>,
+    lane: Lane,
+    length: Length,
+    _held: Arc<(OwnedSemaphorePermit, Held)>,
 }
 
-/// A queue semaphore before a worker semaphore. Clones share both.
+impl QueuePermit {
+    /// For work on so many frames, which gives way to shorter work between two of them.
+    pub fn for_frames(mut self, count: usize) -> Self {
+        self.length = match count {
+            0 | 1 => Length::Short,
+            _ => Length::Long,
+        };
+        self
+    }
+}
+
+/// A queue before the workers. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
     queue: Arc<Semaphore>,
-    bodies: Arc<Semaphore>,
-    workers: Arc<Semaphore>,
+    workers: FairQueue,
     threads: Arc<Workers>,
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, with at most `body_bytes` bytes of bodies together; at most `workers` of
-    /// them at work.
-    pub fn new(queue: usize, body_bytes: usize, workers: usize) -> Self {
+    /// At most `queue` requests at a time, at most `workers` of them at work.
+    pub fn new(queue: usize, workers: usize) -> Self {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
-            bodies: Arc::new(Semaphore::new(body_bytes.div_ceil(BYTES_PER_PERMIT))),
-            workers: Arc::new(Semaphore::new(workers)),
-            threads: Arc::new(Workers::new(workers)),
+            workers: FairQueue::new(workers),
+            // As many again may wait between two frames.
+            threads: Arc::new(Workers::new(2 * workers)),
         }
     }
 
-    /// Takes a place in the queue, and `body_bytes` of the byte budget.
+    /// Whether there is a place in the queue now. It may be gone when it is asked for.
     ///
     /// # Errors
-    /// All places or all bytes are taken.
-    pub fn enter(&self, body_bytes: usize) -> Result<QueuePermit, QueueFull> {
-        let units = u32::try_from(body_bytes.div_ceil(BYTES_PER_PERMIT)).map_err(|_| QueueFull)?;
-        let place = self.queue.clone().try_acquire_owned();
-        let bytes = self.bodies.clone().try_acquire_many_owned(units);
-        match (place, bytes) {
-            (Ok(place), Ok(bytes)) => Ok(QueuePermit {
-                _permits: Arc::new([place, bytes]),
-            }),
-            _ => Err(QueueFull),
+    /// There is none.
+    pub fn check_place(&self) -> Result<(), QueueFull> {
+        match self.queue.available_permits() {
+            0 => Err(QueueFull),
+            _ => Ok(()),
         }
     }
 
-    /// Waits for a worker, in order of arrival, and runs `work` on its thread. If the future is dropped before a worker
+    /// Takes a place in the queue for a client's request, which holds `held` until its work has ended.
+    ///
+    /// # Errors
+    /// All places are taken.
+    pub fn enter(&self, lane: Lane, held: Held) -> Result<QueuePermit, QueueFull> {
+        let place = self.queue.clone().try_acquire_owned();
+        let place = place.map_err(|_| QueueFull)?;
+        Ok(QueuePermit {
+            lane,
+            length: Length::Short,
+            _held: Arc::new((place, held)),
+        })
+    }
+
+    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is dropped before a worker
     /// is free, the work is not done; afterwards it runs to its end and keeps its permits.
     ///
     /// # Errors
@@ -89,15 +111,15 @@ impl Admission {
     pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
     where
         T: Send + 'static,
-        F: FnOnce() -> T + Send + 'static,
+        F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
-        let acquired = self.workers.clone().acquire_owned().await;
-        let permits = (queue, acquired.expect("the semaphore is never closed"));
+        let turn = self.workers.acquire(queue.lane, queue.length).await;
+        let mut permits = (queue, turn);
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         self.threads.start(Box::new(move || {
             // A panic drops `work`, so no half-changed value is read.
-            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(work)));
+            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut permits.1))));
             drop(permits);
             // It cannot be sent when the client has gone.
             let _ = send.send(outcome);
@@ -115,7 +137,7 @@ impl Admission {
 
     /// Workers that are free.
     pub fn free_workers(&self) -> usize {
-        self.workers.available_permits()
+        self.workers.free()
     }
 }
 
@@ -124,38 +146,30 @@ mod tests {
     use super::*;
     use std::sync::mpsc;
 
-    #[tokio::test]
-    async fn the_queue_refuses_when_full_and_frees_on_drop() {
-        let admission = Admission::new(1, 5000, 1);
-        let permit = admission.enter(5000).unwrap();
-        assert_eq!(admission.enter(5000).unwrap_err(), QueueFull);
-        drop(permit);
-        assert!(admission.enter(5000).is_ok());
+    fn enter(admission: &Admission) -> Result<QueuePermit, QueueFull> {
+        admission.enter(Lane(0), Box::new(()))
     }
 
     #[tokio::test]
-    async fn bodies_share_their_byte_budget() {
-        let admission = Admission::new(9, 5 * BYTES_PER_PERMIT, 1);
-        let large = admission.enter(4 * BYTES_PER_PERMIT).unwrap();
-        assert_eq!(
-            admission.enter(BYTES_PER_PERMIT + 1).unwrap_err(),
-            QueueFull
-        );
-        assert!(admission.enter(BYTES_PER_PERMIT).is_ok());
-        drop(large);
-        assert!(admission.enter(5 * BYTES_PER_PERMIT).is_ok());
+    async fn the_queue_refuses_when_full_and_frees_on_drop() {
+        let admission = Admission::new(1, 1);
+        let permit = enter(&admission).unwrap();
+        assert_eq!(admission.check_place(), Err(QueueFull));
+        assert_eq!(enter(&admission).unwrap_err(), QueueFull);
+        drop(permit);
+        assert!(enter(&admission).is_ok());
     }
 
     #[tokio::test]
     async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
-        let admission = Admission::new(1, 5000, 1);
+        let admission = Admission::new(1, 1);
         let (started_tx, started) = mpsc::channel();
         let (finish, finish_rx) = mpsc::channel::<()>();
-        let queue = admission.enter(5000).unwrap();
+        let queue = enter(&admission).unwrap();
         let request = tokio::spawn({
             let admission = admission.clone();
             async move {
-                let work = move || {
+                let work = move |_: &mut Turn| {
                     started_tx.send(()).unwrap();
                     finish_rx.recv().unwrap();
                 };
@@ -169,18 +183,17 @@ mod tests {
         assert!(request.await.unwrap_err().is_cancelled());
         assert_eq!((admission.queue_places(), admission.free_workers()), (0, 0));
         finish.send(()).unwrap();
-        let free = admission.workers.acquire().await.unwrap();
-        drop(free);
+        drop(admission.workers.acquire(Lane(0), Length::Short).await);
         assert_eq!(admission.free_workers(), 1);
     }
 
     #[tokio::test]
     async fn work_is_never_done_on_the_thread_that_asks_for_it() {
-        let admission = Admission::new(9, 5000, 2);
+        let admission = Admission::new(9, 2);
         let here = std::thread::current().id();
         for _ in 0..20 {
-            let queue = admission.enter(0).unwrap();
-            let there = admission.run(queue, || std::thread::current().id());
+            let queue = enter(&admission).unwrap();
+            let there = admission.run(queue, |_| std::thread::current().id());
             assert_ne!(there.await.unwrap(), here);
         }
         assert_eq!((admission.queue_places(), admission.free_workers()), (9, 2));
@@ -188,9 +201,9 @@ mod tests {
 
     #[tokio::test]
     async fn a_panic_is_an_error_and_frees_the_permits() {
-        let admission = Admission::new(1, 5000, 1);
-        let queue = admission.enter(5000).unwrap();
-        let result = admission.run(queue, || panic!("a test panics")).await;
+        let admission = Admission::new(1, 1);
+        let queue = enter(&admission).unwrap();
+        let result = admission.run(queue, |_| panic!("a test panics")).await;
         let panicked: Result<(), WorkLost> = result;
         assert_eq!(
             panicked,

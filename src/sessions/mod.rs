@@ -3,32 +3,49 @@
 //! In: a [`SessionState`], which is a tracker and the answers to its last request. Out: a [`Session`] in the
 //! [`Registry`], found by its id.
 //!
-//! A request for a session takes these steps: [`Registry::get`] finds it, [`Session::enter`] takes one of its few
-//! permits, [`Admission::enter`] takes a place in the queue before the workers, [`SessionPermit::lock`] waits for the
-//! session in order of arrival, and [`Admission::run`] works with its state on a worker thread.
+//! A request for a session takes these steps: [`Registry::find`] finds it for its owner, [`Session::enter`] takes one of
+//! its few permits, [`ByteCharge::grow`] charges the bytes of its body as they arrive, [`Admission::enter`] takes a place
+//! in the queue before the workers, [`SessionPermit::lock`] waits for the session in order of arrival, and
+//! [`Admission::run`] works with its state on a worker thread.
 //!
 //! What can go wrong, and what is done about it:
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
 //! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
 //! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
 //! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayDecision`].
-//! - A client never ends its session. It expires when it was not used for a while, by a [`Clock`] that tests can move
-//!   forward.
-//! - A snapshot comes back damaged or forged. It is checked as a whole: see [`SnapshotError`].
+//! - A client never ends its session. It expires when no frame came for a while, by a [`Clock`] that tests can move
+//!   forward; sooner where none came at all.
+//! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
+//!   is checked and bounded: see [`SnapshotError`].
 
 mod admission;
+mod byte_budget;
 mod clock;
+mod expired;
+mod fair_queue;
+mod lanes;
+mod mac;
+mod owner;
 mod registry;
 mod replay;
 mod session;
 mod snapshot;
 mod state;
+mod work_limit;
 mod workers;
 
-pub use admission::{Admission, QueueFull, QueuePermit, WorkLost};
+pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
+pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
-pub use registry::{Registry, TooManySessions};
+pub use fair_queue::Turn;
+pub use lanes::Lane;
+pub use mac::{MAC_BYTES, MacKeys};
+pub use owner::Owner;
+pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
-pub use session::{LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
-pub use snapshot::{MAGIC as SNAPSHOT_MAGIC, SnapshotError};
-pub use state::SessionState;
+pub use session::{
+    Lease, LockedSession, Session, SessionBusy, SessionClosed, SessionPermit, short_id,
+};
+pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
+pub use state::{SessionState, StepError};
+pub use work_limit::{Stopped, WorkLimit, WorkMeter};

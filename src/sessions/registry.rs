@@ -1,11 +1,15 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
+use super::admission::Held;
+use super::byte_budget::ByteBudget;
 use super::clock::Clock;
-use super::session::Session;
+use super::expired::ExpiredIds;
+use super::owner::Owner;
+use super::session::{Lease, Session};
 use super::state::SessionState;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 use uuid::Uuid;
 
 /// The service holds as many sessions as it may; try again later.
@@ -13,27 +17,49 @@ use uuid::Uuid;
 #[error("there are {0} sessions, which is the maximum")]
 pub struct TooManySessions(pub usize);
 
+/// Why there is no session for a client under an id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoSession {
+    /// There was none, or it was deleted, or it belongs to another client.
+    #[error("there is no such session")]
+    Unknown,
+    /// It was not used for too long.
+    #[error("the session has expired")]
+    Expired,
+}
+
 /// The live sessions.
 #[derive(Debug)]
 pub struct Registry {
     sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
     max_sessions: usize,
+    /// Locked for a moment only, and never together with the map.
+    expired: Mutex<ExpiredIds>,
     max_requests: usize,
-    idle: Duration,
+    lease: Lease,
     clock: Clock,
+    memory: ByteBudget,
 }
 
 impl Registry {
-    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when it
-    /// was not used for `idle`.
-    pub fn new(max_sessions: usize, max_requests: usize, idle: Duration, clock: Clock) -> Self {
+    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when no
+    /// frame comes within its lease.
+    pub fn new(max_sessions: usize, max_requests: usize, lease: Lease, clock: Clock) -> Self {
         Self {
             sessions: Mutex::default(),
+            expired: Mutex::default(),
             max_sessions,
             max_requests,
-            idle,
+            lease,
             clock,
+            memory: ByteBudget::new(usize::MAX),
         }
+    }
+
+    /// The states of all sessions together take at most so many bytes.
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = ByteBudget::new(bytes);
+        self
     }
 
     /// Whether there is room for one more session, after the expired ones have gone.
@@ -50,13 +76,22 @@ impl Registry {
         Ok(())
     }
 
-    /// Adds a session under a new id.
+    /// Adds a session of this owner under a new id. It keeps `held` until it is freed.
     ///
     /// # Errors
-    /// There is no room.
-    pub fn insert(&self, state: SessionState) -> Result<Arc<Session>, TooManySessions> {
+    /// There is no room, or no memory for a state with its parameters.
+    pub fn insert(
+        &self,
+        state: SessionState,
+        owner: Owner,
+        held: Held,
+    ) -> Result<Arc<Session>, TooManySessions> {
         self.check_room()?;
-        let session = Session::new(state, self.max_requests, self.clock.clone());
+        let memory = self.memory.hold(state.tracker().params().session_bytes());
+        let memory = memory.ok_or(TooManySessions(self.max_sessions))?;
+        let held: Held = Box::new((held, memory));
+        let clock = self.clock.clone();
+        let session = Session::new(state, owner, held, self.max_requests, self.lease, clock);
         let mut sessions = self.map();
         if sessions.len() >= self.max_sessions {
             return Err(TooManySessions(self.max_sessions));
@@ -65,21 +100,35 @@ impl Registry {
         Ok(session)
     }
 
-    /// The live session of this id. This counts as use.
-    pub fn get(&self, id: Uuid) -> Option<Arc<Session>> {
+    /// The live session of this id and owner. This does not count as use.
+    ///
+    /// # Errors
+    /// See [`NoSession`]. Of another owner's session nothing is told.
+    pub fn find(&self, id: Uuid, owner: &Owner) -> Result<Arc<Session>, NoSession> {
         let ended = {
             let mut sessions = self.map();
-            let session = sessions.get(&id)?.clone();
-            if !self.has_ended(&session) {
-                session.touch();
-                return Some(session);
+            match sessions.get(&id) {
+                Some(session) if session.owner() != owner => return Err(NoSession::Unknown),
+                Some(session) if !self.has_ended(session) => return Ok(session.clone()),
+                _ => sessions.remove(&id),
             }
-            sessions.remove(&id);
-            session
         };
         // The lock has been released: this may free the session.
-        ended.close();
-        None
+        if let Some(ended) = ended {
+            self.end(&ended);
+        }
+        match self.expired().contains(id, owner, self.clock.now()) {
+            true => Err(NoSession::Expired),
+            false => Err(NoSession::Unknown),
+        }
+    }
+
+    /// Whether the session of this id lives, whoever it belongs to.
+    pub fn is_live(&self, id: Uuid) -> bool {
+        let sessions = self.map();
+        sessions
+            .get(&id)
+            .is_some_and(|session| !self.has_ended(session))
     }
 
     /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
@@ -94,15 +143,12 @@ impl Registry {
 
     /// Removes the sessions that have expired. Returns their number.
     pub fn sweep(&self) -> usize {
-        let mut ended = Vec::new();
-        self.map().retain(|_, session| {
-            let keep = !self.has_ended(session);
-            if !keep {
-                session.close();
-                ended.push(session.clone());
-            }
-            keep
-        });
+        let ended: Vec<Arc<Session>> = {
+            let mut sessions = self.map();
+            let ended = sessions.extract_if(|_, session| self.has_ended(session));
+            ended.map(|(_, session)| session).collect()
+        };
+        ended.iter().for_each(|session| self.end(session));
         ended.len()
     }
 
@@ -118,12 +164,26 @@ impl Registry {
 
     /// The wall-clock time at which the session expires when it is not used again.
     pub fn expires_at(&self, session: &Session) -> SystemTime {
-        self.clock.wall(session.last_used() + self.idle)
+        self.clock.wall(session.expires())
     }
 
     fn has_ended(&self, session: &Session) -> bool {
-        let expired = self.clock.now() >= session.last_used() + self.idle;
+        let expired = self.clock.now() >= session.expires();
         session.is_closed() || (expired && !session.is_busy())
+    }
+
+    /// Closes a session that has ended and is no longer in the map.
+    fn end(&self, session: &Session) {
+        if !session.is_closed() {
+            let (owner, now) = (session.owner().clone(), self.clock.now());
+            self.expired().note(session.id(), owner, now);
+        }
+        session.close();
+    }
+
+    fn expired(&self) -> MutexGuard<'_, ExpiredIds> {
+        // Nothing panics while it is held.
+        self.expired.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
@@ -135,11 +195,16 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::{Admission, Fingerprint};
+    use crate::sessions::{Admission, Fingerprint, Lane, Turn};
     use crate::tracker::{Frame, Preset, Rect, Tracker};
     use std::sync::mpsc;
+    use std::time::Duration;
 
     const IDLE: Duration = Duration::from_secs(600);
+    const LEASE: Lease = Lease {
+        first: IDLE,
+        idle: IDLE,
+    };
 
     fn state() -> SessionState {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
@@ -157,8 +222,10 @@ mod tests {
     /// A session in a new registry, which notes whether the map's lock was free when the session was freed.
     fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
         let clock = Clock::default();
-        let registry = Arc::new(Registry::new(9, 9, IDLE, clock.clone()));
-        let session = registry.insert(state()).unwrap();
+        let registry = Arc::new(Registry::new(9, 9, LEASE, clock.clone()));
+        let session = registry
+            .insert(state(), Owner::default(), Box::new(()))
+            .unwrap();
         let (freed, was_free) = mpsc::channel();
         let map = registry.clone();
         let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
@@ -170,34 +237,41 @@ mod tests {
     fn no_session_is_freed_under_the_lock_of_the_map() {
         let (registry, clock, id, was_free) = watched();
         clock.advance(IDLE);
-        assert!(registry.get(id).is_none());
+        let owner = Owner::default();
+        assert_eq!(registry.find(id, &owner).unwrap_err(), NoSession::Expired);
         assert_eq!(was_free.try_recv(), Ok(true), "when it is looked up");
 
         let (registry, _, id, was_free) = watched();
         assert!(registry.remove(id));
         assert_eq!(was_free.try_recv(), Ok(true), "when it is removed");
 
-        let (registry, clock, _, was_free) = watched();
+        let (registry, clock, id, was_free) = watched();
         clock.advance(IDLE);
         assert_eq!(registry.sweep(), 1);
         assert_eq!(was_free.try_recv(), Ok(true), "when it is swept");
+        let swept = registry.find(id, &Owner::default());
+        assert_eq!(swept.unwrap_err(), NoSession::Expired);
     }
 
     #[tokio::test]
     async fn a_session_whose_work_panicked_has_ended() {
-        let registry = Registry::new(9, 9, IDLE, Clock::default());
-        let session = registry.insert(state()).unwrap();
+        let registry = Registry::new(9, 9, LEASE, Clock::default());
+        let session = registry
+            .insert(state(), Owner::default(), Box::new(()))
+            .unwrap();
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
-        let admission = Admission::new(9, 0, 1);
-        let work = move || {
+        let admission = Admission::new(9, 1);
+        let work = move |_: &mut Turn| {
             let _state = locked.state();
             panic!("a test panics in the work");
         };
-        let panicked: Result<(), _> = admission.run(admission.enter(0).unwrap(), work).await;
+        let place = admission.enter(Lane(0), Box::new(())).unwrap();
+        let panicked: Result<(), _> = admission.run(place, work).await;
         assert!(panicked.is_err());
         assert!(waiting.lock().await.is_err(), "those who wait are told");
-        assert!(registry.get(session.id()).is_none());
+        let found = registry.find(session.id(), &Owner::default());
+        assert_eq!(found.unwrap_err(), NoSession::Unknown);
         assert!(registry.is_empty());
     }
 }

@@ -4,7 +4,9 @@
 //! the [`LockedSession`] into the work on a worker thread. The lock is fair: requests are served in the order in which
 //! they asked for it.
 
+use super::admission::Held;
 use super::clock::Clock;
+use super::owner::Owner;
 use super::state::SessionState;
 use crate::tracker::{Estimate, FrameFormat, Params};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -23,10 +25,20 @@ pub struct SessionBusy;
 #[error("the session has ended")]
 pub struct SessionClosed;
 
+/// How long a session lives without use.
+#[derive(Debug, Clone, Copy)]
+pub struct Lease {
+    /// From its opening to its first frame.
+    pub first: Duration,
+    /// After each frame.
+    pub idle: Duration,
+}
+
 /// One session.
 #[cfg_attr(not(test), derive(Debug))]
 pub struct Session {
     id: Uuid,
+    owner: Owner,
     source_size: (u32, u32),
     frame_format: FrameFormat,
     params: Params,
@@ -34,10 +46,14 @@ pub struct Session {
     /// The permits that are free. Each request at this session has one, the one at work included.
     permits: Arc<Semaphore>,
     max_requests: usize,
+    /// The place of the session in its client's quota.
+    _held: Held,
     /// The last answer, to be read without waiting for the lock.
     latest: Mutex<Estimate>,
     clock: Clock,
-    last_used_ms: AtomicU64,
+    idle: Duration,
+    /// When the session expires, by its clock.
+    expires_ms: AtomicU64,
     closed: AtomicBool,
     /// Called when the session is freed.
     #[cfg(test)]
@@ -63,9 +79,18 @@ impl Drop for Session {
 }
 
 impl Session {
-    pub(super) fn new(state: SessionState, max_requests: usize, clock: Clock) -> Arc<Self> {
-        let session = Self {
+    pub(super) fn new(
+        state: SessionState,
+        owner: Owner,
+        held: Held,
+        max_requests: usize,
+        lease: Lease,
+        clock: Clock,
+    ) -> Arc<Self> {
+        let first = clock.now() + lease.first.min(lease.idle);
+        Arc::new(Self {
             id: Uuid::new_v4(),
+            owner,
             source_size: state.tracker().source_size(),
             frame_format: state.tracker().frame_format(),
             params: state.tracker().params().clone(),
@@ -73,14 +98,14 @@ impl Session {
             state: Arc::new(AsyncMutex::new(state)),
             permits: Arc::new(Semaphore::new(max_requests)),
             max_requests,
+            _held: held,
             clock,
-            last_used_ms: AtomicU64::new(0),
+            idle: lease.idle,
+            expires_ms: AtomicU64::new(milliseconds(first)),
             closed: AtomicBool::new(false),
             #[cfg(test)]
             on_drop: Mutex::default(),
-        };
-        session.touch();
-        Arc::new(session)
+        })
     }
 
     /// The session's id.
@@ -91,6 +116,16 @@ impl Session {
     /// How the session sees its frames.
     pub fn frame_format(&self) -> FrameFormat {
         self.frame_format
+    }
+
+    /// The beginning of the id, for the log: whoever reads it cannot use the session.
+    pub fn short_id(&self) -> String {
+        short_id(self.id)
+    }
+
+    /// Whose the session is.
+    pub fn owner(&self) -> &Owner {
+        &self.owner
     }
 
     /// Width and height of the session's frames as uploaded.
@@ -108,15 +143,15 @@ impl Session {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// When the session was last used, by its clock.
-    pub fn last_used(&self) -> Duration {
-        Duration::from_millis(self.last_used_ms.load(Ordering::Relaxed))
+    /// When the session expires unless a frame comes, by its clock.
+    pub fn expires(&self) -> Duration {
+        Duration::from_millis(self.expires_ms.load(Ordering::Relaxed))
     }
 
-    /// Counts as use: the session expires an idle time from now.
-    pub fn touch(&self) {
-        let now = u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX);
-        self.last_used_ms.fetch_max(now, Ordering::Relaxed);
+    /// A frame came: the session expires an idle time from now.
+    fn renew(&self) {
+        let expires = milliseconds(self.clock.now() + self.idle);
+        self.expires_ms.fetch_max(expires, Ordering::Relaxed);
     }
 
     /// Whether a request is at the session.
@@ -133,25 +168,51 @@ impl Session {
         self.closed.store(true, Ordering::Release);
     }
 
-    /// Takes a permit of the session.
+    /// Takes a permit of the session, for a frame: the session lives on.
     ///
     /// # Errors
     /// All permits are taken.
     pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+        let permit = self.permit(true)?;
+        self.renew();
+        Ok(permit)
+    }
+
+    /// Takes a permit of the session, to look at it: this does not keep the session alive.
+    ///
+    /// # Errors
+    /// All permits are taken.
+    pub fn visit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+        self.permit(false)
+    }
+
+    fn permit(self: &Arc<Self>, renews: bool) -> Result<SessionPermit, SessionBusy> {
         let permit = self.permits.clone().try_acquire_owned();
-        let permit = permit.map_err(|_| SessionBusy)?;
-        self.touch();
         Ok(SessionPermit {
             session: self.clone(),
-            _permit: permit,
+            renews,
+            _permit: permit.map_err(|_| SessionBusy)?,
         })
     }
+}
+
+/// The beginning of an id, for the log.
+pub fn short_id(id: Uuid) -> String {
+    let mut text = id.simple().to_string();
+    text.truncate(8);
+    text.push('…');
+    text
+}
+
+fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// A permit to be at a session, which does not expire meanwhile. Given back when it is dropped.
 #[derive(Debug)]
 pub struct SessionPermit {
     session: Arc<Session>,
+    renews: bool,
     _permit: OwnedSemaphorePermit,
 }
 
@@ -179,7 +240,9 @@ impl SessionPermit {
 
 impl Drop for SessionPermit {
     fn drop(&mut self) {
-        self.session.touch();
+        if self.renews {
+            self.session.renew();
+        }
     }
 }
 

@@ -1,7 +1,9 @@
 //! What work on a session changes: the tracker, and the answers that a repeated request gets again.
 
+use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
 use super::snapshot::{SessionSnapshot, SnapshotError};
+use super::work_limit::{Stopped, WorkMeter};
 use crate::tracker::{Estimate, Frame, Rect, Tracker, TrackerError};
 
 /// The part of a session that changes from frame to frame.
@@ -10,6 +12,22 @@ pub struct SessionState {
     tracker: Tracker,
     /// The answers to the last request, oldest first; at least one.
     recent: Vec<Answered>,
+}
+
+/// Why no frame of several was taken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// The tracker refused one of them.
+    #[error("frame {index}: {error}")]
+    Refused {
+        /// Which one, counted from 0.
+        index: usize,
+        /// Why.
+        error: TrackerError,
+    },
+    /// The work was stopped before all of them were taken.
+    #[error(transparent)]
+    Stopped(Stopped),
 }
 
 impl SessionState {
@@ -26,18 +44,23 @@ impl SessionState {
         }
     }
 
-    /// The session that a snapshot holds.
+    /// The session that a snapshot holds, with at most `max_recent` stored answers.
     ///
     /// # Errors
     /// See [`SnapshotError`].
-    pub fn restore(snapshot: &[u8]) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { tracker, recent } = SessionSnapshot::decode(snapshot)?;
+    pub fn restore(
+        snapshot: &[u8],
+        keys: &MacKeys,
+        max_recent: usize,
+    ) -> Result<Self, SnapshotError> {
+        let SessionSnapshot { tracker, recent } =
+            SessionSnapshot::decode(snapshot, keys, max_recent)?;
         Ok(Self { tracker, recent })
     }
 
-    /// The session as bytes.
-    pub fn snapshot(&self) -> Vec<u8> {
-        SessionSnapshot::encode(&self.tracker, &self.recent)
+    /// The session as bytes, signed.
+    pub fn snapshot(&self, keys: &MacKeys) -> Vec<u8> {
+        SessionSnapshot::encode(&self.tracker, &self.recent, keys)
     }
 
     /// The tracker.
@@ -61,19 +84,22 @@ impl SessionState {
         replay::decide(&self.recent, number, posted, given)
     }
 
-    /// Tracks through `frames` in order: all of them, or none.
+    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on.
     ///
     /// # Errors
-    /// The index of the frame that the tracker refused, and why. The session is unchanged.
+    /// The tracker refused a frame, or the work was stopped. The session is unchanged.
     pub fn step(
         &mut self,
         frames: &[(Fingerprint, Frame)],
-    ) -> Result<Vec<Estimate>, (usize, TrackerError)> {
+        meter: &mut WorkMeter,
+    ) -> Result<Vec<Estimate>, StepError> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());
         let mut answered = Vec::with_capacity(frames.len());
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {
-            match self.tracker.step(frame) {
+            let going_on = meter.check().map_err(StepError::Stopped);
+            let refused = |error| StepError::Refused { index, error };
+            match going_on.and_then(|()| self.tracker.step(frame).map_err(refused)) {
                 Ok(estimate) => answered.push(Answered {
                     fingerprint: *fingerprint,
                     given: None,
@@ -83,7 +109,7 @@ impl SessionState {
                     if let Some(before) = before {
                         self.tracker = before;
                     }
-                    return Err((index, error));
+                    return Err(error);
                 }
             }
         }

@@ -18,6 +18,8 @@ pub struct TestApplication {
     pub address: SocketAddr,
     pub client: Client,
     pub clock: Clock,
+    /// The API key or session token that requests are sent with.
+    pub key: Option<String>,
     stop: Option<oneshot::Sender<()>>,
     served: JoinHandle<bool>,
 }
@@ -35,9 +37,13 @@ impl TestApplication {
             workers: Some(2),
             body_timeout: Duration::from_secs(60),
             work_timeout: Duration::from_secs(60),
+            shutdown_delay: Duration::ZERO,
             ..Config::default()
         };
         change(&mut config);
+        let first = config.access.api_keys.first();
+        let key = first.and_then(|named| named.text().split_once(':'));
+        let key = key.map(|(_, key)| key.to_owned());
         let clock = Clock::default();
         let application = Application::bind_with_clock(config, clock.clone());
         let application = application.await.expect("a free port");
@@ -48,6 +54,7 @@ impl TestApplication {
             address: application.local_addr().unwrap(),
             client: Client::new(),
             clock,
+            key,
             stop: Some(stop),
             served: tokio::spawn(application.serve(async {
                 let _ = stopped.await;
@@ -72,7 +79,11 @@ impl TestApplication {
             [] => Url::parse(&url),
             query => Url::parse_with_params(&url, query),
         };
-        self.client.request(method, url.unwrap())
+        let request = self.client.request(method, url.unwrap());
+        match &self.key {
+            Some(key) => request.bearer_auth(key),
+            None => request,
+        }
     }
 
     pub async fn get(&self, path: &str) -> Response {
@@ -131,9 +142,14 @@ impl TestApplication {
         request.send().await.unwrap()
     }
 
+    /// `GET /sessions/{id}/snapshot`.
+    pub async fn snapshot_of(&self, id: &str) -> Response {
+        self.get(&format!("/sessions/{id}/snapshot")).await
+    }
+
     /// The bytes of a session.
     pub async fn snapshot(&self, id: &str) -> Vec<u8> {
-        let response = self.get(&format!("/sessions/{id}/snapshot")).await;
+        let response = self.snapshot_of(id).await;
         assert_eq!(response.status(), StatusCode::OK);
         let media_type = bagtrack::http::SNAPSHOT_MEDIA_TYPE;
         assert_eq!(response.headers()["content-type"], media_type);

@@ -62,7 +62,9 @@ fn serves_answers_health_and_ends_on_sigterm() {
 #[test]
 fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
     let mut command = bagtrack();
-    command.args(["serve", "--log-format", "json"]);
+    // Probes are logged at this level.
+    let debug = ["serve", "--log-format", "json", "--log", "bagtrack=debug"];
+    command.args(debug);
     command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
     let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
     let log = BufReader::new(child.stderr.take().unwrap()).lines();
@@ -191,4 +193,47 @@ fn a_setting_before_the_command_is_refused_not_dropped() {
     assert_eq!(output.status.code(), Some(2));
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(error.contains("'--queue <QUEUE>'"), "{error}");
+}
+
+#[test]
+fn too_few_open_files_are_said_at_the_start_and_the_service_answers() {
+    let mut command = Command::new("sh");
+    let script = format!(
+        "ulimit -n 128; exec {} serve --log-format json",
+        env!("CARGO_BIN_EXE_bagtrack")
+    );
+    command
+        .args(["-c", &script])
+        .env("BAGTRACK_LISTEN", "127.0.0.1:0");
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
+    let mut warned = None;
+    let url = loop {
+        let line: Value = serde_json::from_str(&log.next().unwrap().unwrap()).unwrap();
+        let fields = &line["fields"];
+        if line["level"] == "WARN" {
+            warned = Some((fields["limit"].clone(), fields["connections"].clone()));
+        }
+        let message = fields["message"].as_str().unwrap_or("");
+        if let Some(url) = message.strip_prefix("listening on ") {
+            break url.to_owned();
+        }
+    };
+    let bound: Value = serde_json::from_str(&log.next().unwrap().unwrap()).unwrap();
+    std::thread::spawn(move || log.for_each(drop));
+    let address = url.strip_prefix("http://").unwrap();
+    let silent: Vec<_> = (0..300)
+        .map_while(|_| std::net::TcpStream::connect(address).ok())
+        .collect();
+    let healthy = health(&url);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(warned, Some((128.into(), 64.into())));
+    let message = bound["fields"]["message"].as_str().unwrap();
+    assert!(
+        message.starts_with("resident memory stays below "),
+        "{message}"
+    );
+    assert_eq!(silent.len(), 300);
+    assert!(healthy.status.success(), "{healthy:?}");
 }

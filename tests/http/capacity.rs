@@ -1,6 +1,7 @@
 //! Many requests at once.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
 use reqwest::StatusCode;
@@ -65,35 +66,24 @@ async fn a_session_takes_a_bounded_number_of_requests_and_frees_their_places() {
     assert_eq!(app.frames_of(&id).await, 4);
 }
 
-#[tokio::test]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_queue_is_bounded_and_a_lost_client_frees_its_place() {
-    let app = TestApplication::start_with(|config| config.queue = 1).await;
+    let app = TestApplication::start_with(|config| {
+        (config.queue, config.workers) = (1, Some(1));
+        config.max_frames = heavy::FRAMES;
+        config.limits.half_close_timeout = Duration::from_millis(10);
+    });
+    let app = app.await;
     let id = app.open().await;
-    let target = format!("/sessions/{id}/frames");
-    let held = RawConnection::hold(app.address, "POST", &target, 1000).await;
+    let busy = heavy::fill_queue(&app).await;
     expect_problem(app.post_frame(&id, pictures::png(1)).await, "queue-full").await;
-    drop(held);
+    drop(busy);
     let freed =
         async { while app.post_frame(&id, pictures::png(1)).await.status() != StatusCode::OK {} };
     tokio::time::timeout(Duration::from_secs(60), freed)
         .await
         .unwrap();
     assert_eq!(app.frames_of(&id).await, 2);
-}
-
-#[tokio::test]
-async fn the_bodies_of_all_requests_together_are_bounded() {
-    let app = TestApplication::start_with(|config| {
-        config.max_body_bytes = 50_000;
-        config.max_upload_bytes = 100_000;
-    });
-    let app = app.await;
-    let id = app.open().await;
-    let target = format!("/sessions/{id}/frames");
-    let held = RawConnection::hold(app.address, "POST", &target, 49_000).await;
-    let more = RawConnection::hold(app.address, "POST", &target, 49_000).await;
-    expect_problem(app.post_frame(&id, pictures::png(1)).await, "queue-full").await;
-    drop((held, more));
 }
 
 #[tokio::test]

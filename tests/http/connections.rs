@@ -1,6 +1,6 @@
 //! Slow clients, large bodies, and the end of the service.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use crate::raw::RawConnection;
 use reqwest::{Method, StatusCode};
@@ -161,6 +161,8 @@ async fn readiness_ends_before_the_service_does() {
         TestApplication::start_with(|config| config.shutdown_delay = Duration::from_secs(600));
     let mut app = app.await;
     let id = app.open().await;
+    let before = app.post_frame(&id, pictures::png(1)).await;
+    assert!(!before.headers().contains_key("draining"));
     app.shut_down();
     let unready = async { while app.get("/readyz").await.status() == StatusCode::OK {} };
     tokio::time::timeout(Duration::from_secs(60), unready)
@@ -168,6 +170,12 @@ async fn readiness_ends_before_the_service_does() {
         .unwrap();
     expect_problem(app.get("/readyz").await, "not-ready").await;
     expect(app.get("/healthz").await, StatusCode::OK).await;
-    // Sessions are served until connections are refused.
-    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    // Sessions are served until connections are refused, and their clients are told to take them elsewhere.
+    let answer = app.post_frame(&id, pictures::png(1)).await;
+    assert_eq!(answer.headers()["draining"], "true");
+    expect(answer, StatusCode::OK).await;
+    let refused = app.create(pictures::png(0), &[("box", BOX)]).await;
+    assert_eq!(refused.headers()["draining"], "true");
+    expect_problem(refused, "not-ready").await;
+    assert!(!app.snapshot(&id).await.is_empty());
 }

@@ -1,12 +1,14 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
-use crate::application::{BOX, TestApplication};
+use crate::application::{BOX, TestApplication, expect};
+use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
-use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE};
+use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use std::time::Duration;
+use tokio::task::JoinSet;
 
 /// An operation of the OpenAPI document.
 #[derive(Clone)]
@@ -24,7 +26,7 @@ impl Operation {
     }
 
     fn takes_frames(&self) -> bool {
-        matches!(self.method, Method::POST | Method::PUT)
+        matches!(self.method, Method::POST | Method::PUT) && !self.path.ends_with("/token")
     }
 }
 
@@ -35,12 +37,14 @@ pub struct Attempt {
     id: Option<String>,
     /// Requests that are kept inside.
     _held: Option<RawConnection>,
+    _busy: Option<JoinSet<()>>,
     method: Method,
     path: String,
     query: Vec<(&'static str, &'static str)>,
     body: Vec<u8>,
     frames: usize,
     media_type: Option<&'static str>,
+    idempotency_key: Option<&'static str>,
     /// Sends the head alone.
     without_body: bool,
 }
@@ -53,7 +57,15 @@ fn settings(slug: &str, config: &mut Config) {
         "too-many-frames" => config.max_frames = 2,
         "too-many-sessions" => config.max_sessions = 1,
         "session-busy" => config.session_queue = 1,
-        "queue-full" => config.queue = 1,
+        "unauthorized" => config.access.api_keys = vec![Secret::from("me:0123456789abcdef")],
+        "queue-full" => {
+            (config.queue, config.workers) = (1, Some(1));
+            config.max_frames = heavy::FRAMES;
+        }
+        "quota-exceeded" => config.limits.client_requests = Some(1),
+        "request-too-costly" => {
+            config.limits.max_request_pixels = u64::from(pictures::WIDTH * pictures::HEIGHT);
+        }
         "not-ready" => config.shutdown_delay = Duration::from_secs(600),
         _ => {}
     }
@@ -68,12 +80,14 @@ impl Attempt {
             app,
             id: Some(id.clone()),
             _held: None,
+            _busy: None,
             method: operation.method.clone(),
             path: operation.path.replace("{id}", &id),
             query: Vec::new(),
             body: Vec::new(),
             frames: 1,
             media_type: None,
+            idempotency_key: None,
             without_body: false,
         };
         if operation.takes_frames() {
@@ -91,6 +105,32 @@ impl Attempt {
             "malformed-request" => self.query.push(("colour", "red")),
             "missing-frame" => self.body.clear(),
             "missing-box" => self.query.clear(),
+            "unauthorized" => {
+                self.app.key = Some("fedcba9876543210".to_owned());
+                self.id = None;
+            }
+            "forbidden" => {
+                let path = format!("/sessions/{}/token", self.id.as_ref().unwrap());
+                let request = self.app.request(Method::POST, &path, &[]);
+                let token = expect(request.send().await.unwrap(), StatusCode::OK).await;
+                self.app.key = Some(token["token"].as_str().unwrap().to_owned());
+            }
+            "session-expired" => {
+                self.app.clock.advance(Duration::from_secs(600));
+                self.id = None;
+            }
+            "idempotency-key-reused" => {
+                self.idempotency_key = Some("a key");
+                let response = self.send().await;
+                assert_eq!(
+                    response.status(),
+                    StatusCode::BAD_REQUEST,
+                    "no space is allowed"
+                );
+                self.idempotency_key = Some("a-key");
+                assert_eq!(self.send().await.status(), StatusCode::CREATED);
+                self.query = vec![("box", "21,15,16,12")];
+            }
             "session-not-found" => {
                 self.path = template.replace("{id}", "67e55044-10b1-426f-9247-bb680e5fe0c8");
             }
@@ -112,7 +152,9 @@ impl Attempt {
                 self.query.clear();
                 self.media_type = Some(SNAPSHOT_MEDIA_TYPE);
             }
-            "session-busy" | "queue-full" => {
+            "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
+            "request-too-costly" => self.frames = 2,
+            "session-busy" | "quota-exceeded" => {
                 let id = self.id.as_ref().unwrap();
                 let target = format!("/sessions/{id}/frames");
                 let held = RawConnection::hold(self.app.address, "POST", &target, 1000);
@@ -144,6 +186,9 @@ impl Attempt {
         if let Some(media_type) = self.media_type {
             request = request.header("content-type", media_type);
         }
+        if let Some(key) = self.idempotency_key {
+            request = request.header("idempotency-key", key);
+        }
         let request = if self.frames > 1 {
             let part = || Part::bytes(self.body.clone()).file_name("frame.png");
             let form = (0..self.frames).fold(Form::new(), |form, _| form.part("frame", part()));
@@ -163,34 +208,29 @@ impl Attempt {
     }
 }
 
-/// A service whose only worker has much to do.
+/// A service whose only worker has so much to do that whoever comes waits too long.
 pub struct Blocked {
     app: TestApplication,
     id: String,
+    _busy: JoinSet<()>,
 }
 
 impl Blocked {
     pub async fn start() -> Self {
         let app = TestApplication::start_with(|config| {
             config.workers = Some(1);
-            config.max_frames = 200;
-            config.work_timeout = Duration::from_secs(1);
+            config.session_queue = 64;
+            config.limits.client_requests = Some(256);
+            config.work_timeout = Duration::from_millis(200);
         });
         let app = app.await;
         let id = app.open().await;
-        // The most expensive parameters there are.
-        let params = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
-            "update_every": 1, "history": 10, "basis_dim": 6}"#;
-        let query = [("box", BOX), ("preset", "paper"), ("params", params)];
-        let response = app.create(pictures::png(0), &query).await;
-        let heavy = response.headers()["location"].to_str().unwrap().to_owned();
-        let part = || Part::bytes(pictures::png(1)).file_name("frame.png");
-        let form = (0..200).fold(Form::new(), |form, _| form.part("frame", part()));
-        let request = app.request(Method::POST, &format!("{heavy}/frames"), &[]);
-        // It too is told that it took too long, and keeps the worker.
-        let response = request.multipart(form).send().await.unwrap();
-        assert_eq!(response.status(), StatusCode::SERVICE_UNAVAILABLE);
-        Self { app, id }
+        let busy = heavy::flood(&app).await;
+        Self {
+            app,
+            id,
+            _busy: busy,
+        }
     }
 
     pub async fn attempt(&self, operation: &Operation) -> Response {

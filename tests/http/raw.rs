@@ -23,12 +23,41 @@ impl RawConnection {
         self.stream.write_all(bytes.as_ref()).await.unwrap();
     }
 
+    /// Sends, if the connection still takes it.
+    pub async fn try_send(&mut self, bytes: impl AsRef<[u8]>) -> std::io::Result<()> {
+        self.stream.write_all(bytes.as_ref()).await
+    }
+
+    /// Closes its own side of the connection.
+    pub async fn close_sending(&mut self) {
+        self.stream.shutdown().await.unwrap();
+    }
+
+    /// What comes next, or nothing where the connection was closed.
+    pub async fn read_some(&mut self) -> String {
+        let mut bytes = Vec::new();
+        let read = self.stream.read_buf(&mut bytes);
+        let _ = timeout(PATIENCE, read).await.expect("something comes");
+        String::from_utf8(bytes).unwrap()
+    }
+
     /// Announces a body of `length` bytes and waits until the service asks for it: from then on the request is
     /// inside, and it stays there until the body is sent.
     pub async fn hold(address: SocketAddr, method: &str, target: &str, length: usize) -> Self {
+        Self::hold_with(
+            address,
+            method,
+            target,
+            &format!("Content-Length: {length}"),
+        )
+        .await
+    }
+
+    /// Like [`Self::hold`], with other header lines than a length.
+    pub async fn hold_with(address: SocketAddr, method: &str, target: &str, lines: &str) -> Self {
         let mut connection = Self::open(address).await;
         let head = format!(
-            "{method} {target} HTTP/1.1\r\nHost: test\r\nContent-Length: {length}\r\n\
+            "{method} {target} HTTP/1.1\r\nHost: test\r\n{lines}\r\n\
              Expect: 100-continue\r\nConnection: close\r\n\r\n"
         );
         connection.send(head).await;
@@ -38,6 +67,25 @@ impl RawConnection {
         timeout(PATIENCE, read).await.unwrap().unwrap();
         assert_eq!(&got, expected);
         connection
+    }
+
+    /// The next answer, whose length is announced; the connection may stay open.
+    pub async fn read_answer(&mut self) -> String {
+        let mut bytes = Vec::new();
+        loop {
+            let text = String::from_utf8_lossy(&bytes);
+            if let Some((head, body)) = text.split_once("\r\n\r\n") {
+                let mut lines = head.lines().filter_map(|line| line.split_once(": "));
+                let length = lines.find(|(name, _)| name.eq_ignore_ascii_case("content-length"));
+                let length: usize = length.expect("an announced length").1.parse().unwrap();
+                if body.len() >= length {
+                    return text.into_owned();
+                }
+            }
+            let read = self.stream.read_buf(&mut bytes);
+            let read = timeout(PATIENCE, read).await.expect("an answer comes");
+            assert_ne!(read.unwrap(), 0, "it ended early: {bytes:?}");
+        }
     }
 
     /// Everything until the service closes the connection.

@@ -2,14 +2,31 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
+use bagtrack::http::Secret;
+use bagtrack::sessions::{Answered, MAC_BYTES, MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
 use reqwest::StatusCode;
+
+const OLD: &str = "the secret of last year";
+const NEW: &str = "the secret of this year";
+
+/// A service with these secrets.
+async fn with_secrets(secrets: &[&str]) -> TestApplication {
+    let secrets = secrets.iter().copied().map(Secret::from).collect();
+    TestApplication::start_with(|config| config.access.snapshot_keys = secrets).await
+}
+
+/// A service that takes unsigned snapshots, and up to `max_frames` frames in a request.
+async fn unsigned(max_frames: usize) -> TestApplication {
+    TestApplication::start_with(|config| {
+        config.access.unsigned_snapshots = true;
+        config.max_frames = max_frames;
+    })
+    .await
+}
 
 #[tokio::test]
 async fn a_session_goes_on_elsewhere_bit_for_bit() {
-    let (here, there) = (
-        TestApplication::start().await,
-        TestApplication::start().await,
-    );
+    let (here, there) = (with_secrets(&[OLD]).await, with_secrets(&[NEW, OLD]).await);
     let id = here.open().await;
     for t in 1..12 {
         here.post_frame(&id, pictures::png(t)).await;
@@ -52,7 +69,7 @@ async fn a_damaged_snapshot_is_refused() {
     let app = TestApplication::start().await;
     let id = app.open().await;
     let snapshot = app.snapshot(&id).await;
-    let magic = bagtrack::sessions::SNAPSHOT_MAGIC.len();
+    let magic = SNAPSHOT_MAGIC.len();
     for position in (magic..snapshot.len()).step_by(snapshot.len() / 40) {
         let mut damaged = snapshot.clone();
         damaged[position] ^= 0x10;
@@ -63,4 +80,102 @@ async fn a_damaged_snapshot_is_refused() {
     }
     let response = app.create(snapshot, &[("box", BOX)]).await;
     expect_problem(response, "malformed-request").await;
+}
+
+#[tokio::test]
+async fn a_snapshot_is_taken_from_services_with_the_same_secret_only() {
+    let restored = async |from: &TestApplication, to: &TestApplication| {
+        let id = from.open().await;
+        to.create(from.snapshot(&id).await, &[]).await
+    };
+    let (old, new) = (with_secrets(&[OLD]).await, with_secrets(&[NEW]).await);
+    let both = with_secrets(&[NEW, OLD]).await;
+    let (none, other) = (
+        TestApplication::start().await,
+        TestApplication::start().await,
+    );
+    let (open, open_too) = (unsigned(64).await, unsigned(64).await);
+    // While a secret is replaced, both are accepted, and the new one signs.
+    for (from, to) in [
+        (&old, &both),
+        (&both, &new),
+        (&none, &none),
+        (&open, &open_too),
+    ] {
+        expect(restored(from, to).await, StatusCode::CREATED).await;
+    }
+    for (from, to) in [
+        (&old, &new),
+        (&both, &old),
+        (&none, &other),
+        (&open, &none),
+        (&old, &open),
+    ] {
+        let problem = expect_problem(restored(from, to).await, "invalid-snapshot").await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains("BAGTRACK_SNAPSHOT_KEYS"), "{detail}");
+    }
+}
+
+/// An unsigned snapshot with another list of stored answers, under the code that everybody can make.
+fn forged(snapshot: &[u8], change: impl FnOnce(&mut Vec<Answered>)) -> Vec<u8> {
+    let (head, content) = snapshot.split_at(SNAPSHOT_MAGIC.len() + 1);
+    let content = &content[..content.len() - MAC_BYTES];
+    let (tracker, rest) = postcard::take_from_bytes::<&[u8]>(content).unwrap();
+    let mut recent: Vec<Answered> = postcard::from_bytes(rest).unwrap();
+    change(&mut recent);
+    let content = postcard::to_stdvec(&(tracker, recent)).unwrap();
+    let mut bytes = [head, &content[..]].concat();
+    let keys = MacKeys::new(SNAPSHOT_KEY_CONTEXT, &[""; 0]).accepting_unsigned(false);
+    let code = keys.sign(&bytes);
+    bytes.extend(code);
+    bytes
+}
+
+#[tokio::test]
+async fn a_forged_list_of_stored_answers_is_refused() {
+    let app = unsigned(64).await;
+    let id = app.open().await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    let snapshot = app.snapshot(&id).await;
+    let same = forged(&snapshot, |_| ());
+    assert!(same == snapshot, "the test knows the format");
+    let long = forged(&snapshot, |recent| *recent = recent.repeat(200_000));
+    assert!(long.len() > 10_000_000);
+    expect_problem(app.create(long, &[]).await, "invalid-snapshot").await;
+    let empty = forged(&snapshot, Vec::clear);
+    expect_problem(app.create(empty, &[]).await, "invalid-snapshot").await;
+    expect(app.create(same, &[]).await, StatusCode::CREATED).await;
+}
+
+#[tokio::test]
+async fn only_as_many_stored_answers_are_kept_as_a_request_may_have() {
+    let (here, there) = (unsigned(64).await, unsigned(2).await);
+    let id = here.open().await;
+    let form = (1..5).fold(reqwest::multipart::Form::new(), |form, t| {
+        let part = reqwest::multipart::Part::bytes(pictures::png(t)).file_name("frame.png");
+        form.part("frame", part)
+    });
+    let request = here.request(
+        reqwest::Method::POST,
+        &format!("/sessions/{id}/frames"),
+        &[],
+    );
+    expect(
+        request.multipart(form).send().await.unwrap(),
+        StatusCode::OK,
+    )
+    .await;
+    let full = here.snapshot(&id).await;
+    let restored = expect(there.create(full.clone(), &[]).await, StatusCode::CREATED).await;
+    let id = restored["id"].as_str().unwrap();
+    let kept = there.snapshot(id).await;
+    assert!(
+        kept.len() + 60 < full.len(),
+        "{} of {}",
+        kept.len(),
+        full.len()
+    );
+    let again = there.post_numbered(id, 4, pictures::png(4)).await;
+    assert_eq!(again.headers()["replayed"], "true");
 }

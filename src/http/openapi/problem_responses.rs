@@ -15,6 +15,13 @@ use utoipa::openapi::{
 /// The problem that every operation may answer.
 pub const ALWAYS: &[Kind] = &[Kind::Internal];
 
+/// The problems that every operation on a session may answer.
+pub const SESSION: &[Kind] = &[
+    Kind::Unauthorized,
+    Kind::SessionNotFound,
+    Kind::SessionExpired,
+];
+
 /// The problems that every operation with frames may answer.
 pub const UPLOAD: &[Kind] = &[
     Kind::MalformedRequest,
@@ -25,6 +32,7 @@ pub const UPLOAD: &[Kind] = &[
     Kind::TooManyFrames,
     Kind::UnsupportedImage,
     Kind::FrameDamaged,
+    Kind::QuotaExceeded,
     Kind::QueueFull,
     Kind::WorkTimeout,
     Kind::Internal,
@@ -80,6 +88,12 @@ fn example(kind: Kind) -> Problem {
         Kind::MalformedRequest => Problem::malformed("`box` is given twice; give it once."),
         Kind::MissingFrame => Problem::missing_frame(),
         Kind::MissingBox => Problem::missing_box(),
+        Kind::Unauthorized => Problem::unauthorized(),
+        Kind::Forbidden => Problem::forbidden(),
+        Kind::OriginNotAllowed => Problem::origin_not_allowed(),
+        Kind::HostNotAllowed => Problem::host_not_allowed(),
+        Kind::SessionExpired => Problem::session_expired(),
+        Kind::IdempotencyKeyReused => Problem::idempotency_key_reused(),
         Kind::RouteNotFound => Problem::route_not_found(),
         Kind::SessionNotFound => Problem::session_not_found(),
         Kind::MethodNotAllowed => Problem::method_not_allowed(),
@@ -93,6 +107,9 @@ fn example(kind: Kind) -> Problem {
             expected: 4,
         }),
         Kind::BodyTooLarge => Problem::body_too_large(33_554_432),
+        Kind::UriTooLong => Problem::uri_too_long(),
+        Kind::HeadTooLarge => Problem::head_too_large(),
+        Kind::RequestTooCostly => Problem::too_many_pixels(500_000_000, 160_000_000),
         Kind::FrameTooLarge => {
             let limit = "a side of 9000 px is over the limit of 8192 px".to_owned();
             IngestError::TooLarge(limit).into()
@@ -115,6 +132,7 @@ fn example(kind: Kind) -> Problem {
         }
         Kind::InvalidSnapshot => SnapshotError::Damaged.into(),
         Kind::SessionBusy => SessionBusy.into(),
+        Kind::QuotaExceeded => Problem::quota_exceeded("requests in flight", 64),
         Kind::Internal => Problem::panicked(),
         Kind::QueueFull => QueueFull.into(),
         Kind::TooManySessions => TooManySessions(1024).into(),

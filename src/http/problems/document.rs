@@ -63,7 +63,7 @@ pub fn respond(problem: &Problem, instance: String, request_id: String) -> Respo
     let mut response = (problem.kind().status(), document).into_response();
     let headers = response.headers_mut();
     headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-    if let Some(seconds) = problem.kind().retry_after() {
+    if let Some(seconds) = problem.retry_seconds() {
         headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
     }
     response

@@ -4,7 +4,8 @@ use super::kind::Kind;
 use super::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
-    QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError, TooManySessions, WorkLost,
+    BytesFull, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
+    Stopped, TooManySessions, WorkLost,
 };
 use crate::tracker::TrackerError;
 use std::sync::Arc;
@@ -62,7 +63,8 @@ impl From<TrackerError> for Problem {
 
 impl From<SnapshotError> for Problem {
     fn from(error: SnapshotError) -> Self {
-        let detail = format!("{error}. Send the bytes of GET /sessions/{{id}}/snapshot unchanged.");
+        let advice = "Send the bytes of GET /sessions/{id}/snapshot unchanged, to a service with the same keys.";
+        let detail = format!("{error}. {advice}");
         Self::new(Kind::InvalidSnapshot, detail).caused_by(Arc::new(error))
     }
 }
@@ -74,6 +76,19 @@ impl From<QueueFull> for Problem {
     }
 }
 
+impl From<BytesFull> for Problem {
+    fn from(full: BytesFull) -> Self {
+        match full {
+            BytesFull::All => QueueFull.into(),
+            BytesFull::Client => {
+                let detail = "The bodies of this client's requests take as much memory as one client's may. Try again \
+                    after the time in `Retry-After`. Nothing was changed.";
+                Self::new(Kind::QuotaExceeded, detail)
+            }
+        }
+    }
+}
+
 impl From<TooManySessions> for Problem {
     fn from(_: TooManySessions) -> Self {
         let detail =
@@ -82,10 +97,35 @@ impl From<TooManySessions> for Problem {
     }
 }
 
+impl From<Stopped> for Problem {
+    fn from(stopped: Stopped) -> Self {
+        match stopped {
+            Stopped::Cost(limit) => {
+                let detail = format!(
+                    "The frames of this request took more than {limit:?} of processor time. Send fewer or smaller \
+                     frames in a request. None of them was tracked."
+                );
+                Self::new(Kind::RequestTooCostly, detail)
+            }
+            // Nobody reads the answer to work that was abandoned.
+            Stopped::Deadline | Stopped::Abandoned => Self::work_timeout(),
+        }
+    }
+}
+
 impl From<SessionBusy> for Problem {
     fn from(_: SessionBusy) -> Self {
         let detail = "Wait for the answers to the frames already sent. The session is unchanged.";
         Self::new(Kind::SessionBusy, detail)
+    }
+}
+
+impl From<NoSession> for Problem {
+    fn from(error: NoSession) -> Self {
+        match error {
+            NoSession::Unknown => Self::session_not_found(),
+            NoSession::Expired => Self::session_expired(),
+        }
     }
 }
 

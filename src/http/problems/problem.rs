@@ -4,6 +4,7 @@ use super::kind::Kind;
 use axum::response::{IntoResponse, Response};
 use std::error::Error;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What went wrong with a request.
 #[derive(Debug, Clone)]
@@ -14,6 +15,8 @@ pub struct Problem {
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     index: Option<usize>,
+    /// When trying again makes sense, where it is known better than by the kind.
+    retry_after: Option<Duration>,
     /// The cause, for the log only.
     cause: Option<Arc<dyn Error + Send + Sync>>,
 }
@@ -25,6 +28,7 @@ impl Problem {
             detail: detail.into(),
             expected_frame: None,
             index: None,
+            retry_after: None,
             cause: None,
         }
     }
@@ -53,11 +57,52 @@ impl Problem {
         Self::new(Kind::RouteNotFound, "See /docs for the paths there are.")
     }
 
-    /// No live session has this id.
+    /// The request has no key, or none that is valid.
+    pub fn unauthorized() -> Self {
+        let detail =
+            "Send an API key, or a session token that has not ended: `Authorization: Bearer …`.";
+        Self::new(Kind::Unauthorized, detail)
+    }
+
+    /// The request needs an API key, and came with a session token.
+    pub fn forbidden() -> Self {
+        let detail =
+            "Use an API key: a session token is good for what is below its own session only.";
+        Self::new(Kind::Forbidden, detail)
+    }
+
+    /// A browser sent the request for a page of another origin.
+    pub fn origin_not_allowed() -> Self {
+        let detail = "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
+        Self::new(Kind::OriginNotAllowed, detail)
+    }
+
+    /// The request names another host.
+    pub fn host_not_allowed() -> Self {
+        let detail =
+            "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
+        Self::new(Kind::HostNotAllowed, detail)
+    }
+
+    /// No live session of the client has this id.
     pub fn session_not_found() -> Self {
-        let detail = "The session was never opened here, was deleted or has expired; open a new one with POST \
+        let detail = "The session was never opened here with this key, or was deleted; open a new one with POST \
             /sessions.";
         Self::new(Kind::SessionNotFound, detail)
+    }
+
+    /// The session was not used for too long.
+    pub fn session_expired() -> Self {
+        let detail = "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST \
+            /sessions.";
+        Self::new(Kind::SessionExpired, detail)
+    }
+
+    /// The idempotency key came with another request before.
+    pub fn idempotency_key_reused() -> Self {
+        let detail =
+            "Send the same frame and settings as the first time, or a new `Idempotency-Key`.";
+        Self::new(Kind::IdempotencyKeyReused, detail)
     }
 
     /// The route has other methods.
@@ -66,6 +111,23 @@ impl Problem {
             Kind::MethodNotAllowed,
             "The header `Allow` lists the methods there are.",
         )
+    }
+
+    /// The path and query have more bytes than they may.
+    pub fn uri_too_long() -> Self {
+        Self::new(Kind::UriTooLong, "Send settings in the body.")
+    }
+
+    /// The head has more bytes or lines than it may.
+    pub fn head_too_large() -> Self {
+        Self::new(Kind::HeadTooLarge, "Send fewer or shorter headers.")
+    }
+
+    /// The address has as many connections as it may, and all of them are busy.
+    pub fn too_many_connections() -> Self {
+        let detail = "This address has as many connections as one may, all of them busy. Use them again, or try again \
+            after the time in `Retry-After`.";
+        Self::new(Kind::QuotaExceeded, detail)
     }
 
     /// The body did not arrive in time.
@@ -79,6 +141,23 @@ impl Problem {
         let detail =
             format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
         Self::new(Kind::BodyTooLarge, detail)
+    }
+
+    /// The frames of the request have more pixels than those of one request may.
+    pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
+        let detail = format!(
+            "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
+             in a request. None of them was tracked."
+        );
+        Self::new(Kind::RequestTooCostly, detail)
+    }
+
+    /// The client has as many of something as one client may have.
+    pub fn quota_exceeded(what: &str, limit: usize) -> Self {
+        let detail = format!(
+            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
+        );
+        Self::new(Kind::QuotaExceeded, detail)
     }
 
     /// The request has more frames than it may.
@@ -103,7 +182,16 @@ impl Problem {
 
     /// The service is about to end.
     pub fn not_ready() -> Self {
-        Self::new(Kind::NotReady, "Send requests to another instance.")
+        let detail = "The service is about to end. Open sessions at another instance.";
+        Self::new(Kind::NotReady, detail)
+    }
+
+    /// The queue is full.
+    pub fn saturated() -> Self {
+        Self::new(
+            Kind::NotReady,
+            "The queue is full. Send requests to another instance.",
+        )
     }
 
     /// The service failed.
@@ -138,6 +226,22 @@ impl Problem {
     pub(super) fn expecting_frame(mut self, number: u64) -> Self {
         self.expected_frame = Some(number);
         self
+    }
+
+    /// Says when trying again makes sense.
+    pub fn retry_after(mut self, wait: Duration) -> Self {
+        self.retry_after = Some(wait);
+        self
+    }
+
+    /// Seconds after which trying again makes sense, where it does; at least 1.
+    pub fn retry_seconds(&self) -> Option<u32> {
+        let known = self
+            .retry_after
+            .map(|wait| wait.as_secs_f64().ceil() as u32);
+        known
+            .map(|seconds| seconds.max(1))
+            .or_else(|| self.kind.retry_after())
     }
 
     /// Its kind.

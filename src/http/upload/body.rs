@@ -1,6 +1,11 @@
 //! Reading a request body, and the problem that a failure is.
+//!
+//! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
+//! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
 
+use super::pace::TooSlow;
 use crate::http::problems::problem::Problem;
+use crate::sessions::{ByteCharge, BytesFull};
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
@@ -8,15 +13,75 @@ use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
 use tower_http::timeout::TimeoutError;
 
+/// Bytes that a buffer begins with, where the body is not smaller.
+const FIRST_BYTES: usize = 64 << 10;
+
+/// Bytes that arrive, with the memory that they are charged to.
+pub(super) struct Buffer<'a> {
+    bytes: Vec<u8>,
+    /// Most bytes that may come.
+    max: usize,
+    charge: &'a mut ByteCharge,
+}
+
+impl<'a> Buffer<'a> {
+    /// Empty, for at most `max` bytes.
+    pub(super) fn new(max: usize, charge: &'a mut ByteCharge) -> Self {
+        Self {
+            bytes: Vec::new(),
+            max,
+            charge,
+        }
+    }
+
+    /// Adds a piece. The buffer doubles where it is too small.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), BytesFull> {
+        let (len, capacity) = (self.bytes.len(), self.bytes.capacity());
+        let needed = len + piece.len();
+        if needed > capacity {
+            let wanted = (2 * capacity).max(FIRST_BYTES).min(self.max).max(needed);
+            self.charge.grow(wanted - capacity)?;
+            self.bytes.reserve_exact(wanted - len);
+        }
+        self.bytes.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// How many bytes there are.
+    pub(super) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// All bytes.
+    pub(super) fn finish(self) -> Bytes {
+        self.bytes.into()
+    }
+}
+
 /// Reads the whole body, of at most `max_bytes` bytes.
 ///
 /// # Errors
-/// It is too large, too slow or cut short.
-pub(super) async fn read(body: Body, max_bytes: usize) -> Result<Bytes, Problem> {
-    match Limited::new(body, max_bytes).collect().await {
-        Ok(collected) => Ok(collected.to_bytes()),
-        Err(error) => Err(problem(error.as_ref(), max_bytes)),
+/// It is too large, too slow or cut short, or there is no memory for it.
+pub(super) async fn read(
+    body: Body,
+    max_bytes: usize,
+    charge: &mut ByteCharge,
+) -> Result<Bytes, Problem> {
+    let announced = http_body::Body::size_hint(&body).upper();
+    let announced = announced.and_then(|bytes| usize::try_from(bytes).ok());
+    let mut body = Limited::new(body, max_bytes);
+    let mut buffer = Buffer::new(announced.unwrap_or(max_bytes).min(max_bytes), charge);
+    while let Some(frame) = body.frame().await {
+        let frame = frame.map_err(|error| problem(error.as_ref(), max_bytes))?;
+        // Trailers mean nothing here.
+        if let Ok(piece) = frame.into_data() {
+            buffer.add(&piece)?;
+        }
     }
+    Ok(buffer.finish())
 }
 
 /// The problem that an error of reading a body is, or of parsing it as it comes. The reason is somewhere in the chain
@@ -27,8 +92,11 @@ pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Proble
         if error.is::<LengthLimitError>() {
             return Problem::body_too_large(max_bytes);
         }
-        if error.is::<TimeoutError>() {
+        if error.is::<TimeoutError>() || error.is::<TooSlow>() {
             return Problem::body_timeout();
+        }
+        if let Some(full) = error.downcast_ref::<BytesFull>() {
+            return (*full).into();
         }
         if let Some(error) = error.downcast_ref::<MultipartError>()
             && error.status().is_client_error()

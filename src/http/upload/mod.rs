@@ -7,16 +7,20 @@
 //!
 //! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](settings::Settings) type of the route.
 //! Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then for what the
-//! route needs besides (a session, room for one), then for a full queue, and only then for its body.
+//! route needs besides (a session, room for one), then for its announced length, a full queue and the client's quota,
+//! and only then for its body. Memory is charged as the bytes of the body arrive, and a place in the queue is taken when
+//! all of them are there.
 //!
 //! What can go wrong: the body is slow, too large or not what it says; parsed JSON takes many times the memory of its
 //! text; a setting is unknown, doubled or no value of its type. Each is a problem document, and no session changes.
 
+pub mod admit;
 mod body;
 mod fields;
 mod json;
 mod multipart;
 pub mod overrides;
+mod pace;
 pub mod session_request;
 pub mod settings;
 pub mod texts;

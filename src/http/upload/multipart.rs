@@ -1,18 +1,22 @@
 //! Multipart uploads: `frame` parts are files, all others are settings.
 
-use super::body;
+use super::body::{self, Buffer};
 use super::fields::Fields;
+use super::texts::MAX_TEXT_BYTES;
 use crate::http::problems::problem::Problem;
-use axum::extract::multipart::MultipartError;
+use crate::sessions::ByteCharge;
+use axum::body::Bytes;
+use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
 
 /// Adds the parts of a multipart body to `fields`: at most `max_files` files. The router limits all bodies to
-/// `max_bytes` bytes.
+/// `max_bytes` bytes. What is kept is charged to `charge`.
 pub(super) async fn read(
     request: Request,
     max_bytes: usize,
     max_files: usize,
     fields: &mut Fields,
+    charge: &mut ByteCharge,
 ) -> Result<(), Problem> {
     let failed = |error: MultipartError| body::problem(&error, max_bytes);
     let mut multipart = Multipart::from_request(request, &()).await.map_err(|_| {
@@ -21,13 +25,35 @@ pub(super) async fn read(
     while let Some(part) = multipart.next_field().await.map_err(failed)? {
         let name = part.name().unwrap_or("").to_owned();
         if name != "frame" {
-            let text = part.text().await.map_err(failed)?;
-            fields.texts.add(&name, &text)?;
+            // One byte more than may be, so that a longer text is refused as such.
+            let text = read_part(part, max_bytes, MAX_TEXT_BYTES + 1, charge).await?;
+            fields.texts.add(&name, &String::from_utf8_lossy(&text))?;
         } else if fields.files.len() < max_files {
-            fields.files.push(part.bytes().await.map_err(failed)?);
+            let file = read_part(part, max_bytes, max_bytes, charge).await?;
+            fields.files.push(file);
         } else {
             return Err(Problem::too_many_frames(max_files));
         }
     }
     Ok(())
+}
+
+/// The bytes of a part; no more than about `enough` are kept.
+async fn read_part(
+    mut part: Field<'_>,
+    max_bytes: usize,
+    enough: usize,
+    charge: &mut ByteCharge,
+) -> Result<Bytes, Problem> {
+    let mut buffer = Buffer::new(enough, charge);
+    while let Some(piece) = part
+        .chunk()
+        .await
+        .map_err(|error| body::problem(&error, max_bytes))?
+    {
+        if buffer.len() < enough {
+            buffer.add(&piece)?;
+        }
+    }
+    Ok(buffer.finish())
 }

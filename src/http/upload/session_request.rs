@@ -1,5 +1,6 @@
 //! A request with frames for a live session.
 
+use super::admit::admit;
 use super::settings::Settings;
 use super::texts::Texts;
 use super::uploaded::Upload;
@@ -28,9 +29,9 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
         let (mut parts, body) = request.into_parts();
         let path = SessionPath::from_request_parts(&mut parts, state).await?;
         let permit = path.find(state)?.enter()?;
-        let queue = state.enter(&parts.headers)?;
+        let client = admit(state, &parts)?;
         let request = Request::from_parts(parts, body);
-        let upload = Upload::read(state, &queue, texts, request).await?;
+        let (upload, queue) = Upload::read(state, client, texts, request).await?;
         Ok(Self {
             permit,
             queue,

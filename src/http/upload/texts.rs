@@ -7,7 +7,7 @@ use axum::http::Uri;
 use serde_json::{Map, Value};
 
 /// Most bytes of a setting. All parameters of the tracker together take some hundred.
-const MAX_TEXT_BYTES: usize = 16 << 10;
+pub(super) const MAX_TEXT_BYTES: usize = 16 << 10;
 /// Most bytes of the name of a setting.
 const MAX_NAME_BYTES: usize = 64;
 /// Most settings of a request; no route has nearly as many.

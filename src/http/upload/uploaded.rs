@@ -1,16 +1,19 @@
 //! The frames and settings of a request, whichever form they came in.
 
 use super::fields::Fields;
+use super::pace::{Pace, PacedBody};
 use super::settings::{FrameCount, Settings};
 use super::texts::Texts;
 use super::{body, json, multipart};
+use crate::http::clients::RequestPermit;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use crate::http::{snapshot, work};
-use crate::sessions::QueuePermit;
-use axum::body::Bytes;
+use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
+use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
+use std::sync::Arc;
 
 /// What a client uploaded.
 #[derive(Debug)]
@@ -24,17 +27,26 @@ pub struct Upload<S> {
 }
 
 impl<S: Settings> Upload<S> {
-    /// Reads the body; `texts` are the settings of the query. JSON is parsed on a worker.
+    /// Reads the body, then takes a place in the queue; `texts` are the settings of the query. JSON is parsed on a
+    /// worker. The place holds `permit` and the memory of the files until the request's work has ended.
     ///
     /// # Errors
-    /// The body cannot be read, it has too few or too many frames, or a setting is wrong.
+    /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
+    /// has sent too many frames lately.
     pub async fn read(
         state: &AppState,
-        queue: &QueuePermit,
+        permit: RequestPermit,
         texts: Texts,
         request: Request,
-    ) -> Result<Self, Problem> {
+    ) -> Result<(Self, QueuePermit), Problem> {
         let max_bytes = state.config.max_body_bytes;
+        let limits = &state.config.limits;
+        let pace = Pace {
+            grace: limits.body_grace,
+            min_rate: limits.min_body_rate,
+        };
+        let new_charge = || ByteCharge::new(&state.uploads, permit.bytes());
+        let mut charge = new_charge();
         let max_files = match S::FRAMES {
             FrameCount::One => 1,
             FrameCount::Several => state.config.max_frames,
@@ -44,28 +56,42 @@ impl<S: Settings> Upload<S> {
             files: Vec::new(),
             texts,
         };
+        let mut json = None;
         if media_type == "multipart/form-data" {
-            multipart::read(request, max_bytes, max_files, &mut fields).await?;
+            // The parser keeps bytes that it has not given out yet; they are charged beside the files.
+            let arriving = Some(new_charge());
+            let request = request.map(|body| Body::new(PacedBody::new(body, pace, arriving)));
+            multipart::read(request, max_bytes, max_files, &mut fields, &mut charge).await?;
         } else {
-            let bytes = body::read(request.into_body(), max_bytes).await?;
+            let body = Body::new(PacedBody::new(request.into_body(), pace, None));
+            let bytes = body::read(body, max_bytes, &mut charge).await?;
             // No image and no snapshot starts like a JSON object, which curl's -d mislabels too.
             if media_type == "application/json" || bytes.starts_with(b"{") {
-                let parse = move || {
-                    json::read::<S>(&bytes, max_files, &mut fields)?;
-                    Ok(fields)
-                };
-                fields = work::run(state, queue.clone(), parse).await?;
+                charge.grow(json::DECODED_PER_BYTE * bytes.len())?;
+                json = Some(bytes);
             } else if !bytes.is_empty() {
                 fields.files.push(bytes);
             }
         }
+        let (lane, permit) = (permit.lane(), Arc::new(permit));
+        let held = Box::new((charge, permit.clone()));
+        let queue = state.admission.enter(lane, held)?;
+        if let Some(bytes) = json {
+            let parse = move |_: &mut WorkMeter| {
+                json::read::<S>(&bytes, max_files, &mut fields)?;
+                Ok(fields)
+            };
+            fields = work::run(state, queue.clone(), parse).await?;
+        }
         let Fields { files, texts } = fields;
         check_files(&files, max_files)?;
-        Ok(Self {
-            files,
+        let upload = Self {
             settings: texts.parse()?,
             is_snapshot: media_type == snapshot::MEDIA_TYPE,
-        })
+            files,
+        };
+        permit.count_frames(upload.files.len())?;
+        Ok((upload, queue))
     }
 }
 

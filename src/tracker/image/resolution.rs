@@ -9,7 +9,7 @@ use crate::tracker::image::rect::Rect;
 /// paper's pixel lengths hold at this size, and a smaller image would show too little around a large target.
 pub const MIN_WORKING_SIDE: u32 = 320;
 /// The longest side of a working image, in pixels. It bounds what a session costs.
-pub const MAX_WORKING_SIDE: u32 = 1920;
+pub const MAX_WORKING_SIDE: u32 = 1280;
 
 /// The size of the working image of uploads of the size `source`, both sides above 0: never larger than these, the
 /// aspect kept, each side rounded to whole pixels. In it `target`, a box in the upload's pixels, has √(width · height) of
@@ -42,11 +42,11 @@ mod tests {
         assert_eq!(size((1280, 720), 512.0, 512.0, 64.0), (320, 180));
         assert_eq!(size((200, 300), 90.0, 90.0, 64.0), (200, 300));
         assert_eq!(size((1280, 720), 10.0, 9.0, 64.0), (1280, 720));
-        assert_eq!(size((3840, 2160), 10.0, 10.0, 64.0), (1920, 1080));
+        assert_eq!(size((3840, 2160), 10.0, 10.0, 64.0), (1280, 720));
         // 128 pixels become 64.
         assert_eq!(size((1280, 720), 128.0, 128.0, 64.0), (640, 360));
         assert_eq!(size((1280, 720), 64.0, 256.0, 64.0), (640, 360));
-        assert_eq!(size((8000, 2), 128.0, 128.0, 64.0), (1920, 1));
+        assert_eq!(size((8000, 2), 128.0, 128.0, 64.0), (1280, 1));
         assert_eq!(size((1280, 720), 10.0, 10.0, 0.0), (320, 180));
         assert_eq!(size((1280, 720), 0.0, 0.0, 64.0), (320, 180));
     }

@@ -1,0 +1,54 @@
+//! Requests of some kilobytes with 64 images of 33 megapixels, for sessions of another size.
+
+use crate::good::{GoodClients, frames};
+use crate::target::Target;
+use crate::{Options, Outcome, Verdict};
+use image::{DynamicImage, ImageFormat, RgbImage};
+use reqwest::multipart::{Form, Part};
+use std::io::Cursor;
+use std::time::Instant;
+use tokio::task::JoinSet;
+
+pub const SETTINGS: &[&str] = &[];
+
+/// A lossless WebP of equal pixels.
+pub fn bomb() -> Outcome<Vec<u8>> {
+    let picture = RgbImage::from_pixel(8192, 4094, image::Rgb([77; 3]));
+    let mut bytes = Cursor::new(Vec::new());
+    DynamicImage::ImageRgb8(picture).write_to(&mut bytes, ImageFormat::WebP)?;
+    Ok(bytes.into_inner())
+}
+
+/// A form with so many of them.
+pub fn form(bomb: &[u8], count: usize) -> Form {
+    let part = || Part::bytes(bomb.to_vec()).file_name("frame.webp");
+    (0..count).fold(Form::new(), |form, _| form.part("frame", part()))
+}
+
+pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
+    let (bomb, frames) = (bomb()?, frames()?);
+    let good = GoodClients::start(target, 4).await?;
+    let mut attackers = JoinSet::new();
+    let end = Instant::now() + options.duration();
+    for number in 0..4 {
+        let client = format!("198.51.100.{number}");
+        let session = target.open(&client, &frames[0], "").await?;
+        let (http, bomb) = (target.http.clone(), bomb.clone());
+        let url = format!("{}{session}/frames", target.url);
+        attackers.spawn(async move {
+            let (mut sent, mut taken) = (0u32, 0u32);
+            while Instant::now() < end {
+                let request = http.post(&url).header("x-forwarded-for", &client);
+                let answer = request.multipart(form(&bomb, 64)).send().await;
+                sent += 1;
+                taken += u32::from(answer.is_ok_and(|answer| answer.status() != 422));
+            }
+            (sent, taken)
+        });
+    }
+    let counts = attackers.join_all().await;
+    let sent: u32 = counts.iter().map(|count| count.0).sum();
+    let taken: u32 = counts.iter().map(|count| count.1).sum();
+    let seen = format!("{sent} requests with 64 bombs, {taken} not answered with 422");
+    good.verdict(taken == 0 && sent > 0, seen).await
+}

@@ -1,0 +1,139 @@
+//! Attacks on the service: `cargo build --release && cargo run --release --example attack -- --short`.
+//!
+//! Each attack runs against a server of its own, beside good clients that send 25 frames a second. It gets through when a
+//! good client loses a frame, when the service answers what it should refuse, or when it takes more memory than it said
+//! at its start. Then this program ends with status 1.
+//!
+//! The server believes `X-Forwarded-For` from this machine, so that attackers and good clients have addresses of their
+//! own. `--url` attacks a server that runs already; give it `--trusted-proxies 127.0.0.0/8`. Its memory is not measured.
+//!
+//! Linux only: memory is read from `/proc`.
+
+mod costly_sessions;
+mod decode_bombs;
+mod fat_frame;
+mod garbage;
+mod good;
+mod greedy_client;
+mod half_close;
+mod idle_flood;
+mod json_copies;
+mod large_length;
+mod mix;
+mod never_readers;
+mod odd_heads;
+mod raw;
+mod session_hoard;
+mod silent_bodies;
+mod target;
+
+use clap::Parser;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+use target::Target;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
+
+/// What an attack came to: what was seen, and what got through.
+#[derive(Debug, Default)]
+pub struct Verdict {
+    seen: String,
+    got_through: Option<String>,
+}
+
+impl Verdict {
+    /// Held, where `holds`; otherwise `seen` is what got through.
+    pub fn new(holds: bool, seen: impl Into<String>) -> Self {
+        let seen = seen.into();
+        let got_through = (!holds).then(|| seen.clone());
+        Self { seen, got_through }
+    }
+}
+
+/// What to attack, and for how long.
+#[derive(Debug, Parser)]
+pub struct Options {
+    /// Each attack for some seconds, with shorter time limits of the server.
+    #[arg(long)]
+    short: bool,
+    /// Only the attacks whose names contain this; `mix` is left out unless it is named.
+    #[arg(long)]
+    only: Option<String>,
+    /// Seconds of the mix.
+    #[arg(long, default_value_t = 600)]
+    seconds: u64,
+    /// Attack this server instead of one of its own.
+    #[arg(long)]
+    url: Option<String>,
+    /// The server's binary; otherwise `bagtrack` beside this program's folder.
+    #[arg(long)]
+    server: Option<PathBuf>,
+}
+
+impl Options {
+    /// How long an attack goes on.
+    pub fn duration(&self) -> Duration {
+        Duration::from_secs(if self.short { 2 } else { 10 })
+    }
+}
+
+#[tokio::main(worker_threads = 2)]
+async fn main() -> ExitCode {
+    let options = Options::parse();
+    let mut failed = 0;
+    macro_rules! attack {
+        ($($name:ident),*) => {$(
+            let name = stringify!($name);
+            let wanted = match &options.only {
+                Some(only) => name.contains(only.as_str()),
+                None => name != "mix",
+            };
+            if wanted {
+                let begun = Instant::now();
+                let verdict = match Target::start(&options, $name::SETTINGS).await {
+                    Ok(target) => $name::attack(&target, &options).await,
+                    Err(error) => Err(error),
+                };
+                failed += report(name, begun, verdict);
+            }
+        )*};
+    }
+    attack!(
+        decode_bombs,
+        costly_sessions,
+        silent_bodies,
+        large_length,
+        never_readers,
+        idle_flood,
+        session_hoard,
+        greedy_client,
+        odd_heads,
+        half_close,
+        garbage,
+        fat_frame,
+        json_copies,
+        mix
+    );
+    match failed {
+        0 => ExitCode::SUCCESS,
+        _ => ExitCode::FAILURE,
+    }
+}
+
+fn report(name: &str, begun: Instant, verdict: Outcome<Verdict>) -> u32 {
+    let seconds = begun.elapsed().as_secs_f64();
+    let (word, text, failed) = match verdict {
+        Ok(Verdict {
+            seen,
+            got_through: None,
+        }) => ("held", seen, 0),
+        Ok(Verdict {
+            got_through: Some(text),
+            ..
+        }) => ("GOT THROUGH", text, 1),
+        Err(error) => ("FAILED", error.to_string(), 1),
+    };
+    println!("{name:<16} {word:<11} {seconds:5.1} s  {text}");
+    failed
+}

@@ -1,0 +1,31 @@
+//! A connection that says what it likes.
+
+use crate::Outcome;
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+/// Sends `bytes` and returns the open connection.
+pub async fn send(address: SocketAddr, bytes: impl AsRef<[u8]>) -> Outcome<TcpStream> {
+    let mut stream = TcpStream::connect(address).await?;
+    stream.write_all(bytes.as_ref()).await?;
+    Ok(stream)
+}
+
+/// What comes until the end of the connection or of a pause of `patience`.
+pub async fn read(stream: &mut TcpStream, patience: Duration) -> String {
+    let mut bytes = Vec::new();
+    while let Ok(Ok(1..)) = timeout(patience, stream.read_buf(&mut bytes)).await {}
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Whether the connection ends within this time, whatever comes before.
+pub async fn ends(stream: &mut TcpStream, within: Duration) -> bool {
+    let end = async {
+        let mut buffer = [0; 4096];
+        while let Ok(1..) = stream.read(&mut buffer).await {}
+    };
+    timeout(within, end).await.is_ok()
+}

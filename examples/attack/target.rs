@@ -1,0 +1,151 @@
+//! The server that is attacked.
+
+use crate::good::target_box;
+use crate::{Options, Outcome};
+use reqwest::{Client, RequestBuilder};
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A server.
+pub struct Target {
+    pub url: String,
+    pub address: SocketAddr,
+    pub http: Client,
+    child: Option<Child>,
+    /// Bytes of resident memory that it said it stays below.
+    pub bound: Option<u64>,
+}
+
+impl Target {
+    /// Starts a server with these flags, or takes the one at `--url`.
+    pub async fn start(options: &Options, settings: &[&str]) -> Outcome<Self> {
+        let http = Client::builder()
+            .timeout(Duration::from_secs(60))
+            .pool_max_idle_per_host(64)
+            .build()?;
+        if let Some(url) = &options.url {
+            let address = url
+                .strip_prefix("http://")
+                .ok_or("--url is http://ADDRESS:PORT")?;
+            return Ok(Self {
+                address: address.trim_end_matches('/').parse()?,
+                url: url.trim_end_matches('/').to_owned(),
+                http,
+                child: None,
+                bound: None,
+            });
+        }
+        let binary = match &options.server {
+            Some(binary) => binary.clone(),
+            None => {
+                let program = std::env::current_exe()?;
+                let folder = program.parent().and_then(|examples| examples.parent());
+                folder
+                    .ok_or("no folder above this program")?
+                    .join("bagtrack")
+            }
+        };
+        let mut command = Command::new(&binary);
+        command
+            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+            .args(["--trusted-proxies", "127.0.0.0/8"])
+            .args(settings);
+        if options.short {
+            command.args(["--write-timeout", "1s", "--header-timeout", "3s"]);
+            command.args(["--body-grace", "1s"]);
+        }
+        let mut child = command
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| format!("{}: {error} (cargo build --release)", binary.display()))?;
+        let log = child.stderr.take().ok_or("the log is piped")?;
+        let mut lines = BufReader::new(log).lines();
+        let (mut url, mut bound) = (None, None);
+        while url.is_none() || bound.is_none() {
+            let line = lines.next().ok_or("the server ended at its start")??;
+            let line: serde_json::Value = serde_json::from_str(&line)?;
+            let message = line["fields"]["message"].as_str().unwrap_or("");
+            if let Some(at) = message.strip_prefix("listening on ") {
+                url = Some(at.to_owned());
+            }
+            if let Some(rest) = message.strip_prefix("resident memory stays below ") {
+                let mib: u64 = rest.trim_end_matches(" MiB").parse()?;
+                bound = Some(mib << 20);
+            }
+        }
+        std::thread::spawn(move || lines.for_each(drop));
+        let url = url.ok_or("no address")?;
+        let address = url.strip_prefix("http://").ok_or("no address")?.parse()?;
+        Ok(Self {
+            url,
+            address,
+            http,
+            child: Some(child),
+            bound,
+        })
+    }
+
+    /// A request of the client at this address.
+    pub fn post(&self, client: &str, path: &str) -> RequestBuilder {
+        let request = self.http.post(format!("{}{path}", self.url));
+        request.header("x-forwarded-for", client)
+    }
+
+    /// Opens a session of this client; gives its path.
+    pub async fn open(&self, client: &str, frame: &[u8], query: &str) -> Outcome<String> {
+        let request = self.post(client, &format!("/sessions?box={}{query}", target_box()));
+        let answer = request.body(frame.to_vec()).send().await?;
+        let status = answer.status();
+        let path = answer.headers().get("location").cloned();
+        let path = path.ok_or_else(|| format!("no session: {status}"))?;
+        Ok(path.to_str()?.to_owned())
+    }
+
+    /// Whether `/healthz` answers, and after how long. A connection that was idle may be closed while it is used again;
+    /// then another one is tried.
+    pub async fn health(&self) -> Outcome<Duration> {
+        let sent = std::time::Instant::now();
+        let mut tries = 0;
+        loop {
+            let answer = self.http.get(format!("{}/healthz", self.url)).send().await;
+            tries += 1;
+            if answer.is_ok() || tries == 5 {
+                answer?.error_for_status()?;
+                return Ok(sent.elapsed());
+            }
+        }
+    }
+
+    /// A value of `/proc/PID/status` in bytes, of a server of this program's own.
+    pub fn memory(&self, field: &str) -> Option<u64> {
+        let pid = self.child.as_ref()?.id();
+        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+        let line = status.lines().find_map(|line| line.strip_prefix(field));
+        let kib: u64 = line?.split_whitespace().next()?.parse().ok()?;
+        Some(kib << 10)
+    }
+
+    /// What the server used at most, against what it said, in words; and whether it kept to that.
+    pub fn peak(&self) -> (bool, String) {
+        match (self.memory("VmHWM:"), self.bound) {
+            (Some(peak), Some(bound)) => {
+                let text = format!("at most {} MiB resident of {}", peak >> 20, bound >> 20);
+                (peak <= bound, text)
+            }
+            _ => (true, "memory not measured".to_owned()),
+        }
+    }
+}
+
+impl Drop for Target {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads the API keys again.
+
+use bagtrack::http::{ApiKeys, Shutdown};
+use std::io;
+use tokio::sync::watch;
+
+/// The signals to end that have come so far. Clones see the same ones.
+#[derive(Clone)]
+pub struct Signals(watch::Receiver<Vec<Shutdown>>);
+
+impl Signals {
+    /// Begins to listen.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn listen() -> io::Result<Self> {
+        let (came, seen) = watch::channel(Vec::new());
+        let mut source = Source::new()?;
+        tokio::spawn(async move {
+            while let Some(how) = source.next().await {
+                came.send_modify(|signals| signals.push(how));
+            }
+        });
+        Ok(Self(seen))
+    }
+
+    /// Waits for the first signal to end.
+    pub async fn shutdown(&mut self) -> Shutdown {
+        self.nth(0).await
+    }
+
+    /// Waits for the second signal to end.
+    pub async fn second_shutdown(&mut self) {
+        self.nth(1).await;
+    }
+
+    async fn nth(&mut self, index: usize) -> Shutdown {
+        match self.0.wait_for(|signals| signals.len() > index).await {
+            Ok(signals) => signals[index],
+            // No more signals can be heard.
+            Err(_) => std::future::pending().await,
+        }
+    }
+}
+
+/// Reads the API keys again on every SIGHUP.
+#[cfg(unix)]
+pub async fn reload_keys(keys: ApiKeys) {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut hangups = match signal(SignalKind::hangup()) {
+        Ok(hangups) => hangups,
+        Err(error) => {
+            tracing::error!(%error, "cannot listen to SIGHUP: API keys are not read again");
+            return;
+        }
+    };
+    while hangups.recv().await.is_some() {
+        let keys = keys.clone();
+        // The file may be on a slow file system.
+        match tokio::task::spawn_blocking(move || keys.reload()).await {
+            Ok(Ok(count)) => tracing::info!(count, "API keys read again"),
+            Ok(Err(error)) => tracing::error!(%error, "the API keys stay as they were"),
+            Err(error) => tracing::error!(%error, "the API keys stay as they were"),
+        }
+    }
+}
+
+/// There is no such signal here.
+#[cfg(not(unix))]
+pub async fn reload_keys(_keys: ApiKeys) {}
+
+#[cfg(unix)]
+struct Source {
+    terminate: tokio::signal::unix::Signal,
+    interrupt: tokio::signal::unix::Signal,
+}
+
+#[cfg(unix)]
+impl Source {
+    fn new() -> io::Result<Self> {
+        use tokio::signal::unix::{SignalKind, signal};
+        Ok(Self {
+            terminate: signal(SignalKind::terminate())?,
+            interrupt: signal(SignalKind::interrupt())?,
+        })
+    }
+
+    async fn next(&mut self) -> Option<Shutdown> {
+        tokio::select! {
+            came = self.terminate.recv() => came.map(|()| Shutdown::Gradual),
+            came = self.interrupt.recv() => came.map(|()| Shutdown::Prompt),
+        }
+    }
+}
+
+#[cfg(not(unix))]
+struct Source;
+
+#[cfg(not(unix))]
+impl Source {
+    fn new() -> io::Result<Self> {
+        Ok(Self)
+    }
+
+    async fn next(&mut self) -> Option<Shutdown> {
+        match tokio::signal::ctrl_c().await {
+            Ok(()) => Some(Shutdown::Prompt),
+            Err(error) => {
+                tracing::error!(%error, "cannot wait for ctrl-c; end the process by other means");
+                None
+            }
+        }
+    }
+}

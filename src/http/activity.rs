@@ -1,0 +1,156 @@
+//! What a connection is doing: shared by its stream, its service and the table of connections.
+
+use axum::body::{Body, Bytes, HttpBody};
+use axum::response::Response;
+use http_body::{Frame, SizeHint};
+use std::pin::Pin;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock};
+use std::task::{Context, Poll};
+use std::time::Duration;
+use tokio::sync::Notify;
+use tokio::time::Instant;
+
+/// Moments are counted from here.
+static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+const IDLE: u8 = 0;
+const RECEIVING: u8 = 1;
+const ANSWERING: u8 = 2;
+
+/// What one connection is doing.
+#[derive(Debug)]
+pub struct Activity {
+    state: AtomicU8,
+    /// Nanoseconds from [`START`] to when it became idle.
+    idle_since: AtomicU64,
+    /// Told when the connection is to end.
+    pub shed: Notify,
+}
+
+impl Activity {
+    /// A new connection is idle.
+    pub fn new() -> Arc<Self> {
+        let activity = Self {
+            state: AtomicU8::new(IDLE),
+            idle_since: AtomicU64::new(0),
+            shed: Notify::new(),
+        };
+        activity.idle();
+        Arc::new(activity)
+    }
+
+    fn idle(&self) {
+        let now = u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.idle_since.store(now, Ordering::Relaxed);
+        self.state.store(IDLE, Ordering::Release);
+    }
+
+    /// Since when no request has been in progress, from some fixed moment; none while one is. A head that has begun is
+    /// not yet a request.
+    pub fn idle_since(&self) -> Option<Duration> {
+        let since = Duration::from_nanos(self.idle_since.load(Ordering::Relaxed));
+        let is_idle = self.state.load(Ordering::Acquire) == IDLE;
+        is_idle.then_some(since)
+    }
+
+    /// Whether a whole request has come whose answer is still being made or sent.
+    pub fn is_answering(&self) -> bool {
+        self.state.load(Ordering::Acquire) == ANSWERING
+    }
+
+    /// A request has come, up to its body, which notes its own end.
+    pub fn receive(self: &Arc<Self>, body: Body) -> Body {
+        self.state.store(RECEIVING, Ordering::Release);
+        self.watch(body, Activity::received)
+    }
+
+    /// The answer is ready, up to its body, which notes its own end.
+    pub fn answer(self: &Arc<Self>, answer: Response) -> Response {
+        self.state.store(ANSWERING, Ordering::Release);
+        answer.map(|body| {
+            // One without a body is dropped as soon as its head is sent.
+            Body::new(WatchedBody {
+                body,
+                activity: self.clone(),
+                at_end: Activity::idle,
+                ended: false,
+                ends_on_drop: true,
+            })
+        })
+    }
+
+    fn watch(self: &Arc<Self>, body: Body, at_end: fn(&Activity)) -> Body {
+        if body.is_end_stream() {
+            at_end(self);
+            return body;
+        }
+        Body::new(WatchedBody {
+            body,
+            activity: self.clone(),
+            at_end,
+            ended: false,
+            ends_on_drop: false,
+        })
+    }
+
+    /// The rest of a refused body may end after its answer.
+    fn received(&self) {
+        let (from, to) = (RECEIVING, ANSWERING);
+        let _ = self
+            .state
+            .compare_exchange(from, to, Ordering::AcqRel, Ordering::Relaxed);
+    }
+}
+
+/// A body that notes its end.
+struct WatchedBody {
+    body: Body,
+    activity: Arc<Activity>,
+    at_end: fn(&Activity),
+    ended: bool,
+    ends_on_drop: bool,
+}
+
+impl WatchedBody {
+    fn end(&mut self) {
+        if !self.ended {
+            self.ended = true;
+            (self.at_end)(&self.activity);
+        }
+    }
+}
+
+impl HttpBody for WatchedBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let polled = Pin::new(&mut self.body).poll_frame(cx);
+        // The reader of a request's body does not ask again after the last piece. The writer of an answer may.
+        let is_last = matches!(polled, Poll::Ready(None)) || self.body.is_end_stream();
+        if is_last && !self.ends_on_drop {
+            self.end();
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+impl Drop for WatchedBody {
+    fn drop(&mut self) {
+        if self.ends_on_drop {
+            self.end();
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Who makes a request.
+
+use crate::http::problems::problem::Problem;
+use crate::sessions::Owner;
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use std::io;
+use std::sync::Arc;
+use uuid::Uuid;
+
+/// Who makes a request, as the layer [`authenticate`](super::layer::authenticate) has found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Caller {
+    owner: Owner,
+    /// The only session that may be used, where the request came with a session token.
+    only: Option<Uuid>,
+}
+
+impl Caller {
+    /// Whoever has the key of this owner.
+    pub fn with_key(owner: Owner) -> Self {
+        Self { owner, only: None }
+    }
+
+    /// Whoever has a token for this session of this owner.
+    pub fn with_token(owner: Owner, session: Uuid) -> Self {
+        let only = Some(session);
+        Self { owner, only }
+    }
+
+    /// Whose sessions these are.
+    pub fn owner(&self) -> &Owner {
+        &self.owner
+    }
+
+    /// Whether the session of this id may be used, if it is one of the owner's.
+    pub fn may_use(&self, id: Uuid) -> bool {
+        self.only.is_none_or(|only| only == id)
+    }
+
+    /// Refuses what a session token is not good for.
+    ///
+    /// # Errors
+    /// The request came with one.
+    pub fn require_key(&self) -> Result<(), Problem> {
+        match self.only {
+            None => Ok(()),
+            Some(_) => Err(Problem::forbidden()),
+        }
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Caller {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Problem> {
+        // A route without the layer serves nobody.
+        let missing = || io::Error::other("the route is not behind the layer that authenticates");
+        let caller = parts.extensions.get::<Self>().cloned();
+        caller.ok_or_else(|| Problem::internal(Arc::new(missing())))
+    }
+}

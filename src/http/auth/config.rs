@@ -1,0 +1,89 @@
+//! The settings of who may use the service.
+
+use std::path::PathBuf;
+
+/// A text that does not show itself in debug output.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Secret(String);
+
+impl Secret {
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&str> for Secret {
+    fn from(text: &str) -> Self {
+        Self(text.trim().to_owned())
+    }
+}
+
+impl AsRef<[u8]> for Secret {
+    fn as_ref(&self) -> &[u8] {
+        self.0.as_bytes()
+    }
+}
+
+impl std::fmt::Debug for Secret {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("Secret")
+    }
+}
+
+/// Who may use the service. Secrets are better given by variables and files than by flags, which other users of the
+/// machine can see.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+pub struct AccessConfig {
+    /// API keys as `name:key`, separated by commas. A key has 16 to 256 visible characters.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            env = "BAGTRACK_API_KEYS",
+            value_delimiter = ',',
+            hide_env_values = true,
+            value_name = "NAME:KEY"
+        )
+    )]
+    pub api_keys: Vec<Secret>,
+    /// File with an API key a line, as `name:key`; lines that begin with # are left out. Read again on SIGHUP.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, env = "BAGTRACK_API_KEYS_FILE", value_name = "FILE")
+    )]
+    pub api_keys_file: Option<PathBuf>,
+    /// Serve everybody who can reach the address. Without API keys only this machine is served otherwise.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_NO_AUTH",
+        value_parser = clap::builder::BoolishValueParser::new()
+    ))]
+    pub no_auth: bool,
+    /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all].
+    /// `/healthz`, `/readyz` and `/metrics` answer under any.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, env = "BAGTRACK_ALLOWED_HOSTS", value_delimiter = ',')
+    )]
+    pub allowed_hosts: Vec<String>,
+    /// Secrets of at least 16 characters that snapshots and session tokens are signed with, separated by commas: the
+    /// first signs, all are accepted. Without one, those of other processes are refused.
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            env = "BAGTRACK_SNAPSHOT_KEYS",
+            value_delimiter = ',',
+            hide_env_values = true,
+            value_name = "SECRET"
+        )
+    )]
+    pub snapshot_keys: Vec<Secret>,
+    /// Accept snapshots that are not signed with a secret, and sign none where no secret is given.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_UNSIGNED_SNAPSHOTS",
+        value_parser = clap::builder::BoolishValueParser::new()
+    ))]
+    pub unsigned_snapshots: bool,
+}

@@ -1,0 +1,179 @@
+//! The API keys, from the settings and from a file.
+//!
+//! Only digests are kept. A key that is presented is hashed and compared with all of them in constant time.
+
+use super::config::Secret;
+use crate::sessions::Owner;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError, RwLock};
+
+const KEY_BYTES: std::ops::RangeInclusive<usize> = 16..=256;
+const MAX_NAME_BYTES: usize = 64;
+
+/// Why there are no keys.
+#[derive(Debug, thiserror::Error)]
+pub enum KeysError {
+    /// An entry cannot be read. It is not shown, since it may hold a key.
+    #[error(
+        "{place}, entry {number}: write name:key, with a name of up to 64 letters, digits, `-`, `_` or `.`, and a key \
+         of 16 to 256 visible characters"
+    )]
+    Entry {
+        /// Where the entry stands.
+        place: String,
+        /// Which one it is, counted from 1.
+        number: usize,
+    },
+    /// The file cannot be read.
+    #[error("{path} (--api-keys-file, BAGTRACK_API_KEYS_FILE) cannot be read: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file has no key: nobody could use the service.
+    #[error("{0} (--api-keys-file, BAGTRACK_API_KEYS_FILE) has no key")]
+    Empty(PathBuf),
+}
+
+#[derive(Debug, Clone)]
+struct ApiKey {
+    owner: Owner,
+    digest: blake3::Hash,
+}
+
+/// The API keys. Clones are the same keys.
+#[derive(Debug, Clone)]
+pub struct ApiKeys(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    fixed: Vec<ApiKey>,
+    file: Option<PathBuf>,
+    current: RwLock<Arc<[ApiKey]>>,
+}
+
+impl ApiKeys {
+    /// The keys of these texts and of this file.
+    ///
+    /// # Errors
+    /// See [`KeysError`].
+    pub fn load(texts: &[Secret], file: Option<&Path>) -> Result<Self, KeysError> {
+        let texts = texts.iter().map(Secret::text);
+        let fixed = parse(texts, "--api-keys (BAGTRACK_API_KEYS)")?;
+        let keys = Self(Arc::new(Inner {
+            fixed,
+            file: file.map(Path::to_owned),
+            current: RwLock::default(),
+        }));
+        keys.reload()?;
+        Ok(keys)
+    }
+
+    /// Reads the file again. Returns the number of keys.
+    ///
+    /// # Errors
+    /// See [`KeysError`]. The keys are then as before.
+    pub fn reload(&self) -> Result<usize, KeysError> {
+        let mut keys = self.0.fixed.clone();
+        if let Some(path) = &self.0.file {
+            let text = std::fs::read_to_string(path).map_err(|source| KeysError::File {
+                path: path.clone(),
+                source,
+            })?;
+            let lines = text.lines().map(str::trim);
+            let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+            let read = parse(lines, &path.display().to_string())?;
+            if read.is_empty() {
+                return Err(KeysError::Empty(path.clone()));
+            }
+            keys.extend(read);
+        }
+        let count = keys.len();
+        let current = self.0.current.write();
+        *current.unwrap_or_else(PoisonError::into_inner) = keys.into();
+        Ok(count)
+    }
+
+    /// Whether a key is needed to use the service.
+    pub fn are_needed(&self) -> bool {
+        self.0.file.is_some() || !self.0.fixed.is_empty()
+    }
+
+    /// The owner of this key.
+    pub fn owner(&self, presented: &[u8]) -> Option<Owner> {
+        let digest = blake3::hash(presented);
+        let mut owner = None;
+        // All are compared, so the time does not tell which one it is.
+        for key in self.current().iter() {
+            if key.digest == digest {
+                owner = Some(key.owner.clone());
+            }
+        }
+        owner
+    }
+
+    /// Whether there is a key of this owner.
+    pub fn has_owner(&self, owner: &Owner) -> bool {
+        self.current().iter().any(|key| key.owner == *owner)
+    }
+
+    fn current(&self) -> Arc<[ApiKey]> {
+        // Nothing panics while it is held.
+        let current = self.0.current.read();
+        current.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// The keys of entries `name:key`.
+fn parse<'a>(
+    entries: impl Iterator<Item = &'a str>,
+    place: &str,
+) -> Result<Vec<ApiKey>, KeysError> {
+    let keys = entries.enumerate().map(|(index, entry)| {
+        parse_one(entry).ok_or_else(|| KeysError::Entry {
+            place: place.to_owned(),
+            number: index + 1,
+        })
+    });
+    keys.collect()
+}
+
+fn parse_one(entry: &str) -> Option<ApiKey> {
+    let (name, key) = entry.split_once(':')?;
+    let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+    let named = (1..=MAX_NAME_BYTES).contains(&name.len()) && name.bytes().all(is_name);
+    let usable = KEY_BYTES.contains(&key.len()) && key.bytes().all(|byte| byte.is_ascii_graphic());
+    (named && usable).then(|| ApiKey {
+        owner: Owner::named(name),
+        digest: blake3::hash(key.as_bytes()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_entries_with_a_name_and_a_long_key_are_taken_and_no_error_shows_the_key() {
+        let long = "0123456789abcdef";
+        let load = |text: &str| ApiKeys::load(&[Secret::from(text)], None);
+        let keys = load(&format!("me:{long}")).unwrap();
+        assert_eq!(keys.owner(long.as_bytes()), Some(Owner::named("me")));
+        assert_eq!(keys.owner(b"0123456789abcdeg"), None);
+        for wrong in [
+            "me:short-key",
+            "0123456789abcdef",
+            ":0123456789abcdef",
+            "a b:0123456789abcdef",
+        ] {
+            let message = load(wrong).unwrap_err().to_string();
+            assert!(
+                !message.contains("0123") && !message.contains("short-key"),
+                "{message}"
+            );
+        }
+    }
+}

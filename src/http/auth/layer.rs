@@ -1,0 +1,62 @@
+//! Finds out who makes a request, from its header `Authorization: Bearer …`.
+
+use super::caller::Caller;
+use super::token;
+use crate::http::client::Client;
+use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
+use axum::extract::{Request, State};
+use axum::http::header::{AUTHORIZATION, WWW_AUTHENTICATE};
+use axum::http::{HeaderMap, HeaderValue};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack\"");
+
+/// The middleware: puts the [`Caller`] into the extensions of the request, or answers 401.
+pub async fn authenticate(
+    State(state): State<AppState>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    match caller(&state, request.headers()) {
+        Some(caller) => {
+            // Who has a key shares its quotas, wherever the requests come from.
+            if let Some(name) = caller.owner().name() {
+                request.extensions_mut().insert(Client::Key(name.into()));
+            }
+            request.extensions_mut().insert(caller);
+            next.run(request).await
+        }
+        None => {
+            let mut response = Problem::unauthorized().into_response();
+            response.headers_mut().insert(WWW_AUTHENTICATE, CHALLENGE);
+            response
+        }
+    }
+}
+
+fn caller(state: &AppState, headers: &HeaderMap) -> Option<Caller> {
+    let (keys, presented) = (&state.access.keys, bearer(headers));
+    if let Some(text) = presented.filter(|text| text.starts_with(token::PREFIX)) {
+        let token = state.access.tokens.verify(text, state.now())?;
+        // The token ends with its key.
+        let has_key = !keys.are_needed() || keys.has_owner(&token.owner);
+        return has_key.then(|| Caller::with_token(token.owner, token.session));
+    }
+    match keys.are_needed() {
+        true => Some(Caller::with_key(keys.owner(presented?.as_bytes())?)),
+        false => Some(Caller::with_key(Default::default())),
+    }
+}
+
+/// The key or token of the only `Authorization` header.
+fn bearer(headers: &HeaderMap) -> Option<&str> {
+    let mut values = headers.get_all(AUTHORIZATION).iter();
+    let (Some(value), None) = (values.next(), values.next()) else {
+        return None;
+    };
+    let (scheme, text) = value.to_str().ok()?.split_once(' ')?;
+    let is_bearer = scheme.eq_ignore_ascii_case("bearer");
+    is_bearer.then(|| text.trim())
+}

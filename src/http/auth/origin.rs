@@ -1,0 +1,91 @@
+//! Refuses requests that a browser sends for a page of another origin, or under the name of another host.
+//!
+//! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
+//! origin is checked, too. A page can also make its own host name resolve to this machine, and is of the same origin
+//! then; the list of hosts is against that.
+
+use crate::http::config::Config;
+use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
+use axum::extract::{Request, State};
+use axum::http::HeaderMap;
+use axum::http::header::{HOST, ORIGIN};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+/// The middleware.
+pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {
+    match check(&state.config, &request) {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+fn check(config: &Config, request: &Request) -> Result<(), Problem> {
+    let headers = request.headers();
+    let named = request
+        .uri()
+        .authority()
+        .map(|authority| authority.as_str());
+    let host = named.or_else(|| text(headers, HOST.as_str())).unwrap_or("");
+    let hosts = &config.access.allowed_hosts;
+    if !hosts.is_empty() && !hosts.iter().any(|allowed| is_host(allowed, host)) {
+        return Err(Problem::host_not_allowed());
+    }
+    let Some(origin) = headers.get(ORIGIN) else {
+        return Ok(());
+    };
+    let origin = origin.to_str().unwrap_or("");
+    // Pages cannot set this header. A proxy may have changed the host, but not this.
+    let site = text(headers, "sec-fetch-site");
+    let same = matches!(site, Some("same-origin" | "none")) || is_same_origin(origin, host);
+    let mut allowed = config.cors_origins.iter();
+    match same || allowed.any(|allowed| allowed == "*" || allowed == origin) {
+        true => Ok(()),
+        false => Err(Problem::origin_not_allowed()),
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
+}
+
+/// Whether `host` is the allowed one, which may leave the port open.
+fn is_host(allowed: &str, host: &str) -> bool {
+    allowed.eq_ignore_ascii_case(host) || allowed.eq_ignore_ascii_case(without_port(host))
+}
+
+/// The scheme is not compared: a proxy may have ended TLS.
+fn is_same_origin(origin: &str, host: &str) -> bool {
+    let authority = origin.split_once("://").map(|(_, authority)| authority);
+    authority.is_some_and(|authority| !host.is_empty() && authority.eq_ignore_ascii_case(host))
+}
+
+fn without_port(host: &str) -> &str {
+    match host.rsplit_once(':') {
+        // The colons of an IPv6 address are in brackets.
+        Some((name, port)) if !port.contains(']') => name,
+        _ => host,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hosts_are_compared_with_or_without_their_port() {
+        for (allowed, host, expected) in [
+            ("example.org", "example.org", true),
+            ("example.org", "EXAMPLE.org:8080", true),
+            ("example.org:8080", "example.org:8080", true),
+            ("example.org:8080", "example.org", false),
+            ("example.org", "example.org.evil.net", false),
+            ("[::1]", "[::1]:8080", true),
+            ("[::1]", "[::1]", true),
+            ("example.org", "", false),
+        ] {
+            assert_eq!(is_host(allowed, host), expected, "{allowed} {host}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The client's address behind trusted proxies: from `Forwarded` (RFC 7239) or `X-Forwarded-For`.
+//!
+//! Each proxy adds the address that it was called from at the end. So the list is read from its end, as long as the
+//! address before was a trusted proxy's: the first other address is the client's. What stands before that, the client
+//! may have written itself.
+//!
+//! A proxy that adds to one of the two headers passes the other one on as the client wrote it. So if both are there and
+//! disagree, neither is believed, and the client is the proxy.
+
+use axum::http::HeaderMap;
+use axum::http::header::FORWARDED;
+use ipnet::IpNet;
+use std::net::{IpAddr, SocketAddr};
+
+/// The address of the client of a request that came from `peer`.
+pub fn address(peer: IpAddr, headers: &HeaderMap, trusted: &[IpNet]) -> IpAddr {
+    let peer = peer.to_canonical();
+    if !is_trusted(peer, trusted) {
+        return peer;
+    }
+    let forwarded = list(headers, FORWARDED.as_str());
+    let forwarded =
+        forwarded.map(|hops| walk(peer, hops.iter().map(|hop| of_forwarded(hop)), trusted));
+    let x_forwarded = list(headers, "x-forwarded-for");
+    let x_forwarded =
+        x_forwarded.map(|hops| walk(peer, hops.iter().map(|hop| parse(hop)), trusted));
+    match (forwarded, x_forwarded) {
+        (Some(one), Some(other)) if one != other => peer,
+        (one, other) => one.or(other).unwrap_or(peer),
+    }
+}
+
+/// Whether the address is a trusted proxy's.
+pub fn is_trusted(address: IpAddr, trusted: &[IpNet]) -> bool {
+    trusted.iter().any(|network| network.contains(&address))
+}
+
+/// The elements of a header that is a list, from all its lines; none without the header.
+fn list<'a>(headers: &'a HeaderMap, name: &str) -> Option<Vec<&'a str>> {
+    let lines = headers.get_all(name).iter();
+    // A line that is not text is a hop that nobody can name.
+    let hops = lines.flat_map(|line| line.to_str().unwrap_or("").split(','));
+    let hops: Vec<&str> = hops.map(str::trim).collect();
+    (!hops.is_empty()).then_some(hops)
+}
+
+/// The first address from the end that is no trusted proxy's, or the last one that can be read.
+fn walk(
+    peer: IpAddr,
+    hops: impl DoubleEndedIterator<Item = Option<IpAddr>>,
+    trusted: &[IpNet],
+) -> IpAddr {
+    let mut last = peer;
+    for hop in hops.rev() {
+        let Some(hop) = hop else { break };
+        last = hop;
+        if !is_trusted(hop, trusted) {
+            break;
+        }
+    }
+    last
+}
+
+/// The address in `for=…` of one element.
+fn of_forwarded(element: &str) -> Option<IpAddr> {
+    let mut pairs = element.split(';').filter_map(|pair| pair.split_once('='));
+    let (_, value) = pairs.find(|(name, _)| name.trim().eq_ignore_ascii_case("for"))?;
+    parse(value.trim().trim_matches('"'))
+}
+
+/// An address with or without a port, an IPv6 one with or without brackets.
+fn parse(text: &str) -> Option<IpAddr> {
+    let bracketed = || text.strip_prefix('[')?.strip_suffix(']')?.parse().ok();
+    let with_port = || text.parse().ok().map(|address: SocketAddr| address.ip());
+    let address: Option<IpAddr> = text.parse().ok().or_else(bracketed).or_else(with_port);
+    address.map(|address| address.to_canonical())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn client(peer: &str, headers: &[(&'static str, &str)]) -> String {
+        let trusted = ["10.0.0.0/8".parse().unwrap(), "fd00::/8".parse().unwrap()];
+        let mut map = HeaderMap::new();
+        for (name, value) in headers {
+            map.append(*name, value.parse().unwrap());
+        }
+        address(peer.parse().unwrap(), &map, &trusted).to_string()
+    }
+
+    #[test]
+    fn only_trusted_proxies_are_believed_and_only_what_they_added() {
+        for (peer, headers, expected) in [
+            (
+                "192.0.2.1",
+                &[("x-forwarded-for", "198.51.100.9")][..],
+                "192.0.2.1",
+            ),
+            ("10.0.0.1", &[], "10.0.0.1"),
+            (
+                "10.0.0.1",
+                &[("x-forwarded-for", "198.51.100.9")],
+                "198.51.100.9",
+            ),
+            (
+                "10.0.0.1",
+                &[("x-forwarded-for", "1.1.1.1, 198.51.100.9, 10.0.0.2")],
+                "198.51.100.9",
+            ),
+            (
+                "10.0.0.1",
+                &[
+                    ("x-forwarded-for", "1.1.1.1"),
+                    ("x-forwarded-for", "198.51.100.9"),
+                ],
+                "198.51.100.9",
+            ),
+            (
+                "10.0.0.1",
+                &[("x-forwarded-for", "1.1.1.1, nonsense, 10.0.0.2")],
+                "10.0.0.2",
+            ),
+            (
+                "::ffff:10.0.0.1",
+                &[("x-forwarded-for", "[2001:db8::1]:4711")],
+                "2001:db8::1",
+            ),
+            (
+                "fd00::1",
+                &[(
+                    "forwarded",
+                    "for=1.1.1.1, for=\"[2001:db8::1]:80\";proto=https",
+                )],
+                "2001:db8::1",
+            ),
+            (
+                "10.0.0.1",
+                &[("forwarded", "proto=https;For=198.51.100.9:80")],
+                "198.51.100.9",
+            ),
+            ("10.0.0.1", &[("forwarded", "for=_hidden")], "10.0.0.1"),
+            (
+                "10.0.0.1",
+                &[
+                    ("forwarded", "for=1.1.1.1"),
+                    ("x-forwarded-for", "198.51.100.9"),
+                ],
+                "10.0.0.1",
+            ),
+            (
+                "10.0.0.1",
+                &[("forwarded", "for=1.1.1.1"), ("x-forwarded-for", "1.1.1.1")],
+                "1.1.1.1",
+            ),
+        ] {
+            assert_eq!(client(peer, headers), expected, "{peer} {headers:?}");
+        }
+    }
+}

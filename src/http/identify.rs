@@ -1,0 +1,38 @@
+//! Notes which client a request is from, and tells the client what is left of its quotas.
+
+use super::client::{Client, Peer};
+use super::forwarded::address;
+use super::problems::kind::Kind;
+use super::problems::problem::Problem;
+use super::state::AppState;
+use axum::extract::{Request, State};
+use axum::middleware::Next;
+use axum::response::Response;
+use std::net::Ipv4Addr;
+use std::time::Duration;
+
+/// How long an answer that refuses a client for its quota is held back.
+const REFUSAL_DELAY: Duration = Duration::from_millis(250);
+
+/// The middleware. A request that has its client already keeps it.
+pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
+    if request.extensions().get::<Client>().is_none() {
+        let peer = request.extensions().get::<Peer>();
+        let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
+        let trusted = &state.config.limits.trusted_proxies;
+        let client = Client::at(address(peer, request.headers(), trusted));
+        request.extensions_mut().insert(client);
+    }
+    let has_quotas = request.uri().path().starts_with("/sessions");
+    let client = request.extensions().get::<Client>().cloned();
+    let mut response = next.run(request).await;
+    let problem = response.extensions().get::<Problem>();
+    if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
+        // Whoever does not wait before it asks again costs the network threads time.
+        tokio::time::sleep(REFUSAL_DELAY).await;
+    }
+    if let (true, Some(client)) = (has_quotas, client) {
+        state.clients.write_headers(&client, response.headers_mut());
+    }
+    response
+}

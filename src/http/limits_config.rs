@@ -1,0 +1,160 @@
+//! The settings that bound what one request, one connection and one client may take.
+
+use ipnet::IpNet;
+use std::time::Duration;
+
+/// What one request, one connection and one client may take.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+pub struct LimitsConfig {
+    /// Most pixels of the frames of one post together; a post of one frame has the limit of a frame.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_REQUEST_PIXELS",
+        default_value_t = LimitsConfig::default().max_request_pixels
+    ))]
+    pub max_request_pixels: u64,
+    /// Most processor time of one request; looked at between its frames.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_REQUEST_CPU",
+        default_value = shown(LimitsConfig::default().max_request_cpu),
+        value_parser = humantime::parse_duration
+    ))]
+    pub max_request_cpu: Duration,
+    /// Least bytes a second of a request body, after its first `body-grace`.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MIN_BODY_RATE",
+        default_value_t = LimitsConfig::default().min_body_rate
+    ))]
+    pub min_body_rate: u32,
+    /// Time for a request body before its least rate counts.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_BODY_GRACE",
+        default_value = shown(LimitsConfig::default().body_grace),
+        value_parser = humantime::parse_duration
+    ))]
+    pub body_grace: Duration,
+    /// A connection whose client takes no byte of an answer for this long is closed.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_WRITE_TIMEOUT",
+        default_value = shown(LimitsConfig::default().write_timeout),
+        value_parser = humantime::parse_duration
+    ))]
+    pub write_timeout: Duration,
+    /// Time for the answer to a client that has closed its side of the connection; then it counts as gone.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_HALF_CLOSE_TIMEOUT",
+        default_value = shown(LimitsConfig::default().half_close_timeout),
+        value_parser = humantime::parse_duration
+    ))]
+    pub half_close_timeout: Duration,
+    /// Most connections of one address, trusted proxies excepted [default: a quarter of `max-connections`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS"))]
+    pub client_connections: Option<usize>,
+    /// Most sessions of one client [default: a quarter of `max-sessions`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_SESSIONS"))]
+    pub client_sessions: Option<usize>,
+    /// Most bytes that the states of all sessions take together; larger parameters take more of it [default: 512 KiB
+    /// for each of `max-sessions`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_MAX_SESSION_BYTES"))]
+    pub max_session_bytes: Option<usize>,
+    /// Most requests with a frame of one client at the same time [default: a quarter of `queue`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_REQUESTS"))]
+    pub client_requests: Option<usize>,
+    /// Most bytes of the request bodies of one client together [default: a quarter of `max-upload-bytes`].
+    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_UPLOAD_BYTES"))]
+    pub client_upload_bytes: Option<usize>,
+    /// Most frames a second of one client; 0 for no limit.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_CLIENT_FRAME_RATE",
+        default_value_t = LimitsConfig::default().client_frame_rate
+    ))]
+    pub client_frame_rate: u32,
+    /// Addresses and networks, like `10.0.0.0/8`, separated by commas, whose `Forwarded` or `X-Forwarded-For` tells
+    /// the client's address.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, env = "BAGTRACK_TRUSTED_PROXIES", value_delimiter = ',', value_parser = network)
+    )]
+    pub trusted_proxies: Vec<IpNet>,
+}
+
+/// A network, or a single address.
+#[cfg(feature = "cli")]
+fn network(text: &str) -> Result<IpNet, String> {
+    let address = || text.parse().map(|address: std::net::IpAddr| address.into());
+    let network = text.parse().or_else(|_| address());
+    network.map_err(|_| "neither an address nor a network like 10.0.0.0/8".to_owned())
+}
+
+/// A duration as flags have it.
+#[cfg(feature = "cli")]
+pub fn shown(duration: Duration) -> String {
+    humantime::format_duration(duration).to_string()
+}
+
+impl Default for LimitsConfig {
+    fn default() -> Self {
+        Self {
+            max_request_pixels: 160_000_000,
+            max_request_cpu: Duration::from_secs(5),
+            min_body_rate: 4096,
+            body_grace: Duration::from_secs(5),
+            write_timeout: Duration::from_secs(30),
+            half_close_timeout: Duration::from_secs(5),
+            client_connections: None,
+            client_sessions: None,
+            max_session_bytes: None,
+            client_requests: None,
+            client_upload_bytes: None,
+            client_frame_rate: 0,
+            trusted_proxies: Vec::new(),
+        }
+    }
+}
+
+impl LimitsConfig {
+    /// Each setting that has a range: its flag, whether its value is inside, and what the range is. `moment` is the
+    /// range of durations; `body` is the largest body.
+    pub(super) fn checks(
+        &self,
+        moment: &std::ops::RangeInclusive<Duration>,
+        body: usize,
+    ) -> [(&'static str, bool, &'static str); 11] {
+        let positive = "at least 1";
+        let duration = "between 1ms and 1 year";
+        let share = |share: Option<usize>| share.is_none_or(|share| share >= 1);
+        [
+            ("max-request-pixels", self.max_request_pixels >= 1, positive),
+            (
+                "max-request-cpu",
+                moment.contains(&self.max_request_cpu),
+                duration,
+            ),
+            ("min-body-rate", self.min_body_rate >= 1, positive),
+            ("body-grace", moment.contains(&self.body_grace), duration),
+            (
+                "write-timeout",
+                moment.contains(&self.write_timeout),
+                duration,
+            ),
+            (
+                "half-close-timeout",
+                moment.contains(&self.half_close_timeout),
+                duration,
+            ),
+            (
+                "client-connections",
+                share(self.client_connections),
+                positive,
+            ),
+            ("client-sessions", share(self.client_sessions), positive),
+            ("max-session-bytes", share(self.max_session_bytes), positive),
+            ("client-requests", share(self.client_requests), positive),
+            (
+                "client-upload-bytes",
+                self.client_upload_bytes.is_none_or(|bytes| bytes >= body),
+                "at least max-body-bytes",
+            ),
+        ]
+    }
+}

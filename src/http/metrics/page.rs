@@ -1,0 +1,63 @@
+//! `GET /metrics`, for Prometheus.
+
+use crate::http::auth::caller::Caller;
+use crate::http::openapi::problem_responses::{self, problem_responses};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
+use crate::http::upload::texts::refuse_query;
+use axum::extract::State;
+use axum::http::Uri;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+
+/// The text format of Prometheus.
+const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+struct Problems;
+
+impl utoipa::IntoResponses for Problems {
+    fn responses()
+    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
+        let own = &[Kind::MalformedRequest, Kind::Unauthorized, Kind::Forbidden];
+        problem_responses(&[problem_responses::ALWAYS, own])
+    }
+}
+
+/// Metrics for Prometheus
+#[utoipa::path(
+    get, path = "/metrics", tag = "service", operation_id = "getMetrics",
+    responses(
+        (
+            status = 200, description = "All metrics in the text format of Prometheus", body = String,
+            content_type = "text/plain"
+        ),
+        Problems
+    )
+)]
+pub async fn get(
+    State(state): State<AppState>,
+    caller: Caller,
+    uri: Uri,
+) -> Result<impl IntoResponse, Problem> {
+    refuse_query(&uri)?;
+    caller.require_key()?;
+    let (gauges, config, admission) = (&state.metrics.gauges, &state.config, &state.admission);
+    gauges.sessions.set(state.registry.len() as f64);
+    gauges.max_sessions.set(config.max_sessions as f64);
+    gauges
+        .queued
+        .set(config.queue.saturating_sub(admission.queue_places()) as f64);
+    let workers = config.worker_count();
+    gauges.workers.set(workers as f64);
+    gauges
+        .workers_busy
+        .set(workers.saturating_sub(admission.free_workers()) as f64);
+    gauges
+        .draining
+        .set(if state.is_draining() { 1.0 } else { 0.0 });
+    if let Some(memory) = memory_stats::memory_stats() {
+        gauges.resident_memory.set(memory.physical_mem as f64);
+    }
+    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], state.metrics.render()))
+}

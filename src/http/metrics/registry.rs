@@ -1,0 +1,154 @@
+//! All metrics, with their names, units and descriptions.
+
+use super::maker::{METADATA, Maker};
+use super::tracking::TrackingMetrics;
+use crate::http::problems::kind::Kind;
+use metrics::{Counter, Gauge, Histogram, Key, Label, Recorder};
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
+
+/// Bounds in seconds for requests and for waiting.
+const REQUEST_SECONDS: [f64; 14] = [
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0,
+];
+/// Bounds in seconds for the work on one frame.
+const FRAME_SECONDS: [f64; 12] = [
+    0.00025, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 1.0,
+];
+
+const REQUESTS: &str = "bagtrack_http_requests_total";
+const REQUEST_TIME: &str = "bagtrack_http_request_duration_seconds";
+const PROBLEMS: &str = "bagtrack_problems_total";
+
+/// All metrics of a service.
+pub struct Metrics {
+    recorder: PrometheusRecorder,
+    /// Time from the place in the queue to the worker.
+    pub queue_wait: Histogram,
+    /// Bytes of request bodies.
+    pub received_bytes: Counter,
+    /// Bytes of response bodies.
+    pub sent_bytes: Counter,
+    /// What decoding and tracking measure.
+    pub tracking: TrackingMetrics,
+    /// What is set when somebody asks.
+    pub gauges: Gauges,
+}
+
+/// Values of a moment.
+pub struct Gauges {
+    /// Sessions in memory.
+    pub sessions: Gauge,
+    /// Most sessions.
+    pub max_sessions: Gauge,
+    /// Requests inside.
+    pub queued: Gauge,
+    /// Workers at work.
+    pub workers_busy: Gauge,
+    /// Workers.
+    pub workers: Gauge,
+    /// Resident memory of the process.
+    pub resident_memory: Gauge,
+    /// 1 while the service is asked to end.
+    pub draining: Gauge,
+}
+
+impl Metrics {
+    /// Metrics that stand at zero.
+    pub fn new() -> Self {
+        let valid = "the bounds are not empty";
+        let full = |name: &str| Matcher::Full(name.to_owned());
+        let frame = Matcher::Prefix("bagtrack_frame_".to_owned());
+        let recorder = PrometheusBuilder::new()
+            .set_buckets_for_metric(full(REQUEST_TIME), &REQUEST_SECONDS)
+            .expect(valid)
+            .set_buckets_for_metric(full("bagtrack_queue_wait_seconds"), &REQUEST_SECONDS)
+            .expect(valid)
+            .set_buckets_for_metric(frame, &FRAME_SECONDS)
+            .expect(valid)
+            .build_recorder();
+        let make = Maker(&recorder);
+        make.describe_counter(REQUESTS, "Requests answered, by method, route and status.");
+        make.describe_seconds(REQUEST_TIME, "Time to the head of the answer, by route.");
+        make.describe_counter(PROBLEMS, "Requests refused or failed, by kind of problem.");
+        Self {
+            queue_wait: make.seconds(
+                "bagtrack_queue_wait_seconds",
+                "Time that a request waited for its session and for a worker.",
+            ),
+            received_bytes: make.counter(
+                "bagtrack_received_bytes_total",
+                "Bytes of request bodies, as they came.",
+                &[],
+            ),
+            sent_bytes: make.counter("bagtrack_sent_bytes_total", "Bytes of answers.", &[]),
+            tracking: TrackingMetrics::new(&make),
+            gauges: Gauges::new(&make),
+            recorder,
+        }
+    }
+
+    /// A request was answered.
+    pub fn answered(&self, method: &str, route: &str, status: u16, seconds: f64) {
+        let make = Maker(&self.recorder);
+        let route = Label::new("route", route.to_owned());
+        let labels = vec![
+            Label::new("method", method.to_owned()),
+            route.clone(),
+            Label::new("status", status.to_string()),
+        ];
+        make.find_counter(REQUESTS, labels).increment(1);
+        let key = Key::from_parts(REQUEST_TIME, vec![route]);
+        let times = self.recorder.register_histogram(&key, &METADATA);
+        times.record(seconds);
+    }
+
+    /// A request met a problem.
+    pub fn problem(&self, kind: Kind) {
+        let labels = vec![Label::from_static_parts("kind", kind.slug())];
+        Maker(&self.recorder)
+            .find_counter(PROBLEMS, labels)
+            .increment(1);
+    }
+
+    /// The text for Prometheus.
+    pub fn render(&self) -> String {
+        self.recorder.handle().render()
+    }
+
+    /// Sums up what was measured since the last time.
+    pub fn upkeep(&self) {
+        self.recorder.handle().run_upkeep();
+    }
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl std::fmt::Debug for Metrics {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("Metrics")
+    }
+}
+
+impl Gauges {
+    fn new(make: &Maker) -> Self {
+        Self {
+            sessions: make.gauge("bagtrack_sessions", "Sessions in memory."),
+            max_sessions: make.gauge("bagtrack_sessions_max", "Most sessions there may be."),
+            queued: make.gauge(
+                "bagtrack_requests_inside",
+                "Requests with a place in the queue.",
+            ),
+            workers_busy: make.gauge("bagtrack_workers_busy", "Workers at work."),
+            workers: make.gauge("bagtrack_workers", "Workers."),
+            resident_memory: make.gauge(
+                "process_resident_memory_bytes",
+                "Resident memory of the process.",
+            ),
+            draining: make.gauge("bagtrack_draining", "1 while the service is about to end."),
+        }
+    }
+}

@@ -1,0 +1,1 @@
+for (const host of document.querySelectorAll(".host")) host.textContent = location.origin;

@@ -1,0 +1,217 @@
+//! API keys and session tokens: who may use what.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use bagtrack::http::{Application, Config, Secret};
+use reqwest::{Method, StatusCode};
+use serde_json::Value;
+use std::time::Duration;
+
+const ANN: &str = "0123456789abcdef";
+const BEN: &str = "fedcba9876543210";
+
+async fn two_clients() -> TestApplication {
+    TestApplication::start_with(|config| {
+        config.access.api_keys = vec![
+            Secret::from("ann:0123456789abcdef"),
+            Secret::from("ben:fedcba9876543210"),
+        ];
+    })
+    .await
+}
+
+#[tokio::test]
+async fn nothing_is_done_without_a_valid_key() {
+    let mut app = two_clients().await;
+    let id = app.open().await;
+    let paths = |id: &str| {
+        [
+            (Method::POST, "/sessions".to_owned()),
+            (Method::GET, format!("/sessions/{id}")),
+            (Method::DELETE, format!("/sessions/{id}")),
+            (Method::POST, format!("/sessions/{id}/frames")),
+            (Method::PUT, format!("/sessions/{id}/target")),
+            (Method::GET, format!("/sessions/{id}/snapshot")),
+            (Method::POST, format!("/sessions/{id}/token")),
+            (Method::GET, "/metrics".to_owned()),
+        ]
+    };
+    for key in [
+        None,
+        Some("0123456789abcdeF"),
+        Some("ann:0123456789abcdef"),
+        Some("ann"),
+        Some(""),
+    ] {
+        app.key = key.map(str::to_owned);
+        for (method, path) in paths(&id) {
+            let response = app.request(method, &path, &[]).send().await.unwrap();
+            assert_eq!(
+                response.headers()["www-authenticate"],
+                "Bearer realm=\"bagtrack\""
+            );
+            expect_problem(response, "unauthorized").await;
+        }
+    }
+    // Two keys are none.
+    app.key = Some(ANN.to_owned());
+    let request = app.request(Method::GET, &format!("/sessions/{id}"), &[]);
+    expect_problem(
+        request.bearer_auth(BEN).send().await.unwrap(),
+        "unauthorized",
+    )
+    .await;
+    // Probes and pages for people need none.
+    app.key = None;
+    for path in ["/healthz", "/readyz", "/", "/docs/", "/openapi.json"] {
+        assert_eq!(app.get(path).await.status(), StatusCode::OK, "{path}");
+    }
+    app.key = Some(ANN.to_owned());
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
+async fn a_session_is_not_there_for_other_clients() {
+    let mut app = two_clients().await;
+    let id = app.open().await;
+    app.key = Some(BEN.to_owned());
+    expect_problem(app.get_session(&id).await, "session-not-found").await;
+    expect_problem(app.snapshot_of(&id).await, "session-not-found").await;
+    expect_problem(app.delete_session(&id).await, "session-not-found").await;
+    let frame = app.post_frame(&id, pictures::png(1)).await;
+    expect_problem(frame, "session-not-found").await;
+    let target = app.put_target(&id, pictures::png(1), &[("box", BOX)]).await;
+    expect_problem(target, "session-not-found").await;
+    let token = app.request(Method::POST, &format!("/sessions/{id}/token"), &[]);
+    expect_problem(token.send().await.unwrap(), "session-not-found").await;
+    app.key = Some(ANN.to_owned());
+    assert_eq!(app.frames_of(&id).await, 1);
+    // Nor are others told that it has expired.
+    app.clock.advance(Duration::from_secs(600));
+    expect_problem(app.get_session(&id).await, "session-expired").await;
+    app.key = Some(BEN.to_owned());
+    expect_problem(app.get_session(&id).await, "session-not-found").await;
+}
+
+async fn token(app: &TestApplication, id: &str, query: &[(&str, &str)]) -> Value {
+    let request = app.request(Method::POST, &format!("/sessions/{id}/token"), query);
+    expect(request.send().await.unwrap(), StatusCode::OK).await
+}
+
+#[tokio::test]
+async fn a_token_is_good_for_its_session_alone() {
+    let mut app = two_clients().await;
+    let (id, other) = (app.open().await, app.open().await);
+    let made = token(&app, &id, &[]).await;
+    app.key = Some(made["token"].as_str().unwrap().to_owned());
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    assert_eq!(app.frames_of(&id).await, 2);
+    expect_problem(app.get_session(&other).await, "session-not-found").await;
+    let opened = app.create(pictures::png(0), &[("box", BOX)]).await;
+    expect_problem(opened, "forbidden").await;
+    let again = app.request(Method::POST, &format!("/sessions/{id}/token"), &[]);
+    expect_problem(again.send().await.unwrap(), "forbidden").await;
+    expect_problem(app.get("/metrics").await, "forbidden").await;
+    expect(app.delete_session(&id).await, StatusCode::NO_CONTENT).await;
+    expect_problem(app.get_session(&id).await, "session-not-found").await;
+}
+
+#[tokio::test]
+async fn a_token_ends_and_cannot_be_changed() {
+    let mut app = two_clients().await;
+    let id = app.open().await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    for wrong in ["0", "86401", "-1", "ten"] {
+        let path = format!("/sessions/{id}/token");
+        let request = app.request(Method::POST, &path, &[("seconds", wrong)]);
+        expect_problem(request.send().await.unwrap(), "malformed-request").await;
+    }
+    let made = token(&app, &id, &[("seconds", "60")]).await;
+    let text = made["token"].as_str().unwrap().to_owned();
+    assert!(made["expires_at"].as_str().unwrap().ends_with('Z'));
+    app.key = Some(text.clone());
+    expect(app.get_session(&id).await, StatusCode::OK).await;
+    let middle = text.len() / 2;
+    let digit = if text.as_bytes()[middle] == b'A' {
+        "B"
+    } else {
+        "A"
+    };
+    let mut changed = text.clone();
+    changed.replace_range(middle..=middle, digit);
+    app.key = Some(changed);
+    expect_problem(app.get_session(&id).await, "unauthorized").await;
+    app.key = Some(text);
+    app.clock.advance(Duration::from_secs(61));
+    expect_problem(app.get_session(&id).await, "unauthorized").await;
+}
+
+#[tokio::test]
+async fn keys_are_read_again_and_a_broken_file_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys");
+    std::fs::write(&file, "# clients\n\nann:0123456789abcdef\n").unwrap();
+    let config = Config {
+        listen: "127.0.0.1:0".parse().unwrap(),
+        ..Config::default()
+    };
+    let mut config = config;
+    config.access.api_keys_file = Some(file.clone());
+    let application = Application::bind(config).await.unwrap();
+    let (keys, address) = (application.api_keys(), application.local_addr().unwrap());
+    tokio::spawn(application.serve(std::future::pending::<()>()));
+    let client = reqwest::Client::new();
+    let status = async |key: &str| {
+        let request = client
+            .get(format!("http://{address}/metrics"))
+            .bearer_auth(key);
+        request.send().await.unwrap().status()
+    };
+    assert_eq!(status(ANN).await, StatusCode::OK);
+    assert_eq!(status(BEN).await, StatusCode::UNAUTHORIZED);
+    for broken in ["ben", "ben:short", "# nobody\n"] {
+        std::fs::write(&file, broken).unwrap();
+        assert!(keys.reload().is_err(), "{broken}");
+        assert_eq!(status(ANN).await, StatusCode::OK);
+    }
+    std::fs::write(&file, "ben:fedcba9876543210").unwrap();
+    assert_eq!(keys.reload().unwrap(), 1);
+    assert_eq!(status(ANN).await, StatusCode::UNAUTHORIZED);
+    assert_eq!(status(BEN).await, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn the_service_does_not_open_itself_to_a_network_by_accident() {
+    let bind = async |change: fn(&mut Config)| {
+        let mut config = Config {
+            listen: "0.0.0.0:0".parse().unwrap(),
+            ..Config::default()
+        };
+        change(&mut config);
+        let bound = Application::bind(config).await;
+        bound.map(drop).map_err(|error| error.to_string())
+    };
+    let message = bind(|_| ()).await.unwrap_err();
+    assert!(
+        message.contains("BAGTRACK_API_KEYS") && message.contains("BAGTRACK_NO_AUTH"),
+        "{message}"
+    );
+    assert_eq!(bind(|config| config.access.no_auth = true).await, Ok(()));
+    let keys =
+        |config: &mut Config| config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
+    assert_eq!(bind(keys).await, Ok(()));
+    let both = bind(|config| {
+        config.access.no_auth = true;
+        config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
+    });
+    assert!(both.await.is_err());
+    let short = bind(|config| {
+        config.access.no_auth = true;
+        config.access.snapshot_keys = vec![Secret::from("guess me")];
+    });
+    let message = short.await.unwrap_err();
+    assert!(
+        message.contains("BAGTRACK_SNAPSHOT_KEYS") && !message.contains("guess me"),
+        "{message}"
+    );
+}

@@ -1,0 +1,187 @@
+//! Requests that cost far more to answer than to send.
+
+use crate::application::{TestApplication, expect, expect_problem};
+use crate::heavy;
+use crate::pictures;
+use crate::raw::RawConnection;
+use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, StatusCode};
+use std::io::Cursor;
+use std::time::{Duration, Instant};
+
+/// A box in a frame of 8000 x 5000.
+const LARGE_BOX: &str = "2000,1500,1600,1200";
+
+/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take tenths of a second to decode.
+fn bomb() -> Vec<u8> {
+    let picture = DynamicImage::ImageLuma8(GrayImage::from_pixel(8192, 4094, Luma([77])));
+    let mut bytes = Cursor::new(Vec::new());
+    let rgb = DynamicImage::ImageRgb8(picture.to_rgb8());
+    rgb.write_to(&mut bytes, ImageFormat::WebP).unwrap();
+    bytes.into_inner()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn sixty_four_bombs_of_another_size_hold_no_worker() {
+    let app = TestApplication::start().await;
+    let bomb = bomb();
+    assert!(bomb.len() < 20_000, "{}", bomb.len());
+    let (id, other) = (app.open().await, app.open().await);
+    let form = || {
+        let part = || Part::bytes(bomb.clone()).file_name("frame.webp");
+        (0..64).fold(Form::new(), |form, _| form.part("frame", part()))
+    };
+    let attack = |id: &str| {
+        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        request.multipart(form()).send()
+    };
+    let sent = Instant::now();
+    let (first, second) = tokio::join!(attack(&id), attack(&other));
+    for refused in [first.unwrap(), second.unwrap()] {
+        let problem = expect_problem(refused, "frame-size-mismatch").await;
+        assert_eq!(problem["index"], 0);
+    }
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    // Decoding them took both workers half a minute.
+    assert!(
+        sent.elapsed() < Duration::from_secs(5),
+        "{:?}",
+        sent.elapsed()
+    );
+    assert_eq!(app.frames_of(&other).await, 1);
+}
+
+#[tokio::test]
+async fn the_size_of_the_last_frame_is_checked_before_the_first_is_decoded() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let mut damaged = pictures::png(1);
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 0xFF;
+    let part = |bytes: Vec<u8>| Part::bytes(bytes).file_name("frame.png");
+    let form = Form::new()
+        .part("frame", part(damaged))
+        .part("frame", part(pictures::png_of(64, 48)));
+    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+    let refused = request.multipart(form).send().await.unwrap();
+    let problem = expect_problem(refused, "frame-size-mismatch").await;
+    assert_eq!(problem["index"], 1);
+}
+
+#[tokio::test]
+async fn the_processor_time_of_a_request_is_bounded() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.max_request_cpu = Duration::from_millis(2);
+    });
+    let app = app.await;
+    let session = heavy::open(&app).await;
+    let response = heavy::post(&app, &session, 64).send().await.unwrap();
+    expect_problem(response, "request-too-costly").await;
+    let view = expect(app.get(&session).await, StatusCode::OK).await;
+    assert_eq!(view["frames"], 1, "none of them was tracked");
+}
+
+#[tokio::test]
+async fn work_past_its_deadline_stops_at_the_next_frame() {
+    let app = TestApplication::start_with(|config| {
+        config.workers = Some(1);
+        config.max_frames = 2 * heavy::FRAMES;
+        config.work_timeout = Duration::from_millis(300);
+    });
+    let app = app.await;
+    let (session, id) = (heavy::open(&app).await, app.open().await);
+    let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
+    expect_problem(request.send().await.unwrap(), "work-timeout").await;
+    // The only worker is free again in time for this one.
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    let view = expect(app.get(&session).await, StatusCode::OK).await;
+    assert_eq!(view["frames"], 1);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn work_whose_client_has_gone_stops_at_the_next_frame() {
+    let app = TestApplication::start_with(|config| {
+        (config.workers, config.queue) = (Some(1), 1);
+        config.max_frames = 2 * heavy::FRAMES;
+        config.limits.half_close_timeout = Duration::from_millis(10);
+    });
+    let app = app.await;
+    let (session, id) = (heavy::open(&app).await, app.open().await);
+    let request = heavy::post(&app, &session, 2 * heavy::FRAMES)
+        .build()
+        .unwrap();
+    let media_type = request.headers()["content-type"]
+        .to_str()
+        .unwrap()
+        .to_owned();
+    let body = heavy::encoded(request).await;
+    let mut client = RawConnection::open(app.address).await;
+    let head = format!(
+        "POST {session}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\n\r\n",
+        body.len()
+    );
+    client.send(head).await;
+    client.send(body).await;
+    let ask = || app.post_frame(&id, pictures::png(1));
+    let mut posted = 0;
+    let full = async {
+        while ask().await.status() == StatusCode::OK {
+            posted += 1;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(60), full)
+        .await
+        .expect("the only place is taken by the long request");
+    drop(client);
+    let freed = async { while ask().await.status() != StatusCode::OK {} };
+    tokio::time::timeout(Duration::from_secs(60), freed)
+        .await
+        .unwrap();
+    let view = expect(app.get(&session).await, StatusCode::OK).await;
+    assert_eq!(view["frames"], 1, "what was done is undone");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_threads() {
+    let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
+    let large = |value: u8| {
+        let picture = GrayImage::from_fn(8000, 5000, |x, y| {
+            Luma([value + ((x / 80) ^ (y / 50)) as u8 % 90])
+        });
+        pictures::encode(picture, ImageFormat::Png)
+    };
+    let (first, next) = (large(10), large(20));
+    let response = app.create(first.clone(), &[("box", LARGE_BOX)]).await;
+    let created = expect(response, StatusCode::CREATED).await;
+    let id = created["id"].as_str().unwrap();
+    // A replay takes next to no time; it once marked the session as one whose frames are cheap.
+    let replayed = app
+        .put_target(id, first, &[("box", LARGE_BOX), ("frame", "0")])
+        .await;
+    assert_eq!(replayed.headers()["replayed"], "true");
+    let (done, mut is_done) = tokio::sync::oneshot::channel();
+    let ask = async {
+        let mut slowest = Duration::ZERO;
+        let mut asked = 0;
+        while is_done.try_recv().is_err() {
+            let sent = Instant::now();
+            expect(app.get("/healthz").await, StatusCode::OK).await;
+            slowest = slowest.max(sent.elapsed());
+            asked += 1;
+        }
+        (asked, slowest)
+    };
+    let post = async {
+        let sent = Instant::now();
+        expect(app.post_numbered(id, 1, next).await, StatusCode::OK).await;
+        done.send(()).unwrap();
+        sent.elapsed()
+    };
+    let (took, (asked, slowest)) = tokio::join!(post, ask);
+    println!("{took:?} for the frame, {asked} answers of /healthz, the slowest after {slowest:?}");
+    assert!(
+        asked > 10 && slowest < took / 2,
+        "{asked} {slowest:?} of {took:?}"
+    );
+}

@@ -1,0 +1,186 @@
+//! Clients that hold connections, close one side of them, or do not speak HTTP.
+
+use crate::application::{TestApplication, expect};
+use crate::heavy;
+use crate::pictures;
+use crate::raw::RawConnection;
+use reqwest::StatusCode;
+use serde_json::Value;
+use std::time::Duration;
+
+const HEALTH: &str = "GET /healthz HTTP/1.1\r\nHost: test\r\n\r\n";
+
+#[tokio::test]
+async fn a_client_that_never_reads_loses_its_connection() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.write_timeout = Duration::from_millis(100);
+    });
+    let app = app.await;
+    let mut connection = RawConnection::open(app.address).await;
+    let ask = "GET /openapi.json HTTP/1.1\r\nHost: test\r\n\r\n".repeat(50);
+    // It sends without end, which fails when the service has closed the connection.
+    let refused = async { while connection.try_send(&ask).await.is_ok() {} };
+    tokio::time::timeout(Duration::from_secs(60), refused)
+        .await
+        .expect("the connection ends");
+    expect(app.get("/healthz").await, StatusCode::OK).await;
+}
+
+#[tokio::test]
+async fn when_all_connections_are_taken_an_idle_one_makes_room() {
+    let app = TestApplication::start_with(|config| {
+        config.max_connections = 3;
+        config.limits.client_connections = Some(9);
+    });
+    let app = app.await;
+    let mut silent = Vec::new();
+    for _ in 0..3 {
+        silent.push(RawConnection::open(app.address).await);
+    }
+    for _ in 0..3 {
+        let mut connection = RawConnection::open(app.address).await;
+        connection.send(HEALTH).await;
+        let answer = connection.read_answer().await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+        silent.push(connection);
+    }
+    // The first three had to go.
+    for mut connection in silent.into_iter().take(3) {
+        assert_eq!(connection.read_to_end().await, "");
+    }
+}
+
+#[tokio::test]
+async fn an_address_has_a_share_of_the_connections() {
+    let app = TestApplication::start_with(|config| config.limits.client_connections = Some(2));
+    let app = app.await;
+    let mut busy = Vec::new();
+    for _ in 0..2 {
+        busy.push(RawConnection::hold(app.address, "POST", "/sessions", 1000).await);
+    }
+    let mut third = RawConnection::open(app.address).await;
+    let answer = third.read_to_end().await;
+    let (head, body) = answer.split_once("\r\n\r\n").expect("an answer");
+    assert!(
+        head.starts_with("HTTP/1.1 429") && head.contains("retry-after: 1"),
+        "{head}"
+    );
+    let problem: Value = serde_json::from_str(body).unwrap();
+    assert_eq!(problem["type"], "urn:bagtrack:problem:quota-exceeded");
+    drop(busy);
+    let served = async {
+        loop {
+            let mut next = RawConnection::open(app.address).await;
+            if next.try_send(HEALTH).await.is_ok()
+                && next.read_some().await.starts_with("HTTP/1.1 200")
+            {
+                break;
+            }
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(60), served)
+        .await
+        .expect("their places are free again");
+}
+
+#[tokio::test]
+async fn a_half_closed_connection_gets_its_answer() {
+    let app = TestApplication::start().await;
+    let session = heavy::open(&app).await;
+    let request = heavy::post(&app, &session, 10).build().unwrap();
+    let media_type = request.headers()["content-type"]
+        .to_str()
+        .unwrap()
+        .to_owned();
+    let body = heavy::encoded(request).await;
+    let mut client = RawConnection::open(app.address).await;
+    let head = format!(
+        "POST {session}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\n\r\n",
+        body.len()
+    );
+    client.send(head).await;
+    client.send(body).await;
+    client.close_sending().await;
+    let answer = client.read_to_end().await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    assert_eq!(answer.matches("\"frame\":").count(), 10, "{answer}");
+
+    let id = app.open().await;
+    let mut client = RawConnection::open(app.address).await;
+    let frame = pictures::png(1);
+    let head = format!(
+        "POST /sessions/{id}/frames HTTP/1.1\r\nHost: test\r\nContent-Length: {}\r\n\r\n",
+        frame.len() + 1
+    );
+    client.send(head).await;
+    client.send(frame).await;
+    client.close_sending().await;
+    // Its last byte never comes.
+    let answer = client.read_to_end().await;
+    assert!(!answer.contains("HTTP/1.1 200"), "{answer}");
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
+async fn a_head_that_is_not_http_gets_a_problem_document() {
+    let app = TestApplication::start().await;
+    let long = "a".repeat(200_000);
+    for (head, status, slug) in [
+        ("NONSENSE\r\n\r\n".to_owned(), "400", "malformed-request"),
+        (
+            "GET / HTTP/1.1\r\nHost: test\r\nbad header: x\r\n\r\n".to_owned(),
+            "400",
+            "malformed-request",
+        ),
+        (
+            format!("GET / HTTP/1.1\r\nHost: test\r\nx: {long}\r\n\r\n"),
+            "431",
+            "head-too-large",
+        ),
+    ] {
+        let mut client = RawConnection::open(app.address).await;
+        // Part of a long head may be unread when the connection is closed.
+        let _ = client.try_send(&head).await;
+        let answer = client.read_to_end().await;
+        let (answer, body) = answer.split_once("\r\n\r\n").expect("an answer");
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{answer}"
+        );
+        assert!(
+            answer.contains("content-type: application/problem+json"),
+            "{answer}"
+        );
+        let problem: Value = serde_json::from_str(body).unwrap();
+        assert_eq!(problem["type"], format!("urn:bagtrack:problem:{slug}"));
+        let id = problem["request_id"].as_str().unwrap();
+        assert!(answer.contains(&format!("x-request-id: {id}")), "{answer}");
+    }
+}
+
+#[tokio::test]
+async fn a_request_names_exactly_one_host() {
+    let app = TestApplication::start().await;
+    for (hosts, status) in [
+        ("", "400"),
+        ("Host: a\r\nHost: b\r\n", "400"),
+        ("Host: a\r\nHost: a\r\n", "400"),
+        ("Host: a\r\n", "200"),
+    ] {
+        let mut client = RawConnection::open(app.address).await;
+        client
+            .send(format!("GET /healthz HTTP/1.1\r\n{hosts}\r\n"))
+            .await;
+        let answer = client.read_answer().await;
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{hosts:?}: {answer}"
+        );
+        let is_problem = answer.contains("urn:bagtrack:problem:malformed-request");
+        assert_eq!(is_problem, status == "400", "{answer}");
+    }
+    let mut old = RawConnection::open(app.address).await;
+    old.send("GET /healthz HTTP/1.0\r\n\r\n").await;
+    let answer = old.read_to_end().await;
+    assert!(answer.starts_with("HTTP/1.0 200"), "{answer}");
+}

@@ -1,0 +1,52 @@
+//! What the log tells, and what it does not.
+
+use crate::application::BOX;
+use crate::pictures;
+use crate::process::Service;
+use rustix::process::Signal;
+use serde_json::Value;
+
+#[tokio::test]
+async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
+    for format in ["json", "text"] {
+        let flags = ["--log-format", format, "--shutdown-delay", "0s"];
+        let service = Service::start(&flags).await;
+        let url = service.url(&format!("/sessions?box={BOX}"));
+        let created = service.client.post(url).body(pictures::png(0));
+        let created: Value = created.send().await.unwrap().json().await.unwrap();
+        let id = created["id"].as_str().unwrap();
+        let trace = "4bf92f3577b34da6a3ce929d0e0e4736";
+        let request = service
+            .client
+            .post(service.url(&format!("/sessions/{id}/frames")));
+        let request = request
+            .header("x-request-id", "the-request")
+            .header("traceparent", format!("00-{trace}-00f067aa0ba902b7-01"));
+        request.body("no image").send().await.unwrap();
+        for path in ["/healthz", "/readyz", "/metrics"] {
+            service.client.get(service.url(path)).send().await.unwrap();
+        }
+        let deleted = service
+            .client
+            .delete(service.url(&format!("/sessions/{id}")));
+        deleted.send().await.unwrap();
+        service.signal(Signal::TERM);
+        let (_, log) = service.ends().await;
+        let text = log.join("\n");
+        assert!(!text.contains(id), "{text}");
+        assert!(text.contains(&id[..8]), "{text}");
+        for probe in ["/healthz", "/readyz", "/metrics"] {
+            assert!(!text.contains(probe), "{text}");
+        }
+        let lines: Vec<&String> = log
+            .iter()
+            .filter(|line| line.contains("the-request"))
+            .collect();
+        assert_eq!(lines.len(), 2, "its problem and its answer: {text}");
+        for line in lines {
+            for word in ["the-request", trace, "/frames"] {
+                assert_eq!(line.matches(word).count(), 1, "{line}");
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! What one client may have, and that others get their turn beside it.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::heavy;
+use crate::pictures;
+use bagtrack::http::Config;
+use reqwest::{Method, Response, StatusCode};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+use tokio::task::JoinSet;
+
+fn behind_a_proxy(config: &mut Config) {
+    config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+}
+
+async fn create_as(app: &TestApplication, client: &str) -> Response {
+    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let request = request
+        .header("x-forwarded-for", client)
+        .body(pictures::png(0));
+    request.send().await.unwrap()
+}
+
+#[tokio::test]
+async fn one_client_cannot_take_all_sessions() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.max_sessions = 8;
+    });
+    let app = app.await;
+    let mut paths = Vec::new();
+    for left in ["1", "0"] {
+        let created = create_as(&app, "198.51.100.1").await;
+        let limit = created.headers()["ratelimit"].to_str().unwrap().to_owned();
+        assert!(limit.contains(&format!("\"sessions\";r={left}")), "{limit}");
+        paths.push(created.headers()["location"].to_str().unwrap().to_owned());
+        expect(created, StatusCode::CREATED).await;
+    }
+    let refused = create_as(&app, "198.51.100.1").await;
+    let policy = refused.headers()["ratelimit-policy"].to_str().unwrap();
+    assert!(policy.contains("\"sessions\";q=2"), "{policy}");
+    let problem = expect_problem(refused, "quota-exceeded").await;
+    assert!(
+        problem["detail"].as_str().unwrap().contains("2 sessions"),
+        "{problem}"
+    );
+    expect(create_as(&app, "198.51.100.2").await, StatusCode::CREATED).await;
+    let deleted = app
+        .request(Method::DELETE, &paths[0], &[])
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
+    expect(create_as(&app, "198.51.100.1").await, StatusCode::CREATED).await;
+}
+
+#[tokio::test]
+async fn an_address_that_no_trusted_proxy_forwards_is_not_believed() {
+    let app = TestApplication::start_with(|config| config.max_sessions = 4).await;
+    expect(create_as(&app, "198.51.100.1").await, StatusCode::CREATED).await;
+    expect_problem(create_as(&app, "198.51.100.2").await, "quota-exceeded").await;
+}
+
+#[tokio::test]
+async fn frames_a_second_are_counted_and_their_rest_is_told() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.client_frame_rate = 1;
+        config.max_frames = 4;
+    });
+    let app = app.await;
+    let id = app.open().await;
+    for t in 1..4 {
+        let response = app.post_frame(&id, pictures::png(t)).await;
+        let policy = response.headers()["ratelimit-policy"].to_str().unwrap();
+        assert!(policy.contains("\"frames\";q=4;w=4"), "{policy}");
+        expect(response, StatusCode::OK).await;
+    }
+    let mut sent = 3;
+    let refused = loop {
+        let response = app.post_frame(&id, pictures::png(1)).await;
+        if response.status() != StatusCode::OK {
+            break response;
+        }
+        sent += 1;
+    };
+    let limit = refused.headers()["ratelimit"].to_str().unwrap();
+    assert!(limit.contains("\"frames\";r=0;t=4"), "{limit}");
+    let wait: u64 = refused.headers()["retry-after"]
+        .to_str()
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!((1..=4).contains(&wait), "{wait}");
+    expect_problem(refused, "quota-exceeded").await;
+    assert_eq!(app.frames_of(&id).await, 1 + sent);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_with_one_session_gets_its_turn_beside_one_with_forty() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.workers = Some(1);
+    });
+    let app = app.await;
+    let mut greedy = JoinSet::new();
+    static WAITED: AtomicU64 = AtomicU64::new(0);
+    static ANSWERED: AtomicU64 = AtomicU64::new(0);
+    let mut urls = Vec::new();
+    for _ in 0..40 {
+        urls.push(format!(
+            "http://{}{}/frames",
+            app.address,
+            heavy::open(&app).await
+        ));
+    }
+    let id = app.open().await;
+    for url in urls {
+        let client = app.client.clone();
+        greedy.spawn(async move {
+            loop {
+                let sent = Instant::now();
+                let request = client.post(&url).header("x-forwarded-for", "198.51.100.1");
+                let Ok(answer) = request.body(pictures::png(1)).send().await else {
+                    return;
+                };
+                assert_eq!(answer.status(), StatusCode::OK);
+                let waited = sent.elapsed().as_micros() as u64;
+                WAITED.fetch_add(waited, Ordering::Relaxed);
+                ANSWERED.fetch_add(1, Ordering::Relaxed);
+            }
+        });
+    }
+    while ANSWERED.load(Ordering::Relaxed) < 40 {
+        tokio::task::yield_now().await;
+    }
+    let sent = Instant::now();
+    for t in 1..=20 {
+        expect(app.post_frame(&id, pictures::png(t)).await, StatusCode::OK).await;
+    }
+    let modest = sent.elapsed().as_micros() as u64 / 20;
+    let greedy = WAITED.load(Ordering::Relaxed) / ANSWERED.load(Ordering::Relaxed);
+    println!("{modest} µs beside {greedy} µs");
+    assert!(modest < greedy / 4, "{modest} µs beside {greedy} µs");
+}
