@@ -98,6 +98,75 @@ fn every_form_of_jpeg_gives_the_luma_up_to_compression() {
     assert!(difference(&frame(&samples), &expected).1 < 2.0, "gray JPEG");
 }
 
+/// A picture of four flat quarters: red, green, blue, gray.
+fn quarters() -> image::RgbImage {
+    image::RgbImage::from_fn(104, 80, |x, y| match (x < 52, y < 40) {
+        (true, true) => image::Rgb([220, 30, 30]),
+        (false, true) => image::Rgb([30, 220, 30]),
+        (true, false) => image::Rgb([30, 30, 220]),
+        (false, false) => image::Rgb([90, 90, 90]),
+    })
+}
+
+/// Checks Cb and Cr in the middle of each quarter, `order` saying which colour is where.
+fn check_chroma(name: &str, bytes: &[u8], order: [usize; 4]) {
+    // (B - Y) / 1.772 + 128 and (R - Y) / 1.402 + 128 of the four colours.
+    let expected = [(96, 223), (65, 48), (223, 113), (128, 128)];
+    let frame = frame(bytes);
+    assert!(frame.has_color(), "{name}");
+    let columns = frame.width().div_ceil(2) as usize;
+    let rows = frame.height().div_ceil(2) as usize;
+    let [_, cb, cr] = frame.into_planes();
+    assert_eq!(
+        (cb.len(), cr.len()),
+        (columns * rows, columns * rows),
+        "{name}"
+    );
+    for (quarter, color) in order.into_iter().enumerate() {
+        let (x, y) = (
+            columns / 4 + quarter % 2 * columns / 2,
+            rows / 4 + quarter / 2 * rows / 2,
+        );
+        let found = (
+            i32::from(cb[y * columns + x]),
+            i32::from(cr[y * columns + x]),
+        );
+        let off = (found.0 - expected[color].0)
+            .abs()
+            .max((found.1 - expected[color].1).abs());
+        assert!(
+            off <= 3,
+            "{name}, quarter {quarter}: {found:?}, not {:?}",
+            expected[color]
+        );
+    }
+}
+
+#[test]
+fn every_format_gives_the_chroma_of_its_pixels() {
+    let image = DynamicImage::ImageRgb8(quarters());
+    let as_stored = [0, 1, 2, 3];
+    for (name, form) in jpeg_forms() {
+        let bytes = jpeg(&quarters(), form, None);
+        // A rare layout is refused, with the reason.
+        if decode(&bytes, &Limits::default()).is_ok() {
+            check_chroma(&name, &bytes, as_stored);
+        }
+    }
+    for (name, layout) in [
+        ("rgb", image.clone()),
+        ("rgba", image.to_rgba8().into()),
+        ("rgb 16", image.to_rgb16().into()),
+    ] {
+        check_chroma(name, &encode(&layout, ImageFormat::Png), as_stored);
+    }
+    check_chroma("webp", &encode(&image, ImageFormat::WebP), as_stored);
+    let turned = with_png_exif(&encode(&image, ImageFormat::Png), 3);
+    check_chroma("upside down", &turned, [3, 2, 1, 0]);
+    let gray = encode(&DynamicImage::ImageLuma8(gray(20, 20)), ImageFormat::Png);
+    assert!(!frame(&gray).has_color());
+}
+
 #[test]
 fn cmyk_jpegs_give_luma_too() {
     let picture = color(SIZE.0, SIZE.1);

@@ -23,8 +23,10 @@ const REDUCTIONS: [ScalingFactor; 4] = [
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct DecodedPlanes {
     pub(super) luma: (u32, u32),
+    /// Where Cb begins; Cr follows.
+    chroma_at: usize,
     /// Of Cb and of Cr.
-    pub(super) chroma: Option<(u32, u32)>,
+    chroma: Option<(u32, u32)>,
 }
 
 impl DecodedPlanes {
@@ -35,18 +37,17 @@ impl DecodedPlanes {
         source: (u32, u32),
         orientation: Orientation,
     ) -> StoredImage<'a> {
-        let mut rest = pixels;
-        let mut next = |size: (u32, u32)| {
-            let (values, after) = rest.split_at(area(size));
-            rest = after;
-            Channel {
-                values: Cow::Borrowed(values),
-                size,
-            }
+        let channel = |at: usize, size| Channel {
+            values: Cow::Borrowed(&pixels[at..at + area(size)]),
+            size,
+        };
+        let chroma = |size| {
+            let cr_at = self.chroma_at + area(size);
+            [channel(self.chroma_at, size), channel(cr_at, size)]
         };
         StoredImage {
-            luma: next(self.luma),
-            chroma: self.chroma.map(|size| [next(size), next(size)]),
+            luma: channel(0, self.luma),
+            chroma: self.chroma.map(chroma),
             source,
             orientation,
         }
@@ -83,22 +84,21 @@ pub(super) fn decode(
         return None;
     }
     let luma = (width as u32, height as u32);
-    let subsampling = match header.subsamp {
-        Subsamp::None => (1, 1),
-        Subsamp::Sub2x1 => (2, 1),
-        Subsamp::Sub1x2 => (1, 2),
-        Subsamp::Sub2x2 => (2, 2),
-        // Gray, or so rare that the luma alone is taken.
-        _ => (0, 0),
-    };
-    let is_color = format.has_color && header.colorspace == Colorspace::YCbCr && subsampling.0 > 0;
-    let chroma = is_color.then(|| {
-        (
-            luma.0.div_ceil(subsampling.0),
-            luma.1.div_ceil(subsampling.1),
-        )
+    let is_color = format.has_color && header.subsamp != Subsamp::Gray;
+    let subsampling = is_color.then_some(match (header.subsamp, header.colorspace) {
+        (Subsamp::None, Colorspace::YCbCr) => (1, 1),
+        (Subsamp::Sub2x1, Colorspace::YCbCr) => (2, 1),
+        (Subsamp::Sub1x2, Colorspace::YCbCr) => (1, 2),
+        (Subsamp::Sub2x2, Colorspace::YCbCr) => (2, 2),
+        // The chroma of any other one is rare.
+        _ => return None,
     });
-    let len = area(luma) + 2 * chroma.map_or(0, area);
+    let chroma = subsampling.map(|(x, y)| (luma.0.div_ceil(x), luma.1.div_ceil(y)));
+    // The luma that comes with chroma is a whole number of its pixels.
+    let padded = subsampling.map_or(luma, |(x, y)| {
+        (luma.0.next_multiple_of(x), luma.1.next_multiple_of(y))
+    });
+    let len = area(padded) + 2 * chroma.map_or(0, area);
     if pixels.len() < len {
         pixels.resize(len, 0);
     }
@@ -111,6 +111,12 @@ pub(super) fn decode(
             subsamp: header.subsamp,
         };
         decompressor.decompress_to_yuv(whole, image).ok()?;
+        if padded.0 > luma.0 {
+            for row in 1..height {
+                let from = row * padded.0 as usize;
+                pixels.copy_within(from..from + width, row * width);
+            }
+        }
     } else {
         let image = Image {
             pixels: &mut pixels[..len],
@@ -121,7 +127,11 @@ pub(super) fn decode(
         };
         decompressor.decompress(whole, image).ok()?;
     }
-    Some(DecodedPlanes { luma, chroma })
+    Some(DecodedPlanes {
+        luma,
+        chroma_at: area(padded),
+        chroma,
+    })
 }
 
 fn new_decompressor() -> Option<Decompressor> {
@@ -160,7 +170,19 @@ mod tests {
 
     fn reduced(bytes: &[u8], pixels: &mut Vec<u8>) -> Option<(u32, u32)> {
         let markers = Markers::read(bytes).expect("its end was not cut off");
-        decode(bytes, &markers, &Limits::default(), pixels)
+        let format = FrameFormat {
+            size: working_size((markers.width, markers.height)),
+            has_color: true,
+        };
+        let planes = decode(bytes, &markers, &Limits::default(), format, pixels)?;
+        Some(planes.luma)
+    }
+
+    /// 320 pixels on the longer side.
+    fn working_size(source: (u32, u32)) -> (u32, u32) {
+        let longer = f64::from(source.0.max(source.1)).max(320.0);
+        let shrink = |side: u32| ((f64::from(side) * 320.0 / longer).round() as u32).max(1);
+        (shrink(source.0), shrink(source.1))
     }
 
     #[test]
@@ -179,7 +201,6 @@ mod tests {
             let mut pixels = Vec::new();
             let got = reduced(&jpeg(size.0, size.1), &mut pixels);
             assert_eq!(got, Some(expected), "{size:?}");
-            assert_eq!(pixels.len() as u32, expected.0 * expected.1);
         }
     }
 
