@@ -148,8 +148,10 @@ fn every_format_gives_the_chroma_of_its_pixels() {
     let as_stored = [0, 1, 2, 3];
     for (name, form) in jpeg_forms() {
         let bytes = jpeg(&quarters(), form, None);
-        // A rare layout is refused, with the reason.
-        if decode(&bytes, &Limits::default()).is_ok() {
+        // Rare layouts are refused, or decoded in gray.
+        let usual = ["R_4_4_4", "R_4_2_2", "R_4_4_0", "R_4_2_0"];
+        let is_usual = usual.iter().any(|usual| name.contains(usual));
+        if decode(&bytes, &Limits::default()).is_ok_and(|frame| frame.has_color() || is_usual) {
             check_chroma(&name, &bytes, as_stored);
         }
     }

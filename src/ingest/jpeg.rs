@@ -27,6 +27,11 @@ pub(super) fn decode<'scratch>(
     let source = (markers.width, markers.height);
     let orientation = orientation::of_exif(markers.exif(bytes));
     let format = format(orientation::upright(source, orientation));
+    let has_color = format.has_color && markers.has_usual_chroma();
+    let format = FrameFormat {
+        has_color,
+        ..format
+    };
     #[cfg(feature = "turbo")]
     {
         // Before it is turned upright, as the decoder sees it.

@@ -125,6 +125,11 @@ impl Markers {
         matches!(self.largest_sampling(), (_, 1) | (2, 2))
     }
 
+    /// Whether chroma has half or all of the luma's columns and rows. In others the decoder garbles it.
+    pub(super) fn has_usual_chroma(&self) -> bool {
+        matches!(self.largest_sampling(), (1 | 2, 1 | 2))
+    }
+
     /// The EXIF block of the image that these markers are of.
     pub(super) fn exif<'a>(&self, bytes: &'a [u8]) -> Option<&'a [u8]> {
         bytes.get(self.exif.clone()?)

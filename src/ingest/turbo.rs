@@ -90,7 +90,7 @@ pub(super) fn decode(
         (Subsamp::Sub2x1, Colorspace::YCbCr) => (2, 1),
         (Subsamp::Sub1x2, Colorspace::YCbCr) => (1, 2),
         (Subsamp::Sub2x2, Colorspace::YCbCr) => (2, 2),
-        // The chroma of any other one is rare.
+        // Any other one is rare.
         _ => return None,
     });
     let chroma = subsampling.map(|(x, y)| (luma.0.div_ceil(x), luma.1.div_ceil(y)));
