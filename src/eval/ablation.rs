@@ -21,6 +21,13 @@ const ROWS: &[Row] = &[
             ("patch_height", "32"),
         ],
     ),
+    ("320 pixels for any target", &[("target_side", "0")]),
+    ("no chroma in cells", &[("chroma_weight", "0")]),
+    ("no colour histogram", &[("histogram_weight", "0")]),
+    (
+        "neither, all in gray",
+        &[("chroma_weight", "0"), ("histogram_weight", "0")],
+    ),
     ("the box alone, no rim", &[("context", "1")]),
     (
         "candidates with their history",

@@ -21,6 +21,7 @@ pub(crate) fn luma(rgb: [u8; 3]) -> u8 {
 }
 
 /// Cb (`channel` 0) or Cr (1) of an RGB triple.
+#[cfg(feature = "ingest")]
 #[inline(always)]
 pub(crate) fn chroma_at(rgb: [u8; 3], channel: usize) -> u8 {
     let weights = CHROMA[channel];
