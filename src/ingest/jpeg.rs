@@ -1,5 +1,6 @@
 //! JPEG, decoded strictly, to the channels that it stores.
 
+use super::deinterleave;
 use super::error::IngestError;
 use super::jpeg_markers::Markers;
 use super::limits::{Limits, MAX_JPEG_SCANS};
@@ -46,13 +47,11 @@ pub(super) fn decode<'scratch>(
         }
     }
     let (luma, chroma) = decode_whole(bytes, &markers, limits, format.has_color, scratch)?;
-    let channel = |values| Channel {
-        values,
-        size: source,
-    };
+    let channel = |values, size| Channel { values, size };
+    let half = ycbcr::chroma_size(source);
     let stored = StoredImage {
-        luma: channel(luma),
-        chroma: chroma.map(|planes| planes.map(|plane| channel(Cow::Owned(plane)))),
+        luma: channel(luma, source),
+        chroma: chroma.map(|planes| planes.map(|plane| channel(Cow::Owned(plane), half))),
         source,
         orientation,
     };
@@ -79,7 +78,7 @@ fn read_markers(bytes: &[u8], limits: &Limits) -> Result<Markers, IngestError> {
     Ok(markers)
 }
 
-/// Luma and, where it is wanted, chroma, as the file has them.
+/// Luma and, where it is wanted, chroma in half of its columns and rows.
 type Channels<'a> = (Cow<'a, [u8]>, Option<[Vec<u8>; 2]>);
 
 /// The channels at full size, with zune-jpeg.
@@ -127,28 +126,18 @@ fn decode_whole<'scratch>(
     scratch.pixels.clear();
     scratch.pixels.resize(bytes, 0);
     decoder.decode_into(&mut scratch.pixels).map_err(reason)?;
-    let of = |channel: usize| {
-        scratch.pixels[channel..]
-            .iter()
-            .copied()
-            .step_by(3)
-            .collect()
-    };
+    let size = (markers.width, markers.height);
+    let pixels = scratch.pixels.as_chunks::<3>().0;
     Ok(match output {
         ColorSpace::Luma => (Cow::Borrowed(&scratch.pixels[..]), None),
-        ColorSpace::YCbCr => (Cow::Owned(of(0)), has_color.then(|| [of(1), of(2)])),
+        ColorSpace::YCbCr if has_color => {
+            let (luma, chroma) = deinterleave::planes(&scratch.pixels, size);
+            (Cow::Owned(luma), Some(chroma))
+        }
+        ColorSpace::YCbCr => (pixels.iter().map(|pixel| pixel[0]).collect(), None),
         _ => {
-            let pixels = scratch.pixels.as_chunks::<3>().0;
-            let of = |channel: usize| -> Vec<u8> {
-                pixels
-                    .iter()
-                    .map(|&rgb| ycbcr::chroma_at(rgb, channel))
-                    .collect()
-            };
-            (
-                Cow::Owned(luma_of_rgb8(&scratch.pixels)),
-                has_color.then(|| [of(0), of(1)]),
-            )
+            let chroma = has_color.then(|| ycbcr::chroma(size, |i| pixels[i]));
+            (Cow::Owned(luma_of_rgb8(&scratch.pixels)), chroma)
         }
     })
 }

@@ -28,6 +28,7 @@
 mod catch_decoder_panic;
 mod containers;
 mod decode;
+mod deinterleave;
 mod error;
 mod jpeg;
 mod jpeg_markers;

@@ -20,19 +20,6 @@ pub(crate) fn luma(rgb: [u8; 3]) -> u8 {
     ((sum + (1 << 15)) >> 16) as u8
 }
 
-/// Cb (`channel` 0) or Cr (1) of an RGB triple.
-#[cfg(feature = "ingest")]
-#[inline(always)]
-pub(crate) fn chroma_at(rgb: [u8; 3], channel: usize) -> u8 {
-    let weights = CHROMA[channel];
-    let sum: i32 = rgb
-        .iter()
-        .zip(weights)
-        .map(|(&c, w)| i32::from(c) * w)
-        .sum();
-    (((sum + (1 << 15)) >> 16) + NEUTRAL).clamp(0, 255) as u8
-}
-
 /// The chroma of an image of `size`, Cb and Cr, in pixels twice as large: means of 2 x 2 pixels, or of fewer at the edge.
 /// `rgb` gives each pixel of the image by its index, row by row.
 pub(crate) fn chroma(size: (u32, u32), rgb: impl Fn(usize) -> [u8; 3]) -> [Vec<u8>; 2] {
