@@ -35,7 +35,7 @@ impl Client {
         Self::Address(address)
     }
 
-    /// The client of a request that has passed `identify`.
+    /// The client of a request that has passed the layer that notes it.
     pub fn of(parts: &Parts) -> Self {
         let client = parts.extensions.get::<Self>().cloned();
         client.unwrap_or_else(|| Self::at(Ipv4Addr::UNSPECIFIED.into()))

@@ -1,7 +1,8 @@
 //! Accepting connections, and ending.
 //!
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a bounded time to end.
+//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a
+//! bounded time to end.
 
 use super::auth::access::{Access, AccessError};
 use super::auth::keys::ApiKeys;

@@ -103,8 +103,8 @@ impl Admission {
         })
     }
 
-    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is dropped before a worker
-    /// is free, the work is not done; afterwards it runs to its end and keeps its permits.
+    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is
+    /// dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
     ///
     /// # Errors
     /// The work panicked, or there was no thread for it.
