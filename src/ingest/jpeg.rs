@@ -117,7 +117,7 @@ fn decode_whole<'scratch>(
         _ => ColorSpace::RGB,
     };
     limits
-        .check_memory(markers.memory(2 * output.num_components() as u64) + guarded.len() as u64)?;
+        .check_memory(markers.memory(output.num_components() as u64 + 2) + guarded.len() as u64)?;
     decoder.set_options(options.jpeg_set_out_colorspace(output));
     let bytes = decoder
         .output_buffer_size()

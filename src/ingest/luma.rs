@@ -65,8 +65,12 @@ pub(super) fn chroma_of(image: &DynamicImage) -> Option<[Vec<u8>; 2]> {
             let pixels = rgb.as_raw().as_chunks::<3>().0;
             ycbcr::chroma(size, |i| pixels[i].map(to_8_bits))
         }
+        DynamicImage::ImageRgba16(rgba) => {
+            let pixels = rgba.as_raw().as_chunks::<4>().0;
+            ycbcr::chroma(size, |i| blend(pixels[i].map(to_8_bits)))
+        }
         other => {
-            // RGBA in 16 bits, and whatever else `image` comes to decode.
+            // Whatever else `image` comes to decode.
             let rgba = other.to_rgba8();
             let pixels = rgba.as_raw().as_chunks::<4>().0;
             ycbcr::chroma(size, |i| blend(pixels[i]))

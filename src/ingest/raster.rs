@@ -88,7 +88,7 @@ fn decode(
     limits.check_size(width, height)?;
     // The decoded image, what the decoder needs beside it, the luma, and the chroma in half of the columns and rows.
     let pixels = u64::from(width) * u64::from(height);
-    let beside = (working_bytes_per_pixel + 2) * pixels + copied;
+    let beside = working_bytes_per_pixel * pixels + pixels * 3 / 2 + copied;
     limits.check_memory(decoder.total_bytes() + beside)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let source = (width, height);
