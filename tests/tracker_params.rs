@@ -54,10 +54,8 @@ fn spread(shares: &[f64], switches: u8, seed: u64) -> Params {
         scale_learning_rate: if on(3) { share() } else { 0.0 },
         dense_maxima: seed as u32 % 17,
         static_penalty: if on(5) { 100.0 * share() } else { 0.0 },
-        rotation_step: if on(5) { 30.0 * share() } else { 0.0 },
         augmentation_angle: if on(4) { 90.0 * share() } else { 0.0 },
         pinned_weight: if on(1) { 100.0 * share() } else { 0.0 },
-        update_min_score: share(),
         update_distance_ratio: 100.0 * (seed % 3) as f64 / 2.0,
         discriminant_weight: 100.0 * (seed % 5) as f64 / 4.0,
         features: if on(0) {

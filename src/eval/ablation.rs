@@ -39,7 +39,6 @@ const ROWS: &[Row] = &[
     ("no scale filter", &[("scale_learning_rate", "0")]),
     ("no dense search", &[("dense_maxima", "0")]),
     ("no augmented first image", &[("augmentation_angle", "0")]),
-    ("no in-plane rotation", &[("rotation_step", "0")]),
     (
         "the first subspace weighs as any other",
         &[("pinned_weight", "1")],
@@ -50,9 +49,7 @@ const ROWS: &[Row] = &[
     ),
     ("no change test", &[("static_penalty", "0")]),
     ("no global motion", &[("global_motion", "false")]),
-    ("never lost", &[("lost_threshold", "0")]),
     ("updates at any distance", &[("update_distance_ratio", "0")]),
-    ("updates at any score", &[("update_min_score", "0")]),
     ("no discriminant", &[("discriminant_weight", "0")]),
 ];
 

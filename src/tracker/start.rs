@@ -13,12 +13,12 @@ use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
 use crate::tracker::estimate::{Estimate, Status};
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::{Frame, FrameFormat};
-use crate::tracker::image::frame_views::FrameViews;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::image::warp;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::last_seen::LastSeen;
-use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
 use crate::tracker::params::table::Params;
@@ -67,7 +67,6 @@ impl State {
             last_seen: LastSeen::default(),
             update_gate: UpdateGate::default(),
             baseline: DistanceBaseline::default(),
-            orientation: 0.0,
             frames_lost: 0,
         };
         state.reset_particles(answer);
@@ -86,7 +85,6 @@ impl State {
         let number = self.estimate.frame + 1;
         let (bounds, answer) = Self::place(self.source, self.format.size, &target);
         self.bounds = bounds;
-        self.orientation = 0.0;
         self.frames_lost = 0;
         self.reset_particles(answer);
         if let Some(profiles) = &mut self.global_motion {
@@ -119,11 +117,8 @@ impl State {
         workspace.change_test.load(frame, answer, bounds);
         self.record_seen(workspace);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
-        if orientation::is_on(&self.params) {
-            workspace.views.reserve_rectified(frame);
-        }
-        let views = FrameViews::new(frame, self.downsample_factor(), &mut workspace.views);
-        let (image, answer) = (views.original(), self.answer);
+        let view = self.view(frame, workspace);
+        let (image, answer) = (&*view, self.answer);
         workspace.extractor.compute_channels(
             image,
             &[answer],
@@ -147,7 +142,7 @@ impl State {
         self.learn_scale(image, &answer, workspace);
         self.describe_at(image, &answer, workspace);
         self.describe_augmented(image, workspace);
-        views.give_back(&mut workspace.views);
+        workspace.give_back(view);
     }
 
     /// Appends the feature vectors of the augmented views of the answer. The extractor has the channels of the last of
@@ -155,8 +150,9 @@ impl State {
     fn describe_augmented(&self, image: &Frame, workspace: &mut Workspace) {
         let (answer, params) = ([self.answer], &self.params);
         let (extractor, learning) = (&mut workspace.extractor, &mut workspace.learning);
+        let window = Extractor::window(&answer, 0.0, &self.bounds, params);
         for angle in augmentation::angles(params) {
-            let rotated = augmentation::rotated(image, &self.answer, angle);
+            let rotated = warp::rotated(image, (self.answer.x, self.answer.y), angle, &window);
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
             let view = &mut learning.view;
             extractor.features(&rotated, &answer, &self.bounds, params, view);

@@ -22,9 +22,9 @@ use crate::tracker::scale::dsst::ScaleFilter;
 
 /// By how much of its usual width the search widens in each frame in which the target is lost.
 const WIDENING: f64 = 0.5;
-/// Three standard deviations of the widest search, in working pixels: the whole frame, or five times the target's usual
-/// size. A wider one costs more, and finds look-alikes.
-const MAX_SEARCHED: f64 = 320.0;
+/// Three standard deviations of the widest search, in sides √(width · height) of the target. A wider one costs more, and
+/// finds look-alikes.
+const MAX_SEARCHED_SIDES: f64 = 5.0;
 
 /// The state of a tracker between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,8 +54,6 @@ pub(crate) struct State {
     pub last_seen: LastSeen,
     pub update_gate: UpdateGate,
     pub baseline: DistanceBaseline,
-    /// The target's in-plane rotation against the first frame, in radians.
-    pub orientation: f64,
     /// For how many frames the target has been lost.
     pub frames_lost: u32,
 }
@@ -88,11 +86,12 @@ impl State {
     }
 
     /// How many times as wide as usual the next search is. The longer a target is lost, the further it may have come,
-    /// until the search covers [`MAX_SEARCHED`] pixels.
+    /// until the search covers the whole frame or [`MAX_SEARCHED_SIDES`].
     pub fn spread(&self) -> f64 {
         let std = self.params.motion_std_x.max(self.params.motion_std_y);
         let frame = self.bounds.frame_width.max(self.bounds.frame_height);
-        let max = (frame.min(MAX_SEARCHED) / 3.0 / std.max(1.0)).max(1.0);
+        let widest = frame.min(MAX_SEARCHED_SIDES * self.bounds.side(&self.answer));
+        let max = (widest / 3.0 / std.max(1.0)).max(1.0);
         (1.0 + WIDENING * f64::from(self.frames_lost)).min(max)
     }
 

@@ -5,10 +5,7 @@
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::Frame;
-use crate::tracker::learn::Found;
-use crate::tracker::motion::orientation;
 use crate::tracker::motion::random::{self, Draws};
-use crate::tracker::observe::to_original;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
@@ -17,21 +14,19 @@ impl State {
     pub fn step(&mut self, frame: &Frame, workspace: &mut Workspace) -> (Estimate, Evidence) {
         let number = self.estimate.frame + 1;
         let displacement = self.displacement(frame, workspace);
-        let rotation = orientation::rotation(&self.answer, self.orientation);
-        let search = self.search(displacement, rotation.as_ref());
+        let search = self.search(displacement);
         let radius = self.radius(&search, number);
-        let views = self.views(frame, rotation.as_ref(), radius, workspace);
-        let image = views.rectified();
+        let image = self.view(frame, workspace);
 
         // (A) Propose: where the target may be.
         let mut draws = random::generator(self.params.seed, number, Draws::Particles);
-        self.propose(image, &search, radius, &mut draws, workspace);
-        self.test_for_change(frame, &search, rotation.as_ref(), radius, workspace);
+        self.propose(&image, &search, radius, &mut draws, workspace);
+        self.test_for_change(frame, &search, radius, workspace);
 
         // (B) Describe, (D) compare and weigh. Twice, since a second round is drawn around the best of the first.
-        let mut best = self.weigh(image, &search, rotation.as_ref(), workspace);
+        let mut best = self.weigh(&image, &search, workspace);
         if self.refine(&search, &mut draws, workspace) {
-            best = self.weigh(image, &search, rotation.as_ref(), workspace);
+            best = self.weigh(&image, &search, workspace);
         }
         let candidates = &workspace.candidates;
 
@@ -39,13 +34,12 @@ impl State {
         let evidence = candidates.evidence(best, self.update_gate.mean_distance);
         let (gate, params) = (&self.update_gate, &self.params);
         let is_lost = gate.is_lost(&evidence, self.frames_lost, search.spread, params);
-        let found = if is_lost {
-            search.displaced()
+        let answer = if is_lost {
+            self.bounds.clamp(search.displaced())
         } else {
             let mean = search.answer(&candidates.particles, &candidates.weights, best);
-            self.measure_scale(image, mean, workspace)
+            self.measure_scale(&image, mean, workspace)
         };
-        let answer = self.bounds.clamp(to_original(found, rotation.as_ref()));
 
         // Judge: how likely the box is right, and whether it may be learned from.
         let scale = answer.scale;
@@ -58,20 +52,13 @@ impl State {
                 &self.params,
             );
         let (score, status) = self.baseline.judge(&evidence, is_lost, is_usual);
-        let passes = is_usual && self.passes(score, number);
 
         // (C) Learn: what is remembered of the frame.
-        let found = Found {
-            number,
-            answer,
-            rectified: found,
-            distance: evidence.first_distance,
-        };
-        self.remember(&found, is_lost, workspace);
-        if passes {
-            self.learn(&views, &found, workspace);
+        self.remember(answer, is_lost, workspace);
+        if is_usual {
+            self.learn(&image, &answer, number, workspace);
         }
-        views.give_back(&mut workspace.views);
+        workspace.give_back(image);
         let target = self.target_of(&answer);
         self.estimate = Estimate {
             frame: number,

@@ -2,6 +2,7 @@
 //! many and threads few, so each thread has one workspace and sessions have none. A step that finds its thread's
 //! workspace warm allocates nothing.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 use crate::tracker::appearance::foreground_map::ForegroundMap;
@@ -11,7 +12,6 @@ use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
-use crate::tracker::image::frame_views;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::particles::Particle;
@@ -22,7 +22,8 @@ use crate::tracker::scale::pyramid;
 pub(crate) struct Workspace {
     /// The profiles of the present frame.
     pub global_motion: GlobalMotion,
-    pub views: frame_views::Scratch,
+    /// The frame in larger pixels.
+    pub downsampled: Frame,
     pub extractor: Extractor,
     pub dense_search: DenseSearch,
     pub foreground: ForegroundMap,
@@ -31,11 +32,8 @@ pub(crate) struct Workspace {
     pub sums: Vec<f64>,
     /// For each particle the logarithm of its prior.
     pub log_priors: Vec<f64>,
-    /// Particles where they are in the original view.
-    pub original: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
-    pub rotated: Rotated,
 }
 
 /// What is learned from a frame, before it goes into the models.
@@ -53,11 +51,13 @@ pub(crate) struct Learning {
     pub pyramid: pyramid::Scratch,
 }
 
-/// The answer in images that are rotated further.
-#[derive(Debug, Default)]
-pub(crate) struct Rotated {
-    pub extractor: Extractor,
-    pub frame: Frame,
+impl Workspace {
+    /// Takes back the memory of a view.
+    pub fn give_back(&mut self, view: Cow<'_, Frame>) {
+        if let Cow::Owned(downsampled) = view {
+            self.downsampled = downsampled;
+        }
+    }
 }
 
 thread_local! {

@@ -231,7 +231,7 @@ pub fn robust(seed: u64) -> Params {
 type Change = fn(&mut Params);
 
 /// Each extension of the preset `robust`, switched off.
-const EXTENSIONS_OFF: [(&str, Change); 15] = [
+const EXTENSIONS_OFF: [(&str, Change); 13] = [
     ("no background", |p| p.background_samples = 0),
     ("no discriminant", |p| p.discriminant_weight = 0.0),
     ("resampled", |p| p.search = Search::Resampled),
@@ -241,11 +241,9 @@ const EXTENSIONS_OFF: [(&str, Change); 15] = [
     ("no scale filter", |p| p.scale_learning_rate = 0.0),
     ("no dense search", |p| p.dense_maxima = 0),
     ("no augmentation", |p| p.augmentation_angle = 0.0),
-    ("no rotation", |p| p.rotation_step = 0.0),
     ("no change test", |p| p.static_penalty = 0.0),
     ("nothing pinned", |p| p.pinned_weight = 0.0),
     ("updates at any distance", |p| p.update_distance_ratio = 0.0),
-    ("updates at any score", |p| p.update_min_score = 0.0),
     ("no prior", |p| p.displacement_std = 0.0),
 ];
 

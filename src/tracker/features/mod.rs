@@ -2,7 +2,7 @@
 //!
 //! In: a [`Frame`](crate::tracker::image::frame::Frame) and particles, in working pixels. Out: for each
 //! particle a vector of D `f32` values, one after the other. These are H₁ x H₂ gray values in [0, 1] (section III-B),
-//! or H₁ x H₂ cells of ten values: nine gradient directions in [0, 0.4] and a gray value of mean 0.
+//! or H₁ x H₂ cells of twelve values: nine gradient directions in [0, 0.4], two of chroma and a gray value of mean 0.
 //!
 //! | file | holds |
 //! |---|---|

@@ -14,8 +14,6 @@
 //! | [`area_average`] | exact downscaling of an uploaded frame to its working size |
 //! | [`downsample`] | a working image in pixels 2 or 4 times as large |
 //! | [`warp`] | a working image rotated about a point |
-//! | [`bilinear`] | rows of interpolated pixels along a line, for `warp` |
-//! | [`frame_views`] | the images in which the target of one frame is searched |
 //!
 //! Errors: only [`Frame`](frame::Frame) checks its input ([`FrameError`](frame::FrameError): no pixels, or not
 //! width x height of them). All else takes frames that exist, so a frame has at least one pixel everywhere. Boxes may
@@ -24,10 +22,8 @@
 //! Nothing here knows what is tracked or how: no features, no particles, no state.
 
 pub(crate) mod area_average;
-pub(crate) mod bilinear;
 pub(crate) mod downsample;
 pub(crate) mod frame;
-pub(crate) mod frame_views;
 pub(crate) mod plane;
 pub(crate) mod rect;
 pub(crate) mod resolution;

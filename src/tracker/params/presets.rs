@@ -60,11 +60,8 @@ const PAPER: Params = Params {
     global_motion: false,
     pinned_weight: 0.0,
     augmentation_angle: 0.0,
-    rotation_step: 0.0,
     update_distance_ratio: 0.0,
-    update_min_score: 0.0,
     discriminant_weight: 0.0,
-    lost_threshold: 0.0,
     seed: 0,
 };
 
@@ -99,13 +96,7 @@ const ROBUST: Params = Params {
     pinned_weight: 6.0,
     // 5 to 15 are alike: a head that nods, a bottle that is lifted.
     augmentation_angle: 10.0,
-    // Heads tilt by some degrees a frame.
-    rotation_step: 6.0,
     update_distance_ratio: 1.5,
-    // Right twice as often as wrong.
-    update_min_score: 0.65,
     discriminant_weight: 20.0,
-    // The discriminant says 0.5 to 1 on the target, and about 0.1 beside it.
-    lost_threshold: 0.35,
     ..PAPER
 };

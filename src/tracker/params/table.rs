@@ -169,20 +169,12 @@ parameters! {
     pinned_weight: f64 [0 to 100];
     /// By how many degrees, either way, the first box's image is rotated to augment its subspace. Off: 0.
     augmentation_angle: f64 [0 to 90];
-    /// By how many degrees, either way, a further in-plane rotation of the target is tried. With
-    /// `single_vector_candidate` and `search` = `answer`. Off: 0.
-    rotation_step: f64 [0 to 30];
     /// The models are updated only while the answer's distance to the first subspace is below this multiple of its
     /// running mean. Off: 0.
     update_distance_ratio: f64 [0 to 100];
-    /// The models are updated only from frames with this score or a greater one, after the first twenty. Off: 0.
-    update_min_score: f64 [0 to 1];
     /// Weight of the discriminant, a linear classifier of the target against its surroundings: the likelihood is
     /// multiplied by exp(weight · score). Off: 0.
     discriminant_weight: f64 [0 to 100];
-    /// Below this score of the discriminant the target is lost: the box stays, nothing is learned, and the search
-    /// widens from frame to frame until the target is found again. Off: 0.
-    lost_threshold: f64 [0 to 1];
 
     /// Seed of all random draws: the same seed and frames give the same boxes.
     seed: u64;
