@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
@@ -33,26 +33,20 @@ pub(crate) struct PointDistance {
     norms: Vec<f32>,
 }
 
-/// [`PointDistance::distances`], compiled for this machine's instructions.
-struct Distances<'a> {
-    point_distance: &'a mut PointDistance,
-    candidates: &'a [f32],
-    squares: &'a [f32],
-    params: &'a Params,
-    out: &'a mut Vec<f64>,
-}
-
-impl WithSimd for Distances<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let (this, count) = (self.point_distance, self.squares.len());
-        let stride = count.next_multiple_of(GROUP);
-        this.multiply(simd, self.candidates, self.params.feature_len(), stride);
-        this.normalize(self.squares, stride);
-        this.compare(count, stride, self.params, self.out);
-    }
+#[pulp::with_simd(distances = Arch::new())]
+#[inline(always)]
+fn distances_simd<S: Simd>(
+    simd: S,
+    point_distance: &mut PointDistance,
+    (candidates, squares): (&[f32], &[f32]),
+    params: &Params,
+    out: &mut Vec<f64>,
+) {
+    let count = squares.len();
+    let stride = count.next_multiple_of(GROUP);
+    point_distance.multiply(simd, candidates, params.feature_len(), stride);
+    point_distance.normalize(squares, stride);
+    point_distance.compare(count, stride, params, out);
 }
 
 impl PointDistance {
@@ -78,13 +72,7 @@ impl PointDistance {
         params: &Params,
         out: &mut Vec<f64>,
     ) {
-        Arch::new().dispatch(Distances {
-            point_distance: self,
-            candidates,
-            squares,
-            params,
-            out,
-        });
+        distances(self, (candidates, squares), params, out);
     }
 
     /// The products of the last `count` candidates with the queries.

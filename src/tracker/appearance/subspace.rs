@@ -1,6 +1,6 @@
 //! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::linalg::jacobi::Spectrum;
@@ -17,22 +17,16 @@ pub struct AffineSubspace {
     pub(crate) basis: Vec<f32>,
 }
 
-/// [`AffineSubspace::fit`], compiled for this machine's instructions.
-struct Fit<'a> {
-    subspace: &'a mut AffineSubspace,
-    vectors: &'a [&'a [f32]],
+#[pulp::with_simd(fit = Arch::new())]
+#[inline(always)]
+fn fit_simd<S: Simd>(
+    _: S,
+    subspace: &mut AffineSubspace,
+    vectors: &[&[f32]],
     basis_dim: usize,
-    spectrum: &'a mut Spectrum,
-}
-
-impl WithSimd for Fit<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.subspace
-            .make_of(self.vectors, self.basis_dim, self.spectrum);
-    }
+    spectrum: &mut Spectrum,
+) {
+    subspace.make_of(vectors, basis_dim, spectrum);
 }
 
 impl AffineSubspace {
@@ -50,12 +44,7 @@ impl AffineSubspace {
 
     /// Becomes the subspace [`of`](Self::of) these vectors, in its present memory.
     pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
-        Arch::new().dispatch(Fit {
-            subspace: self,
-            vectors,
-            basis_dim,
-            spectrum,
-        });
+        fit(self, vectors, basis_dim, spectrum);
     }
 
     #[inline(always)]

@@ -2,18 +2,18 @@
 //!
 //! Particles are few, and what is between them is not seen: the further a target may have moved, the wider the gaps.
 //! Areas of one size that are whole cells apart share their cells, so one grid of cells serves all of them, and the
-//! scores are a correlation of the discriminant's weights with the grid ([`SlidingWindow`]). Half of the first
+//! scores are a correlation of the discriminant's weights with the grid ([`sliding_window`](crate::tracker::classifier::sliding_window)). Half of the first
 //! particles are then drawn around the maxima, and weighed as all particles are.
 //!
 //! A score here differs a little from that of a particle at the same place: a cell at the edge of an area is normalised
 //! with the cells beyond the edge as well.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::foreground_map::ForegroundMap;
-use crate::tracker::classifier::channel_planes::MAX_OFFSET;
+use crate::tracker::classifier::channel_planes::{ChannelPlanes, MAX_OFFSET};
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::classifier::sliding_window::SlidingWindow;
+use crate::tracker::classifier::sliding_window::window_scores;
 use crate::tracker::features::extractor::{Extractor, Grid};
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::Particle;
@@ -27,7 +27,7 @@ const MAX_PRODUCTS: usize = 1_600_000;
 #[derive(Debug, Default)]
 pub(crate) struct DenseSearch {
     grid: Grid,
-    sliding_window: SlidingWindow,
+    planes: ChannelPlanes,
     /// The logarithm of what the weight of a particle at each place is multiplied by, row by row.
     values: Vec<f32>,
     maxima: Vec<Particle>,
@@ -78,31 +78,24 @@ impl SearchGrid {
     }
 }
 
-/// Turns the scores in `values` into logarithms of weights, compiled for this machine's instructions.
-struct Weigh<'a> {
-    places: SearchGrid,
-    search: &'a SearchContext<'a>,
-    foreground: &'a ForegroundMap,
-    values: &'a mut [f32],
-}
-
-impl WithSimd for Weigh<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let weight = self.search.params.discriminant_weight;
-        let histogram_weight = self.search.params.histogram_weight;
-        let rows = self.values.chunks_exact_mut(self.places.columns());
-        for (row, values) in rows.enumerate() {
-            for (column, value) in values.iter_mut().enumerate() {
-                let place = self.places.at(column, row);
-                let color = self
-                    .foreground
-                    .mean(&place, place.scale, self.search.bounds);
-                let prior = self.search.log_prior(&place) + histogram_weight * color;
-                *value = (weight * f64::from(*value) + prior) as f32;
-            }
+/// Turns the scores in `values` into logarithms of weights.
+#[pulp::with_simd(weigh = Arch::new())]
+#[inline(always)]
+fn weigh_simd<S: Simd>(
+    _: S,
+    places: &SearchGrid,
+    search: &SearchContext<'_>,
+    foreground: &ForegroundMap,
+    values: &mut [f32],
+) {
+    let (weight, bounds) = (search.params.discriminant_weight, search.bounds);
+    let rows = values.chunks_exact_mut(places.columns());
+    for (row, values) in rows.enumerate() {
+        for (column, value) in values.iter_mut().enumerate() {
+            let place = places.at(column, row);
+            let color = foreground.mean(&place, place.scale, bounds);
+            let prior = search.log_prior(&place) + search.params.histogram_weight * color;
+            *value = (weight * f64::from(*value) + prior) as f32;
         }
     }
 }
@@ -144,14 +137,10 @@ impl DenseSearch {
         let values = &mut self.values;
         values.resize(places.columns() * places.rows(), 0.0);
         let cell_pixels = (cell.0 * cell.1) as f32;
-        self.sliding_window
-            .scores(grid, discriminant, params, cell_pixels, values);
-        Arch::new().dispatch(Weigh {
-            places,
-            search,
-            foreground,
-            values,
-        });
+        let size = (params.patch_width as usize, params.patch_height as usize);
+        let planes = &mut self.planes;
+        window_scores(planes, grid, discriminant, size, cell_pixels, values);
+        weigh(&places, search, foreground, values);
         let columns = places.columns();
         while self.maxima.len() < params.dense_maxima as usize {
             let Some(index) = take_maximum(values, columns) else {

@@ -10,10 +10,10 @@
 //! So no sample is kept, and one frame changes w only so far. A few steps of conjugate gradients are enough: the
 //! damping makes the problem well conditioned. The unit vectors are never written out ([`TrainingSamples`]).
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::classifier::samples::TrainingSamples;
+use crate::tracker::classifier::samples::{Coefficients, TrainingSamples};
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
@@ -46,25 +46,16 @@ pub(crate) struct Scratch {
     product: Vec<f32>,
 }
 
-/// [`Discriminant::fit`], compiled for this machine's instructions.
-struct Fit<'a> {
-    discriminant: &'a mut Discriminant,
-    samples: &'a TrainingSamples,
-    vectors: &'a [f32],
-    damping: f64,
-    steps: usize,
-    scratch: &'a mut Scratch,
-}
-
-impl WithSimd for Fit<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let (damping, steps) = (self.damping, self.steps);
-        self.discriminant
-            .fit_all(self.samples, self.vectors, damping, steps, self.scratch);
-    }
+#[pulp::with_simd(fit = Arch::new())]
+#[inline(always)]
+fn fit_simd<S: Simd>(
+    simd: S,
+    discriminant: &mut Discriminant,
+    (samples, vectors): (&TrainingSamples, &[f32]),
+    (damping, steps): (f64, usize),
+    scratch: &mut Scratch,
+) {
+    discriminant.fit_all(simd, (samples, vectors), (damping, steps), scratch);
 }
 
 impl Discriminant {
@@ -100,39 +91,20 @@ impl Discriminant {
     /// The fit to the first frame, with the labels in `scratch`.
     pub fn begin(&mut self, samples: &TrainingSamples, vectors: &[f32], scratch: &mut Scratch) {
         let damping = DAMPING * FIRST_DAMPING;
-        self.fit(samples, vectors, damping, FIRST_STEPS, scratch);
+        fit(self, (samples, vectors), (damping, FIRST_STEPS), scratch);
     }
 
     /// The fit to a further frame: its particles as samples, their vectors, and their labels in `scratch`.
     pub fn learn(&mut self, samples: &TrainingSamples, vectors: &[f32], scratch: &mut Scratch) {
-        self.fit(samples, vectors, DAMPING, STEPS, scratch);
-    }
-
-    fn fit(
-        &mut self,
-        samples: &TrainingSamples,
-        vectors: &[f32],
-        damping: f64,
-        steps: usize,
-        scratch: &mut Scratch,
-    ) {
-        Arch::new().dispatch(Fit {
-            discriminant: self,
-            samples,
-            vectors,
-            damping,
-            steps,
-            scratch,
-        });
+        fit(self, (samples, vectors), (DAMPING, STEPS), scratch);
     }
 
     #[inline(always)]
-    fn fit_all(
+    fn fit_all<S: Simd>(
         &mut self,
-        samples: &TrainingSamples,
-        vectors: &[f32],
-        damping: f64,
-        steps: usize,
+        simd: S,
+        (samples, vectors): (&TrainingSamples, &[f32]),
+        (damping, steps): (f64, usize),
         scratch: &mut Scratch,
     ) {
         let Scratch {
@@ -148,7 +120,7 @@ impl Discriminant {
         // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
         gradient.clear();
         gradient.resize(self.weights.len(), 0.0);
-        samples.add_sum(vectors, residuals, gradient);
+        samples.add_sum(simd, vectors, Coefficients::Given(residuals), gradient);
         direction.clone_from(gradient);
         product.resize(gradient.len(), 0.0);
         let mut squared = vector_ops::dot(gradient, gradient);
@@ -159,14 +131,19 @@ impl Discriminant {
             }
             if step == steps {
                 // The gradient is not needed after the last step.
-                let along = samples.energy(vectors, direction);
+                let along = samples.energy(simd, vectors, direction);
                 let along = along + damping * vector_ops::dot(direction, direction);
                 vector_ops::add(&mut self.weights, squared / along, direction);
                 break;
             }
             product.fill(0.0);
             vector_ops::add(product, damping, direction);
-            samples.add_products(vectors, direction, product);
+            samples.add_sum(
+                simd,
+                vectors,
+                Coefficients::ProductsWith(direction),
+                product,
+            );
             let step = squared / vector_ops::dot(direction, product);
             vector_ops::add(&mut self.weights, step, direction);
             vector_ops::add(gradient, -step, product);
@@ -223,7 +200,12 @@ mod tests {
                 labels: labels.clone(),
                 ..Scratch::default()
             };
-            discriminant.fit(&samples, &shifted, 0.2, 60, &mut scratch);
+            fit(
+                &mut discriminant,
+                (&samples, &shifted),
+                (0.2, 60),
+                &mut scratch,
+            );
 
             let mut u = DMatrix::from_row_slice(count, len, &vectors).cast::<f64>();
             for mut row in u.row_iter_mut() {
@@ -258,7 +240,12 @@ mod tests {
                 labels: vec![1.0, 0.5],
                 ..Scratch::default()
             };
-            discriminant.fit(&samples, &vectors, 1e-4, 25, &mut scratch);
+            fit(
+                &mut discriminant,
+                (&samples, &vectors),
+                (1e-4, 25),
+                &mut scratch,
+            );
             let finite = discriminant.weights.iter().all(|weight| weight.is_finite());
             assert!(finite, "{tiny}: {:?}", discriminant.weights);
         }

@@ -4,7 +4,7 @@
 //! and its score follow from the inner products of x with the weights and with the origin, and sums over samples are
 //! sums over vectors. A mean may be subtracted from the vectors, if it is subtracted from the origin as well.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::Simd;
 
 use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::scratch::clear_and_reserve;
@@ -77,69 +77,24 @@ impl TrainingSamples {
         self.scratch = scratch;
     }
 
-    /// Forgets all samples but the first `count`.
-    pub fn truncate(&mut self, count: usize) {
-        self.scales.truncate(count);
-        self.scores.truncate(count);
-    }
-
     /// The scores: about 1 on the target and 0 beside it, but not bounded.
     pub fn scores(&self) -> &[f32] {
         &self.scores
     }
 
-    /// Adds Σ cᵢ uᵢ to `sum`.
-    pub fn add_sum(&self, vectors: &[f32], coefficients: &[f32], sum: &mut [f32]) {
-        Arch::new().dispatch(Sum {
-            samples: self,
-            vectors,
-            coefficients: Coefficients::Given(coefficients),
-            sum,
-        });
-    }
-
     /// Σ (uᵢ · d)².
-    pub fn energy(&self, vectors: &[f32], direction: &[f32]) -> f32 {
-        Arch::new().dispatch(Energy {
-            samples: self,
-            vectors,
-            direction,
-        })
-    }
-
-    /// Adds Σ (uᵢ · d) uᵢ to `sum`.
-    pub fn add_products(&self, vectors: &[f32], direction: &[f32], sum: &mut [f32]) {
-        Arch::new().dispatch(Sum {
-            samples: self,
-            vectors,
-            coefficients: Coefficients::ProductsWith(direction),
-            sum,
-        });
-    }
-}
-
-/// [`TrainingSamples::energy`], compiled for this machine's instructions.
-struct Energy<'a> {
-    samples: &'a TrainingSamples,
-    vectors: &'a [f32],
-    direction: &'a [f32],
-}
-
-impl WithSimd for Energy<'_> {
-    type Output = f32;
-
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f32 {
-        let (len, scales) = (self.direction.len(), &self.samples.scales);
-        let of_origin = vector_ops::dot(&self.samples.origin, self.direction);
+    pub fn energy<S: Simd>(&self, simd: S, vectors: &[f32], direction: &[f32]) -> f32 {
+        let (len, scales) = (direction.len(), &self.scales);
+        let of_origin = vector_ops::dot(&self.origin, direction);
         let mut energy = 0.0;
         for first in (0..scales.len()).step_by(GROUP) {
-            let mut group = [self.vectors; GROUP];
+            let mut group = [vectors; GROUP];
             for (i, vector) in group.iter_mut().enumerate() {
                 // A group at the end has the last vector more than once, which is not counted.
-                *vector = &self.vectors[(first + i).min(scales.len() - 1) * len..][..len];
+                *vector = &vectors[(first + i).min(scales.len() - 1) * len..][..len];
             }
-            let products = gemm::tile(simd, group, [self.direction]);
+            let products = gemm::tile(simd, group, [direction]);
             for ([product], scale) in products.iter().zip(&scales[first..]) {
                 let product = scale * (product - of_origin);
                 energy += product * product;
@@ -147,38 +102,22 @@ impl WithSimd for Energy<'_> {
         }
         energy
     }
-}
 
-enum Coefficients<'a> {
-    Given(&'a [f32]),
-    ProductsWith(&'a [f32]),
-}
-
-/// A sum over all samples, compiled for this machine's instructions.
-struct Sum<'a> {
-    samples: &'a TrainingSamples,
-    vectors: &'a [f32],
-    coefficients: Coefficients<'a>,
-    sum: &'a mut [f32],
-}
-
-impl WithSimd for Sum<'_> {
-    type Output = ();
-
+    /// Adds Σ cᵢ uᵢ to `sum`.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            samples,
-            vectors,
-            coefficients,
-            sum,
-        } = self;
+    pub fn add_sum<S: Simd>(
+        &self,
+        simd: S,
+        vectors: &[f32],
+        coefficients: Coefficients<'_>,
+        sum: &mut [f32],
+    ) {
         let len = sum.len();
         let of_origin = match coefficients {
             Coefficients::Given(_) => 0.0,
-            Coefficients::ProductsWith(direction) => vector_ops::dot(&samples.origin, direction),
+            Coefficients::ProductsWith(direction) => vector_ops::dot(&self.origin, direction),
         };
-        let count = samples.scales.len();
+        let count = self.scales.len();
         let mut total = 0.0;
         for first in (0..count).step_by(GROUP) {
             let mut group = [vectors; GROUP];
@@ -187,26 +126,35 @@ impl WithSimd for Sum<'_> {
                 *vector = &vectors[(first + i).min(count - 1) * len..][..len];
             }
             let mut factors = [0.0; GROUP];
-            let counted = GROUP.min(count - first);
+            let scales = &self.scales[first..];
             match coefficients {
                 Coefficients::Given(given) => {
+                    let counted = GROUP.min(count - first);
                     factors[..counted].copy_from_slice(&given[first..first + counted]);
                 }
                 Coefficients::ProductsWith(direction) => {
                     let products = gemm::tile(simd, group, [direction]);
-                    let scales = &samples.scales[first..];
                     for ((factor, [product]), scale) in factors.iter_mut().zip(products).zip(scales)
                     {
                         *factor = scale * (product - of_origin);
                     }
                 }
             }
-            for (factor, scale) in factors.iter_mut().zip(&samples.scales[first..]) {
+            for (factor, scale) in factors.iter_mut().zip(scales) {
                 *factor *= scale;
                 total += *factor;
             }
             vector_ops::add_all(simd, sum, factors, group);
         }
-        vector_ops::add(sum, -total, &samples.origin);
+        vector_ops::add(sum, -total, &self.origin);
     }
+}
+
+/// The coefficients c of a sum over samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Coefficients<'a> {
+    /// One for each sample.
+    Given(&'a [f32]),
+    /// uᵢ · d.
+    ProductsWith(&'a [f32]),
 }

@@ -4,89 +4,52 @@
 //! deviation and length change follows from sums ([`Scorer`]). Windows side by side are worked on together, one a lane,
 //! so each channel of the grid is brought into a line of its own first ([`ChannelPlanes`]).
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::window_score::{Products, Scorer};
 use crate::tracker::features::channels::{CHANNELS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
-use crate::tracker::params::table::Params;
 
 /// Rows of windows whose sums are in registers at a time.
 const ROWS: usize = 4;
 
-/// The buffers for the scores of a grid.
-#[derive(Debug, Default)]
-pub(crate) struct SlidingWindow {
-    planes: ChannelPlanes,
-}
-
-/// [`SlidingWindow::scores`], compiled for this machine's instructions.
-struct Scores<'a> {
-    sliding_window: &'a mut SlidingWindow,
-    grid: &'a Grid,
-    discriminant: &'a Discriminant,
-    params: &'a Params,
+/// Writes the score of each window of `grid`, row by row, to `out`; `cell_pixels` is the area of a cell in working
+/// pixels.
+#[pulp::with_simd(window_scores = Arch::new())]
+#[inline(always)]
+pub(crate) fn window_scores_simd<S: Simd>(
+    simd: S,
+    planes: &mut ChannelPlanes,
+    grid: &Grid,
+    discriminant: &Discriminant,
+    (width, height): (usize, usize),
     cell_pixels: f32,
-    out: &'a mut [f32],
-}
-
-impl WithSimd for Scores<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let size = (
-            self.params.patch_width as usize,
-            self.params.patch_height as usize,
-        );
-        let planes = &mut self.sliding_window.planes;
-        planes.load(self.grid, size);
-        let scorer = Scorer::new(self.discriminant, self.cell_pixels);
-        let columns = self.grid.columns + 1 - size.0;
-        let last = self.out.len() / columns - 1;
-        for (block, rows) in self.out.chunks_mut(ROWS * columns).enumerate() {
-            // A block at the end has the last row more than once.
-            let mut places = [last; ROWS];
-            for (row, place) in places.iter_mut().enumerate() {
-                *place = last.min(block * ROWS + row);
-            }
-            for first in (0..columns).step_by(S::F32_LANES) {
-                let products = correlate(simd, planes, (first, places), size.0, self.discriminant);
-                let rows = rows.chunks_mut(columns).zip(places).zip(products);
-                for ((row, j), products) in rows {
-                    let boxes = planes.boxes(simd, (first, j), size.1);
-                    let mut scores = Lanes::ZERO;
-                    scores.load_mut::<S>()[0] = scorer.score(simd, products, boxes);
-                    for (out, score) in row[first..].iter_mut().zip(&scores.0[..S::F32_LANES]) {
-                        *out = *score;
-                    }
+    out: &mut [f32],
+) {
+    planes.load(grid, (width, height));
+    let scorer = Scorer::new(discriminant, cell_pixels);
+    let columns = grid.columns + 1 - width;
+    let last = out.len() / columns - 1;
+    for (block, rows) in out.chunks_mut(ROWS * columns).enumerate() {
+        // A block at the end has the last row more than once.
+        let mut places = [last; ROWS];
+        for (row, place) in places.iter_mut().enumerate() {
+            *place = last.min(block * ROWS + row);
+        }
+        for first in (0..columns).step_by(S::F32_LANES) {
+            let products = correlate(simd, planes, (first, places), width, discriminant);
+            let rows = rows.chunks_mut(columns).zip(places).zip(products);
+            for ((row, j), products) in rows {
+                let boxes = planes.boxes(simd, (first, j), height);
+                let mut scores = Lanes::ZERO;
+                scores.load_mut::<S>()[0] = scorer.score(simd, products, boxes);
+                for (out, score) in row[first..].iter_mut().zip(&scores.0[..S::F32_LANES]) {
+                    *out = *score;
                 }
             }
         }
-    }
-}
-
-impl SlidingWindow {
-    /// Writes the score of each window of `grid`, row by row, to `out`; `cell_pixels` is the area of a cell in working
-    /// pixels.
-    pub fn scores(
-        &mut self,
-        grid: &Grid,
-        discriminant: &Discriminant,
-        params: &Params,
-        cell_pixels: f32,
-        out: &mut [f32],
-    ) {
-        Arch::new().dispatch(Scores {
-            sliding_window: self,
-            grid,
-            discriminant,
-            params,
-            cell_pixels,
-            out,
-        });
     }
 }
 
@@ -164,6 +127,7 @@ mod tests {
     use crate::tracker::linalg::vector_ops;
     use crate::tracker::motion::particles::{Particle, StateBounds};
     use crate::tracker::params::presets::Preset;
+    use crate::tracker::params::table::Params;
 
     fn number(i: usize) -> f32 {
         ((i * i * 37 + i * 7919) % 1000) as f32 / 500.0 - 1.0
@@ -215,10 +179,11 @@ mod tests {
             let mut scores = vec![0.0; (2 * across + 1) * (2 * down + 1)];
             let (cell_width, cell_height) = Extractor::cell_size(&center, &bounds, &params);
             let cell_pixels = (cell_width * cell_height) as f32;
-            SlidingWindow::default().scores(
+            window_scores(
+                &mut ChannelPlanes::default(),
                 &grid,
                 &discriminant,
-                &params,
+                (width as usize, height as usize),
                 cell_pixels,
                 &mut scores,
             );

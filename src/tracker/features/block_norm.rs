@@ -6,8 +6,6 @@
 
 use pulp::Simd;
 
-use crate::tracker::linalg::element::{Element, GROUP_SIZE, can_sum_each};
-
 /// Cells of a row that are computed together.
 const GROUP: usize = 8;
 
@@ -58,15 +56,6 @@ impl BlockNorm {
         energies: [S::f32s; N],
     ) {
         let out = &mut self.energies[row * self.columns + first..][..N];
-        let (mut energies, mut out) = (&energies[..], out);
-        if can_sum_each::<S, f32>(simd) {
-            let (groups, rest) = energies.as_chunks::<GROUP_SIZE>();
-            let (sums, rest_out) = out.as_chunks_mut::<GROUP_SIZE>();
-            for (group, sums) in groups.iter().zip(sums) {
-                *sums = f32::sum_each(simd, *group);
-            }
-            (energies, out) = (rest, rest_out);
-        }
         for (energy, out) in energies.iter().zip(out) {
             *out = simd.reduce_sum_f32s(*energy);
         }

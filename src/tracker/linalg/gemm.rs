@@ -10,7 +10,7 @@
 
 use pulp::Simd;
 
-use super::element::{Element, GROUP_SIZE, can_sum_each};
+use super::element::Element;
 
 /// Tiles of the second set that stay in the cache: eight vectors at most, of 640 single-precision values 20 KB.
 const BLOCK: usize = 2;
@@ -106,24 +106,8 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
         }
     }
     let mut products = [[T::default(); B]; A];
-    if can_sum_each::<S, T>(simd) {
-        for first in (0..A * B).step_by(T::GROUP_SIZE) {
-            let mut registers = [T::zeros(simd); GROUP_SIZE];
-            for (i, register) in registers.iter_mut().enumerate().take(T::GROUP_SIZE) {
-                // A group at the end has the last sum more than once.
-                let at = (first + i).min(A * B - 1);
-                *register = sums[at / B][at % B];
-            }
-            let totals = T::sum_each(simd, registers);
-            for (i, total) in totals.iter().enumerate().take(T::GROUP_SIZE) {
-                let at = (first + i).min(A * B - 1);
-                products[at / B][at % B] = *total;
-            }
-        }
-    } else {
-        for at in 0..A * B {
-            products[at / B][at % B] = T::sum(simd, sums[at / B][at % B]);
-        }
+    for at in 0..A * B {
+        products[at / B][at % B] = T::sum(simd, sums[at / B][at % B]);
     }
     for p in 0..A {
         let rest_a = T::lanes::<S>(a[p]).1;

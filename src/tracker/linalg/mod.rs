@@ -3,7 +3,7 @@
 //! | file | computes |
 //! |---|---|
 //! | `gemm` | all inner products of two sets of vectors, f32 or f64 |
-//! | `element` | sums of vector registers, f32 or f64 |
+//! | `element` | f32 or f64 in vector registers |
 //! | `combinations` | linear combinations of f32 vectors |
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |

@@ -4,7 +4,7 @@
 //! likelihood. Equation 10 normalises over the candidates, so the least distance to an entry may be taken from all
 //! distances to it first: the result is the same, and the largest term is always 1.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd};
 
 use crate::tracker::linalg::exp;
 
@@ -17,26 +17,20 @@ pub(crate) struct Likelihoods {
     entries: Vec<f64>,
 }
 
-/// [`Likelihoods::weigh`], compiled for this machine's instructions.
-struct Weigh<'a> {
-    likelihoods: &'a mut Likelihoods,
-    distances: &'a [f64],
+#[pulp::with_simd(weigh = Arch::new())]
+#[inline(always)]
+fn weigh_simd<S: Simd>(
+    _: S,
+    likelihoods: &mut Likelihoods,
+    distances: &[f64],
     sigma: f64,
     pinned: (usize, f64),
-    weights: &'a mut [f64],
-}
-
-impl WithSimd for Weigh<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let entries = self.distances.len() / self.weights.len();
-        let likelihoods = self.likelihoods;
-        likelihoods.normalize(self.distances, entries, self.sigma);
-        exp::exp(self.weights);
-        likelihoods.sum_rule(entries, self.pinned, self.weights);
-    }
+    weights: &mut [f64],
+) {
+    let entries = distances.len() / weights.len();
+    likelihoods.normalize(distances, entries, sigma);
+    exp::exp(weights);
+    likelihoods.sum_rule(entries, pinned, weights);
 }
 
 impl Likelihoods {
@@ -61,13 +55,7 @@ impl Likelihoods {
         pinned: (usize, f64),
         weights: &mut [f64],
     ) {
-        Arch::new().dispatch(Weigh {
-            likelihoods: self,
-            distances,
-            sigma,
-            pinned,
-            weights,
-        });
+        weigh(self, distances, sigma, pinned, weights);
     }
 
     /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equation 10), in the order of the distances. Each entry's sum over
