@@ -2,7 +2,7 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{Frame, Params, Preset, Rect, Tracker};
+use bagtrack::tracker::{Frame, Params, Preset, Rect, Status, Tracker};
 use tracker_scene::{near, panned};
 
 /// A target that is held: the bag of one that is not is still growing when others are full.
@@ -57,6 +57,46 @@ fn a_warm_step_of_a_large_target_allocates_nothing() {
             tracker.step(&frame).expect("frames of one size");
         });
         assert!(t < 70 || counted.count_total == 0, "frame {t}");
+    }
+}
+
+/// The same scene in colour: chroma has channels of its own and a histogram of other sizes.
+fn colored(t: usize) -> Frame {
+    let luma = frame(t);
+    let rgb: Vec<u8> = luma
+        .pixels()
+        .iter()
+        .flat_map(|&value| [value, value / 2, 255 - value])
+        .collect();
+    Frame::from_rgb(luma.width(), luma.height(), &rgb).expect("a frame of this size")
+}
+
+#[test]
+fn a_warm_step_in_colour_allocates_nothing() {
+    let (_, target) = panned(0, (0, 0));
+    let params = Preset::Robust.params();
+    let mut tracker = Tracker::new(&colored(0), target, params).expect("a box in the frame");
+    for t in 1..110 {
+        let frame = colored(t);
+        let counted = allocation_counter::measure(|| {
+            tracker.step(&frame).expect("frames of one size");
+        });
+        assert!(t < 70 || counted.count_total == 0, "frame {t}");
+    }
+}
+
+/// The search widens from frame to frame, up to its limit.
+#[test]
+fn the_search_for_a_lost_target_allocates_nothing() {
+    let mut tracker = tracker(Preset::Robust.params());
+    allocations(&mut tracker, 1, 70);
+    let gone = tracker_scene::flat(frame(0).width(), frame(0).height(), 90);
+    for t in 70..100 {
+        let counted = allocation_counter::measure(|| {
+            let estimate = tracker.step(&gone).expect("frames of one size");
+            assert!(t < 75 || estimate.status == Status::Lost, "frame {t}");
+        });
+        assert_eq!(counted.count_total, 0, "frame {t}");
     }
 }
 

@@ -4,8 +4,9 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::resampling;
-use crate::tracker::motion::search::SearchContext;
+use crate::tracker::motion::search::{self, SearchContext};
 use crate::tracker::params::table::Search;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
@@ -22,7 +23,7 @@ impl State {
     ) {
         let (bounds, params) = (&self.bounds, &self.params);
         workspace.candidates.begin(self);
-        workspace.log_priors.clear();
+        clear_and_reserve(&mut workspace.log_priors, search::max_count(params));
         let extractor = &mut workspace.extractor;
         let particles = &mut workspace.candidates.particles;
         match params.search {

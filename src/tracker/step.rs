@@ -3,6 +3,7 @@
 //! An answer is judged against statistics of the frames before it, and nothing is learned before it is judged.
 
 use crate::tracker::confidence::score::Evidence;
+use crate::tracker::confidence::update_gate;
 use crate::tracker::estimate::Estimate;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::motion::random::{self, Draws};
@@ -55,7 +56,8 @@ impl State {
 
         // (C) Learn: what is remembered of the frame.
         self.remember(answer, is_lost, workspace);
-        if is_usual {
+        // Without a discriminant the score is no probability.
+        if is_usual && (!self.discriminant.is_on() || update_gate::passes(score, number)) {
             self.learn(&image, &answer, number, workspace);
         }
         workspace.give_back(image);

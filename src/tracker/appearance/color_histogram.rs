@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::plane::Plane;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
 /// Bins of luma, and of each of Cb and Cr.
@@ -78,6 +79,16 @@ impl<'a> ColorPixels<'a> {
         2.0 * f64::from(self.luma.pixel_side)
     }
 
+    /// How many there are in a row.
+    pub fn columns(&self) -> usize {
+        self.luma.width.div_ceil(2) as usize
+    }
+
+    /// How many there are in a column.
+    pub fn rows(&self) -> usize {
+        self.luma.height.div_ceil(2) as usize
+    }
+
     /// The part that is `factor` times the box of `particle`, and `margin` working pixels more on each side; on the frame.
     pub fn part(
         &self,
@@ -107,7 +118,7 @@ impl<'a> ColorPixels<'a> {
     pub fn bins(&self, part: &Part, y: usize, bin_count: usize, out: &mut Vec<u16>) {
         let (upper, lower) = (self.luma.row(2 * y), self.luma.row(2 * y + 1));
         let last = upper.len() - 1;
-        out.clear();
+        clear_and_reserve(out, self.columns());
         let luma = |x: usize| {
             let (left, right) = (2 * x, (2 * x + 1).min(last));
             let sum = [upper[left], upper[right], lower[left], lower[right]];

@@ -4,6 +4,7 @@
 use crate::tracker::appearance::color_histogram::{ColorHistogram, ColorPixels, Part};
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
 /// How much larger than the last box boxes may be.
@@ -32,12 +33,13 @@ impl ForegroundMap {
         bounds: &StateBounds,
         has_color: bool,
     ) {
-        self.sums.clear();
+        let pixels = ColorPixels::of(frame, has_color);
+        // Room for the widest search at once.
+        clear_and_reserve(&mut self.sums, (pixels.columns() + 1) * (pixels.rows() + 1));
         if !histogram.has_learned() {
             return;
         }
         histogram.posterior(&mut self.posterior);
-        let pixels = ColorPixels::of(frame, has_color);
         self.side = pixels.side();
         self.part = pixels.part(center, bounds, SCALE_MARGIN, radius + 2.0 * self.side);
         let part = self.part;

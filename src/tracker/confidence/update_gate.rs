@@ -4,6 +4,8 @@
 //! distance of the answer to it tells: it jumps when the target is covered, and creeps when the target turns. A frame
 //! passes while that distance is below a multiple of its running mean. The mean follows slowly in frames that do not
 //! pass, too, so a lasting change is accepted in the end.
+//!
+//! Where such jumps are usual the score tells: a frame passes only if its box is more likely right than wrong.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +24,9 @@ const ALWAYS_ACCEPTED: f64 = 0.3;
 const COLOR_STRICTNESS: f64 = 0.8;
 /// The least mean against which a target that was lost is recognised, also if it has hardly changed so far.
 const MIN_MEAN: f64 = 0.15;
+/// The least score of a frame that passes: right twice as often as wrong. A box that is half off would be learned as the
+/// target, and the next one would be further off.
+const MIN_SCORE: f32 = 0.65;
 /// Below this score of the discriminant the target is lost: the box stays, nothing is learned, and the search widens
 /// from frame to frame until the target is found again. The discriminant says 0.5 to 1 on the target, and about 0.1
 /// beside it.
@@ -31,6 +36,12 @@ const FOUND_MARGIN: f64 = 0.2;
 /// The share of the newest frame in the running mean, where it passes and where it does not.
 const RATE: f64 = 0.1;
 const RATE_REJECTED: f64 = 0.02;
+
+/// Whether frame `number` may update the models; `score` is the probability that its box overlaps the target by half or
+/// more.
+pub(crate) fn passes(score: f32, number: u64) -> bool {
+    number < WARM_UP || score >= MIN_SCORE
+}
 
 /// The running mean of the answers' distances to the first subspace.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -103,6 +114,12 @@ mod tests {
         let rejected = (50..500).take_while(|&number| !gate.judge(0.6, false, number, &params));
         let rejected = rejected.count();
         assert!((10..100).contains(&rejected), "{rejected}");
+    }
+
+    #[test]
+    fn a_low_score_does_not_pass_after_the_warm_up() {
+        assert!(passes(0.1, WARM_UP - 1) && passes(0.7, 500));
+        assert!(!passes(0.6, WARM_UP) && !passes(0.1, 500));
     }
 
     /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
