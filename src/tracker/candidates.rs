@@ -44,11 +44,11 @@ pub(crate) struct Candidates {
 }
 
 impl Candidates {
-    /// Forgets the last frame, loads the models of `state`, and makes room for the widest search, so that the first
-    /// search for a lost target does not allocate.
-    pub fn begin(&mut self, state: &State) {
+    /// Forgets the last frame, loads the models of `state`, and makes room for the widest search and `more` particles,
+    /// so that the first search for a lost target does not allocate.
+    pub fn begin(&mut self, state: &State, more: usize) {
         let params = &state.params;
-        let (count, entries) = (search::max_count(params), params.bag_size as usize);
+        let (count, entries) = (search::max_count(params) + more, params.bag_size as usize);
         self.len = params.feature_len();
         self.vectors.resize(count * self.len);
         clear_and_reserve(&mut self.particles, count);
@@ -169,19 +169,36 @@ impl Candidates {
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
     /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
     pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
-        let weights = &mut self.weights;
+        let mut weights = std::mem::take(&mut self.weights);
         weights.clear();
         weights.extend_from_slice(log_priors);
+        self.weigh_from(0, params.sigma, params, &mut weights);
+        self.weights = weights;
+        likelihood::arg_max(&self.weights)
+    }
+
+    /// The same for the particles from `first` on, with another σ: `weights` are their logarithmic priors, and become
+    /// their weights.
+    pub fn weigh_from(&mut self, first: usize, sigma: f64, params: &Params, weights: &mut [f64]) {
         // Without a discriminant there are no scores.
-        let scores = self.samples.scores();
-        let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        for (weight, score) in weights.iter_mut().zip(scores) {
-            *weight += params.discriminant_weight * f64::from(score - max);
+        if let Some(scores @ [_, ..]) = self.samples.scores().get(first..) {
+            let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            for (weight, score) in weights.iter_mut().zip(scores) {
+                *weight += params.discriminant_weight * f64::from(score - max);
+            }
         }
         let pinned = (params.pinned_entries(), params.pinned_weight);
-        self.likelihoods
-            .weigh(&self.distances, params.sigma, pinned, weights);
-        likelihood::arg_max(weights)
+        let distances = &self.distances[first * self.entries()..];
+        self.likelihoods.weigh(distances, sigma, pinned, weights);
+    }
+
+    /// Forgets all particles but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        let entries = self.entries();
+        self.particles.truncate(count);
+        self.squares.truncate(count);
+        self.distances.truncate(count * entries);
+        self.samples.truncate(count);
     }
 
     /// What particle `index` says of itself; the running mean is that of the distance to the first entry.

@@ -4,9 +4,11 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
+use crate::tracker::image::warp::Rotation;
 use crate::tracker::linalg::scratch::clear_and_reserve;
-use crate::tracker::motion::resampling;
 use crate::tracker::motion::search::{self, SearchContext};
+use crate::tracker::motion::{orientation, resampling};
+use crate::tracker::observe::to_original;
 use crate::tracker::params::table::Search;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
@@ -22,8 +24,9 @@ impl State {
         workspace: &mut Workspace,
     ) {
         let (bounds, params) = (&self.bounds, &self.params);
-        workspace.candidates.begin(self);
+        workspace.candidates.begin(self, orientation::TRIED);
         clear_and_reserve(&mut workspace.log_priors, search::max_count(params));
+        clear_and_reserve(&mut workspace.original, search::max_count(params));
         let extractor = &mut workspace.extractor;
         let particles = &mut workspace.candidates.particles;
         match params.search {
@@ -72,13 +75,15 @@ impl State {
         &self,
         frame: &Frame,
         search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
         radius: f64,
         workspace: &mut Workspace,
     ) {
         if self.params.static_penalty > 0.0 {
+            let displaced = to_original(search.displaced(), rotation);
             let test = &mut workspace.change_test;
             test.load(frame, &self.answer, &self.bounds);
-            test.compare(&self.last_seen, &search.displaced(), radius, &self.bounds);
+            test.compare(&self.last_seen, &displaced, radius, &self.bounds);
         }
     }
 
@@ -88,12 +93,13 @@ impl State {
         &self,
         image: &Frame,
         search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
         workspace: &mut Workspace,
     ) -> usize {
         workspace
             .candidates
             .describe_and_compare(image, &mut workspace.extractor, self);
-        self.push_log_priors(search, workspace);
+        self.push_log_priors(search, rotation, workspace);
         workspace
             .candidates
             .weigh(&workspace.log_priors, &self.params)
@@ -101,7 +107,12 @@ impl State {
 
     /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
     /// there.
-    fn push_log_priors(&self, search: &SearchContext<'_>, workspace: &mut Workspace) {
+    fn push_log_priors(
+        &self,
+        search: &SearchContext<'_>,
+        rotation: Option<&Rotation>,
+        workspace: &mut Workspace,
+    ) {
         let known = workspace.log_priors.len();
         let new = &workspace.candidates.particles[known..];
         let weight = self.params.histogram_weight;
@@ -111,8 +122,11 @@ impl State {
         });
         workspace.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {
+            workspace.original.clear();
+            let original = new.iter().map(|&particle| to_original(particle, rotation));
+            workspace.original.extend(original);
             workspace.change_test.penalize(
-                new,
+                &workspace.original,
                 &self.bounds,
                 self.params.static_penalty,
                 &mut workspace.log_priors[known..],

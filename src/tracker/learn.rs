@@ -6,23 +6,40 @@ use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
 use crate::tracker::appearance::color_histogram::ColorPixels;
 use crate::tracker::classifier::labels;
+use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
 use crate::tracker::scale::{dsst, pyramid};
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
+/// Where the target was found in frame `number`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Found {
+    pub number: u64,
+    /// In the frame.
+    pub answer: Particle,
+    /// In the rectified view.
+    pub rectified: Particle,
+    /// The distance to the bag's first subspace.
+    pub distance: f64,
+}
+
 impl State {
     /// Keeps what the next frame starts from.
-    pub fn remember(&mut self, answer: Particle, is_lost: bool, workspace: &Workspace) {
-        self.answer = answer;
+    pub fn remember(&mut self, found: &Found, is_lost: bool, workspace: &Workspace) {
+        self.answer = found.answer;
         if self.params.stored_particles() > 0 {
             self.particles.clone_from(&workspace.candidates.particles);
             self.weights.clone_from(&workspace.candidates.weights);
         }
         if is_lost {
             self.frames_lost = self.frames_lost.saturating_add(1);
+            // A target that comes back is looked for upright.
+            self.orientation = 0.0;
         } else {
             self.frames_lost = 0;
             self.record_seen(workspace);
@@ -37,14 +54,22 @@ impl State {
         }
     }
 
-    /// Updates all models from frame `number`, in which the target was found `at` this place of `image`.
-    pub fn learn(&mut self, image: &Frame, at: &Particle, number: u64, workspace: &mut Workspace) {
+    /// Updates all models from a frame in which the target was found: `image` is its rectified view.
+    pub fn learn(
+        &mut self,
+        original: &Frame,
+        image: &Frame,
+        found: &Found,
+        workspace: &mut Workspace,
+    ) {
+        let at = &found.rectified;
+        self.orientation = self.measure_orientation(original, found, workspace);
         self.learn_discriminant(at, workspace);
         self.learn_color(image, at, workspace);
         self.learn_scale(image, at, workspace);
-        let samples = Background::wanted(number, &self.params);
+        let samples = Background::wanted(found.number, &self.params);
         if samples > 0 {
-            let mut draws = random::generator(self.params.seed, number, Draws::Samples);
+            let mut draws = random::generator(self.params.seed, found.number, Draws::Samples);
             let areas = &mut workspace.learning.areas;
             background::areas(at, &self.bounds, samples, &mut draws, areas);
             self.learn_background(image, workspace);
@@ -54,7 +79,7 @@ impl State {
         self.describe_at(image, at, workspace);
         let learning = &mut workspace.learning;
         let features = &mut learning.features;
-        if Bag::admits(number, &self.params) {
+        if Bag::admits(found.number, &self.params) {
             // V: the answer and the previous frames (equation 2).
             for vector in &self.history {
                 features.extend_from_slice(vector);
@@ -64,6 +89,38 @@ impl State {
                 .admit(features, &self.background, &self.params, bag);
         }
         self.push_history(features);
+    }
+
+    /// The target's rotation in `original`, in radians: the last one, or moved towards the likelier of two others.
+    fn measure_orientation(
+        &self,
+        original: &Frame,
+        found: &Found,
+        workspace: &mut Workspace,
+    ) -> f64 {
+        let tried = orientation::hypotheses(self.orientation, found.distance, &self.params);
+        let Some(tried) = tried else {
+            return self.orientation;
+        };
+        let (candidates, rotated) = (&mut workspace.candidates, &mut workspace.rotated);
+        let (answer, bounds, params) = (found.answer, &self.bounds, &self.params);
+        let window = Extractor::window(&[answer], 0.0, bounds, params);
+        let first = candidates.particles.len();
+        for (angle, _) in tried {
+            let scratch = std::mem::take(&mut rotated.frame);
+            let rotation = Rotation::about((answer.x, answer.y), angle);
+            let image = rotation.apply(original, &window, scratch);
+            let extractor = &mut rotated.extractor;
+            extractor.compute_channels(&image, &[answer], 0.0, bounds, params);
+            candidates.particles.push(answer);
+            candidates.describe_and_compare(&image, extractor, self);
+            rotated.frame = image;
+        }
+        let mut weights = tried.map(|(_, log_prior)| log_prior);
+        let sigma = orientation::SIGMA_FACTOR * params.sigma;
+        candidates.weigh_from(first, sigma, params, &mut weights);
+        candidates.truncate(first);
+        orientation::updated(self.orientation, weights)
     }
 
     /// Fits the discriminant to the frame's particles, labelled by their distance from `at`.

@@ -6,6 +6,8 @@ use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::downsample::downsampled;
 use crate::tracker::image::frame::Frame;
+use crate::tracker::image::warp::Rotation;
+use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search::SearchContext;
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
@@ -19,11 +21,17 @@ impl State {
         }
     }
 
-    /// The search in an image displaced by so much.
-    pub fn search(&self, displacement: (f64, f64)) -> SearchContext<'_> {
+    /// The search in an image displaced by so much, in the view that `rotation` makes.
+    pub fn search(
+        &self,
+        displacement: (f64, f64),
+        rotation: Option<&Rotation>,
+    ) -> SearchContext<'_> {
         SearchContext {
             last: self.answer,
-            displacement,
+            displacement: rotation.map_or(displacement, |rotation| {
+                rotation.rotated_displacement(displacement)
+            }),
             spread: self.spread(),
             params: &self.params,
             bounds: &self.bounds,
@@ -50,4 +58,26 @@ impl State {
             }
         }
     }
+
+    /// `view` with a rotated target upright, within the window of the search.
+    pub fn rectified(
+        &self,
+        view: &Frame,
+        rotation: Option<&Rotation>,
+        radius: f64,
+        workspace: &mut Workspace,
+    ) -> Option<Frame> {
+        let rotation = rotation?;
+        let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
+        let scratch = std::mem::take(&mut workspace.rectified);
+        Some(rotation.apply(view, &window, scratch))
+    }
+}
+
+/// `particle` of the rotated image where it is in the frame.
+pub(crate) fn to_original(particle: Particle, rotation: Option<&Rotation>) -> Particle {
+    rotation.map_or(particle, |rotation| {
+        let (x, y) = rotation.to_original((particle.x, particle.y));
+        Particle { x, y, ..particle }
+    })
 }

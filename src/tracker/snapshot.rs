@@ -12,6 +12,7 @@ use crate::tracker::appearance::bag::Bag;
 use crate::tracker::error::TrackerError;
 use crate::tracker::image::resolution::MAX_WORKING_SIDE;
 use crate::tracker::input;
+use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
@@ -176,6 +177,7 @@ fn check_extensions(state: &State) -> bool {
         && state
             .last_seen
             .is_valid_for((width, height), params.static_penalty > 0.0)
+        && orientation::is_valid_for(state.orientation, params)
         && (0.0..=1e6).contains(&state.update_gate.mean_distance)
 }
 

@@ -16,7 +16,7 @@ use crate::tracker::estimate::{Estimate, Status};
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::{Frame, FrameFormat};
 use crate::tracker::image::rect::Rect;
-use crate::tracker::image::warp;
+use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::last_seen::LastSeen;
 use crate::tracker::motion::particles::Particle;
@@ -67,6 +67,7 @@ impl State {
             last_seen: LastSeen::default(),
             update_gate: UpdateGate::default(),
             baseline: DistanceBaseline::default(),
+            orientation: 0.0,
             frames_lost: 0,
         };
         state.reset_particles(answer);
@@ -85,6 +86,7 @@ impl State {
         let number = self.estimate.frame + 1;
         let (bounds, answer) = Self::place(self.source, self.format.size, &target);
         self.bounds = bounds;
+        self.orientation = 0.0;
         self.frames_lost = 0;
         self.reset_particles(answer);
         if let Some(profiles) = &mut self.global_motion {
@@ -117,6 +119,7 @@ impl State {
         workspace.change_test.load(frame, answer, bounds);
         self.record_seen(workspace);
         let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
+        workspace.reserve_rectified(frame);
         let view = self.view(frame, workspace);
         let (image, answer) = (&*view, self.answer);
         workspace.extractor.compute_channels(
@@ -142,7 +145,7 @@ impl State {
         self.learn_scale(image, &answer, workspace);
         self.describe_at(image, &answer, workspace);
         self.describe_augmented(image, workspace);
-        workspace.give_back(view);
+        workspace.give_back(view, None);
     }
 
     /// Appends the feature vectors of the augmented views of the answer. The extractor has the channels of the last of
@@ -152,7 +155,8 @@ impl State {
         let (extractor, learning) = (&mut workspace.extractor, &mut workspace.learning);
         let window = Extractor::window(&answer, 0.0, &self.bounds, params);
         for angle in augmentation::angles(params) {
-            let rotated = warp::rotated(image, (self.answer.x, self.answer.y), angle, &window);
+            let rotation = Rotation::about((self.answer.x, self.answer.y), angle);
+            let rotated = rotation.apply(image, &window, Frame::default());
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
             let view = &mut learning.view;
             extractor.features(&rotated, &answer, &self.bounds, params, view);

@@ -54,6 +54,8 @@ pub(crate) struct State {
     pub last_seen: LastSeen,
     pub update_gate: UpdateGate,
     pub baseline: DistanceBaseline,
+    /// The target's in-plane rotation against the first frame, in radians.
+    pub orientation: f64,
     /// For how many frames the target has been lost.
     pub frames_lost: u32,
 }

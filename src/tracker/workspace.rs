@@ -12,6 +12,7 @@ use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
+use crate::tracker::image::plane::Plane;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::particles::Particle;
@@ -22,8 +23,9 @@ use crate::tracker::scale::pyramid;
 pub(crate) struct Workspace {
     /// The profiles of the present frame.
     pub global_motion: GlobalMotion,
-    /// The frame in larger pixels.
+    /// The frame in larger pixels, and rotated.
     pub downsampled: Frame,
+    pub rectified: Frame,
     pub extractor: Extractor,
     pub dense_search: DenseSearch,
     pub foreground: ForegroundMap,
@@ -32,8 +34,11 @@ pub(crate) struct Workspace {
     pub sums: Vec<f64>,
     /// For each particle the logarithm of its prior.
     pub log_priors: Vec<f64>,
+    /// Particles where they are in the original view.
+    pub original: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
+    pub rotated: Rotated,
 }
 
 /// What is learned from a frame, before it goes into the models.
@@ -51,11 +56,30 @@ pub(crate) struct Learning {
     pub pyramid: pyramid::Scratch,
 }
 
+/// The answer in images that are rotated further.
+#[derive(Debug, Default)]
+pub(crate) struct Rotated {
+    pub extractor: Extractor,
+    pub frame: Frame,
+}
+
 impl Workspace {
-    /// Takes back the memory of a view.
-    pub fn give_back(&mut self, view: Cow<'_, Frame>) {
+    /// Reserves the memory of a rectified view of `frame`, so that the first rotation does not allocate.
+    pub fn reserve_rectified(&mut self, frame: &Frame) {
+        let scratch = std::mem::take(&mut self.rectified);
+        self.rectified = frame.map_planes(scratch, |plane, mut pixels| {
+            pixels.resize(plane.pixels.len(), 0);
+            Plane::new(plane.size(), pixels, plane.pixel_side)
+        });
+    }
+
+    /// Takes back the memory of views.
+    pub fn give_back(&mut self, view: Cow<'_, Frame>, rectified: Option<Frame>) {
         if let Cow::Owned(downsampled) = view {
             self.downsampled = downsampled;
+        }
+        if let Some(rectified) = rectified {
+            self.rectified = rectified;
         }
     }
 }

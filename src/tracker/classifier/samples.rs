@@ -82,6 +82,12 @@ impl TrainingSamples {
         &self.scores
     }
 
+    /// Forgets all samples but the first `count`.
+    pub fn truncate(&mut self, count: usize) {
+        self.scales.truncate(count);
+        self.scores.truncate(count);
+    }
+
     /// Σ (uᵢ · d)².
     #[inline(always)]
     pub fn energy<S: Simd>(&self, simd: S, vectors: &[f32], direction: &[f32]) -> f32 {

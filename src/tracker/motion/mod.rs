@@ -8,6 +8,7 @@
 //! - `global_motion`: the displacement of the whole image between two frames.
 //! - `change_test`: whether anything has come to a place since the target was last seen. `last_seen` is the frame
 //!   that it compares with, `joint_integral` its sums.
+//! - `orientation`: the target's in-plane rotation.
 //!
 //! In: the last particles and weights, or the last answer; the frame. Out: particles, log-priors (natural logarithms,
 //! 0 at the likeliest place), displacements in working pixels, angles in radians. Nothing here fails: every particle
@@ -17,6 +18,7 @@ pub(crate) mod change_test;
 pub(crate) mod global_motion;
 pub(crate) mod joint_integral;
 pub(crate) mod last_seen;
+pub(crate) mod orientation;
 pub(crate) mod particles;
 pub(crate) mod proposal;
 pub(crate) mod random;
