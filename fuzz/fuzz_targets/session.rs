@@ -8,6 +8,9 @@ use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 
 const MAX_STEPS: usize = 24;
+/// The head of a file in a form.
+const PART: &[u8] =
+    b"--B\r\nContent-Disposition: form-data; name=\"frame\"; filename=\"a\"\r\n\r\n";
 
 /// Picture `t` in the three formats.
 static PICTURES: LazyLock<Vec<Vec<u8>>> =
@@ -155,7 +158,7 @@ impl Script<'_> {
                 }
                 let mut form = Vec::new();
                 for file in &files {
-                    form.extend_from_slice(b"--B\r\nContent-Disposition: form-data; name=\"frame\"; filename=\"a\"\r\n\r\n");
+                    form.extend_from_slice(PART);
                     form.extend_from_slice(file);
                     form.extend_from_slice(b"\r\n");
                 }
