@@ -1,8 +1,8 @@
 """What no schema can tell: which bytes are a picture, which box lies on it, and which parameters are too much together.
 
 schemathesis loads this file (`SCHEMATHESIS_HOOKS`). Pictures of one size are sent wherever a file is described, as are
-snapshots of a session that is opened here. Requests that are meant to be valid get a box inside the picture, and no
-more than their schema leaves open is changed in them. Requests that are meant to be invalid are sent as they were made.
+snapshots of a session that is opened here. Requests that are meant to be valid get a box inside the picture, a fresh
+idempotency key, and few tracker parameters. Requests that are meant to be invalid are sent as they were made.
 """
 
 import base64
