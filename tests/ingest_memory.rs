@@ -34,6 +34,84 @@ fn with_profile(mut png: Vec<u8>, mib: usize) -> Vec<u8> {
     png
 }
 
+/// Writes numbers with so many bits, the lowest bit first.
+#[derive(Default)]
+struct Bits {
+    bytes: Vec<u8>,
+    count: usize,
+}
+
+impl Bits {
+    fn write(&mut self, number: usize, bits: usize) {
+        for place in 0..bits {
+            if self.count.is_multiple_of(8) {
+                self.bytes.push(0);
+            }
+            let bit = (number >> place & 1) as u8;
+            *self.bytes.last_mut().expect("it was pushed") |= bit << (self.count % 8);
+            self.count += 1;
+        }
+    }
+
+    /// A code in which the first `symbols` all have codes of `length` bits, 8 or 11.
+    fn write_flat_code(&mut self, symbols: usize, length: usize) {
+        self.write(0, 1);
+        // Code lengths are written in a code with one symbol, `length`; the last of those stored here.
+        let place = if length == 8 { 11 } else { 14 };
+        self.write(place + 1 - 4, 4);
+        self.write(0, 3 * place);
+        self.write(1, 3);
+        self.write(1, 1);
+        self.write(5, 3);
+        self.write(symbols - 2, 12);
+    }
+
+    /// A code with the symbol 0 alone.
+    fn write_single_code(&mut self) {
+        self.write(0b0001, 4);
+    }
+}
+
+/// A lossless WebP of 1024 x 1024 equal pixels with so many groups of codes, each with 2048 codes of 11 bits.
+fn with_code_groups(groups: usize) -> Vec<u8> {
+    let mut bits = Bits::default();
+    bits.write(0x2f, 8);
+    bits.write(1023, 14);
+    bits.write(1023, 14);
+    bits.write(0, 4);
+    // No transforms; 2048 colours that were seen before; groups for blocks of 4 x 4 pixels.
+    bits.write(0, 1);
+    bits.write(1, 1);
+    bits.write(11, 4);
+    bits.write(1, 1);
+    bits.write(0, 3);
+    // The groups' numbers, in green and red.
+    bits.write(0, 1);
+    bits.write_flat_code(256, 8);
+    bits.write_flat_code(256, 8);
+    (0..3).for_each(|_| bits.write_single_code());
+    for block in 0..256 * 256 {
+        let group = block % groups;
+        for byte in [group % 256, group / 256] {
+            bits.write(usize::from((byte as u8).reverse_bits()), 8);
+        }
+    }
+    for _ in 0..groups {
+        bits.write_flat_code(2048, 11);
+        (0..4).for_each(|_| bits.write_single_code());
+    }
+    // The pixels: the symbol 0 in each group.
+    for _ in 0..1024 * 1024 {
+        bits.write(0, 11);
+    }
+    let mut chunk = b"VP8L".to_vec();
+    chunk.extend_from_slice(&(bits.bytes.len() as u32).to_le_bytes());
+    chunk.extend_from_slice(&bits.bytes);
+    chunk.resize(chunk.len().next_multiple_of(2), 0);
+    let length = (4 + chunk.len() as u32).to_le_bytes();
+    [b"RIFF".as_slice(), &length, b"WEBP", &chunk].concat()
+}
+
 #[test]
 fn no_format_allocates_more_than_is_promised() {
     let limits = Limits {
@@ -76,6 +154,12 @@ fn no_format_allocates_more_than_is_promised() {
             "WebP with alpha",
             encode(rgba(1700), ImageFormat::WebP),
             true,
+        ),
+        ("WebP with 100 groups of codes", with_code_groups(100), true),
+        (
+            "WebP with 2000 groups of codes",
+            with_code_groups(2000),
+            false,
         ),
         ("JPEG", encode(rgb(2500), ImageFormat::Jpeg), true),
     ] {

@@ -1,5 +1,8 @@
 //! The server that is attacked.
 
+#[path = "../load/binary.rs"]
+mod binary;
+
 use crate::good::target_box;
 use crate::{Options, Outcome};
 use reqwest::{Client, RequestBuilder};
@@ -37,16 +40,7 @@ impl Target {
                 bound: None,
             });
         }
-        let binary = match &options.server {
-            Some(binary) => binary.clone(),
-            None => {
-                let program = std::env::current_exe()?;
-                let folder = program.parent().and_then(|examples| examples.parent());
-                folder
-                    .ok_or("no folder above this program")?
-                    .join("bagtrack")
-            }
-        };
+        let binary = binary::server(options.server.clone())?;
         let mut command = Command::new(&binary);
         command
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])

@@ -9,10 +9,13 @@
 //! - the processor time of the server process for a frame against that of decoding and tracking. The speed of a
 //!   shared machine varies, so a measurement has parts, and the two are measured in turns.
 //!
-//! With `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
+//! With `--churn SECONDS` sessions come and go, and it compares the server's memory at the end with that before. With
+//! `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
 //!
 //! Frames, sessions and time are bounded. Linux only: processor time is read from `/proc`.
 
+mod binary;
+mod churn;
 mod drive;
 mod in_process;
 mod memory;
@@ -57,6 +60,10 @@ struct Options {
     /// Print the resident memory of the server with 1000, 2000, 5000 … of these sessions, and nothing else.
     #[arg(long)]
     memory: bool,
+    /// Seconds for which sessions come and go at `--rate`; then compare the resident memory with that after ten minutes,
+    /// and do nothing else.
+    #[arg(long)]
+    churn: Option<u64>,
     /// The server's binary; otherwise `bagtrack` beside this program's folder.
     #[arg(long)]
     server: Option<PathBuf>,
@@ -75,13 +82,24 @@ fn main() -> Outcome<()> {
         options.preset
     );
 
-    let server = Server::start(options.server.clone(), options.sessions)?;
+    // No session ends while others are still being opened, except where that is what is measured.
+    let idle = if options.churn.is_some() { "1m" } else { "1d" };
+    let server = Server::start(options.server.clone(), options.sessions, idle)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
     let driver = Driver::new(server.url(), pictures.clone(), target, &options.preset);
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
+    }
+    if let Some(seconds) = options.churn {
+        let rate = options.rate.unwrap_or(40.0);
+        let length = Duration::from_secs(seconds);
+        return runtime.block_on(churn::run(
+            &driver,
+            &server,
+            (options.sessions, rate, length),
+        ));
     }
     let mut load = Load {
         one: InProcess::new(pictures.clone(), target, preset, 1)?,

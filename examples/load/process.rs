@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-use crate::Outcome;
+use crate::{Outcome, binary};
 
 /// Clock ticks of `/proc/<pid>/stat` in a second: fixed by the Linux interface.
 const TICKS: f64 = 100.0;
@@ -27,24 +27,17 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts `binary` with room for so many sessions and waits until it listens.
-    pub fn start(binary: Option<PathBuf>, sessions: u32) -> Outcome<Self> {
-        let binary = match binary {
-            Some(binary) => binary,
-            None => {
-                let folder = std::env::current_exe()?;
-                let folder = folder.parent().and_then(|examples| examples.parent());
-                folder
-                    .ok_or("no folder above this program")?
-                    .join("bagtrack")
-            }
-        };
+    /// Starts `binary` with room for so many sessions, which expire after `idle`, and waits until it listens.
+    pub fn start(binary: Option<PathBuf>, sessions: u32, idle: &str) -> Outcome<Self> {
+        let binary = binary::server(binary)?;
         let room = (3 * sessions + 16).to_string();
         let mut child = Command::new(&binary)
             .args(["serve", "--listen", "127.0.0.1:0", "--max-sessions", &room])
             .args(["--queue", &room, "--max-connections", &room])
-            // No session ends while others are still being opened.
-            .args(["--session-idle", "1d"])
+            // All clients have one address.
+            .args(["--client-sessions", &room, "--client-requests", &room])
+            .args(["--client-connections", &room])
+            .args(["--session-idle", idle])
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()

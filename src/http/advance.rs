@@ -51,6 +51,7 @@ impl NextFrames {
                 .state()
                 .replay_decision(self.number, &fingerprints, self.correction)?;
         if let ReplayDecision::Replay(estimates) = decision {
+            locked.session().renew();
             return Ok(Answered {
                 estimates,
                 replayed: true,
@@ -83,6 +84,7 @@ impl NextFrames {
             StepError::Stopped(stopped) => stopped.into(),
         };
         let estimates = estimates.map_err(refused)?;
+        locked.session().renew();
         metrics.tracked(before, &estimates, took);
         Ok(Answered {
             estimates,
@@ -128,7 +130,8 @@ pub struct RequestLimits {
     pub max_pixels: u64,
 }
 
-/// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says whether to go on.
+/// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says
+/// whether to go on.
 ///
 /// # Errors
 /// The problem of the first bad file, or that the work was stopped.

@@ -3,8 +3,8 @@
 use super::create_request::{CreateRequest, CreateSettings, check_room};
 use super::idempotency::StoredAnswer;
 use super::openapi::param_limits;
-use super::openapi::problem_responses::{self, problem_responses};
-use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::openapi::problem_responses::{self, operation_problems};
+use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::opening::{CreatedSession, Opened, open};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
@@ -16,25 +16,21 @@ use tokio::time::timeout;
 type CreateForm = FormBody<CreateSettings>;
 type CreateJson = JsonBody<CreateSettings>;
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::Unauthorized,
-            Kind::Forbidden,
-            Kind::MissingBox,
-            Kind::InvalidBox,
-            Kind::InvalidParameter,
-            Kind::InvalidSnapshot,
-            Kind::IdempotencyKeyReused,
-            Kind::TooManySessions,
-            Kind::NotReady,
-        ];
-        problem_responses(&[problem_responses::UPLOAD, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    &[
+        Kind::Unauthorized,
+        Kind::Forbidden,
+        Kind::MissingBox,
+        Kind::InvalidBox,
+        Kind::InvalidParameter,
+        Kind::InvalidSnapshot,
+        Kind::IdempotencyKeyReused,
+        Kind::TooManySessions,
+        Kind::NotReady,
+    ]
+);
 
 /// Open a session
 #[utoipa::path(
@@ -43,7 +39,8 @@ impl utoipa::IntoResponses for Problems {
     params(
         CreateSettings,
         (
-            "Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255,
+            "Idempotency-Key" = Option<String>, Header, nullable = false, min_length = 1, max_length = 255,
+            pattern = "^[!-~]+$",
             description = "A text of your own, a new one for each session: the same request with the same key gets \
                 the same answer as long as the session lives, and opens no second one."
         )
@@ -51,7 +48,7 @@ impl utoipa::IntoResponses for Problems {
     request_body(
         description = "The first frame in one of three forms, or a snapshot.",
         content(
-            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (CreateForm = "multipart/form-data"),
             (
                 CreateJson = "application/json",
@@ -61,7 +58,7 @@ impl utoipa::IntoResponses for Problems {
                     "seed": 7
                 })
             ),
-            (Vec<u8> = "application/vnd.bagtrack.snapshot"),
+            (BinaryBody = "application/vnd.bagtrack.snapshot"),
         )
     ),
     responses(
@@ -70,6 +67,14 @@ impl utoipa::IntoResponses for Problems {
             headers(
                 ("Location" = String, description = "The session's path"),
                 ("Replayed" = bool, description = "`true` where this answer was given before")
+            ),
+            links(
+                ("getSession" = (operation_id = "getSession", parameters(("id" = "$response.body#/id")))),
+                ("postFrames" = (operation_id = "postFrames", parameters(("id" = "$response.body#/id")))),
+                ("putTarget" = (operation_id = "putTarget", parameters(("id" = "$response.body#/id")))),
+                ("getSnapshot" = (operation_id = "getSnapshot", parameters(("id" = "$response.body#/id")))),
+                ("createToken" = (operation_id = "createToken", parameters(("id" = "$response.body#/id")))),
+                ("deleteSession" = (operation_id = "deleteSession", parameters(("id" = "$response.body#/id"))))
             )
         ),
         Problems

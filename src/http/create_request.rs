@@ -5,10 +5,10 @@ use super::clients::Account;
 use super::idempotency;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use super::target_box::TargetBox;
+use super::target_box::{BoxInput, BoxText, TargetBox};
 use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
-use super::upload::settings::{FrameCount, Settings, WholeNumber};
+use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use super::upload::texts::Texts;
 use super::upload::uploaded::Upload;
 use crate::sessions::{Fingerprint, QueuePermit};
@@ -21,22 +21,21 @@ use std::sync::Arc;
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct CreateSettings {
-    /// The target's box: `x,y,width,height`, or a JSON object with these names. May be in the query or in the body.
-    #[param(value_type = String, required = false, example = "10,20,30,40")]
-    #[schema(nullable = false)]
+    /// The target's box: `x,y,width,height`, or a JSON object with these names. In the query or in the
+    /// body; that of the body counts.
+    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
+    #[schema(value_type = BoxInput, inline, required = false)]
     pub r#box: Option<TargetBox>,
     /// `robust` (the default) or `paper`.
     #[param(nullable = false)]
-    #[schema(nullable = false)]
     pub preset: Option<PresetName>,
-    /// Seed of all random draws; a random one when left out.
-    #[param(value_type = u64, required = false)]
-    #[schema(value_type = Option<u64>, nullable = false)]
+    /// Seed of all random draws, which counts before that of `params`; a random one when left out.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
     pub seed: Option<WholeNumber>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
-    #[param(value_type = String, required = false, example = "{\"seed\": 7}")]
-    #[schema(nullable = false)]
+    #[param(value_type = String, format = "json", required = false, example = "{\"seed\": 7}")]
     pub params: Option<ParamOverrides>,
 }
 

@@ -2,13 +2,13 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{FrameAnswers, replayed_header};
-use super::openapi::problem_responses::{self, problem_responses};
-use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::openapi::problem_responses::{self, operation_problems};
+use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use super::upload::session_request::SessionRequest;
-use super::upload::settings::{FrameCount, Settings, WholeNumber};
+use super::upload::session_request::{SessionRequest, renew_if_busy};
+use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use super::work;
 use crate::sessions::WorkMeter;
 use axum::Json;
@@ -22,8 +22,8 @@ use serde::Deserialize;
 #[into_params(parameter_in = Query)]
 pub struct FramesSettings {
     /// The number of the (first) frame of this request.
-    #[param(value_type = u64, required = false)]
-    #[schema(value_type = Option<u64>, nullable = false)]
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
     frame: Option<WholeNumber>,
 }
 
@@ -35,21 +35,18 @@ impl Settings for FramesSettings {
 type FramesForm = FormBody<FramesSettings>;
 type FramesJson = JsonBody<FramesSettings>;
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::FrameOutOfOrder,
-            Kind::FrameDiffers,
-            Kind::FrameSizeMismatch,
-            Kind::SessionBusy,
-            Kind::RequestTooCostly,
-        ];
-        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    problem_responses::SESSION,
+    &[
+        Kind::FrameOutOfOrder,
+        Kind::FrameDiffers,
+        Kind::FrameSizeMismatch,
+        Kind::SessionBusy,
+        Kind::RequestTooCostly,
+    ]
+);
 
 /// Send the next frame, or several
 ///
@@ -70,7 +67,7 @@ impl utoipa::IntoResponses for Problems {
     request_body(
         description = "The frame in one of three forms; the second and third take several.",
         content(
-            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (FramesForm = "multipart/form-data"),
             (FramesJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…"})),
         )
@@ -100,10 +97,12 @@ pub async fn post(
     let metrics = state.metrics.tracking.clone();
     let advance =
         move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
+    let session = request.permit.session().clone();
+    let answered = work::on_session(&state, request.permit, queue, advance).await;
     let Answered {
         estimates,
         replayed,
-    } = work::on_session(&state, request.permit, queue, advance).await?;
+    } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))
 }

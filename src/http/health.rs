@@ -1,6 +1,6 @@
 //! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
-use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
@@ -18,23 +18,9 @@ pub struct Health {
 
 const OK: Json<Health> = Json(Health { status: "ok" });
 
-struct LiveProblems;
+operation_problems!(LiveProblems, problem_responses::ALWAYS);
 
-impl utoipa::IntoResponses for LiveProblems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        problem_responses(&[problem_responses::ALWAYS])
-    }
-}
-
-struct ReadyProblems;
-
-impl utoipa::IntoResponses for ReadyProblems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        problem_responses(&[problem_responses::ALWAYS, &[Kind::NotReady]])
-    }
-}
+operation_problems!(ReadyProblems, problem_responses::ALWAYS, &[Kind::NotReady]);
 
 /// Whether the process runs
 #[utoipa::path(

@@ -2,7 +2,7 @@
 
 use super::answer_problems::{answer_problems, panic_response};
 use super::api;
-use super::auth::layer::authenticate;
+use super::auth::layer::{authenticate, authenticate_metrics};
 use super::auth::origin::check_origin;
 use super::cors::cors;
 use super::drain::drain_refused;
@@ -63,6 +63,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
 /// with no key.
 fn routes(state: &AppState) -> Router<AppState> {
     let with_key = || middleware::from_fn_with_state(state.clone(), authenticate);
+    let with_metrics_key = middleware::from_fn_with_state(state.clone(), authenticate_metrics);
     let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
     let (sessions, _) = api::sessions().split_for_parts();
@@ -78,6 +79,6 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/docs/{*path}", get(docs::asset))
         .merge(sessions.route_layer(of_client).route_layer(with_key()))
         .route_layer(from_origin)
-        .merge(metrics.route_layer(with_key()))
+        .merge(metrics.route_layer(with_metrics_key))
         .merge(probes)
 }

@@ -1,7 +1,7 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
 use super::answer::{Answer, ImageSize};
-use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
@@ -35,15 +35,12 @@ pub struct SessionView {
     expires_at: String,
 }
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[Kind::MalformedRequest];
-        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[Kind::MalformedRequest]
+);
 
 /// See where a session stands
 ///

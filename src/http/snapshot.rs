@@ -1,7 +1,8 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
 use super::client::Client;
-use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::problem_responses::{self, operation_problems};
+use super::openapi::request_bodies::BinaryBody;
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
@@ -23,21 +24,18 @@ use std::task::{Context, Poll};
 /// The media type of session snapshots.
 pub const MEDIA_TYPE: &str = "application/vnd.bagtrack.snapshot";
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::MalformedRequest,
-            Kind::SessionBusy,
-            Kind::QuotaExceeded,
-            Kind::QueueFull,
-            Kind::WorkTimeout,
-        ];
-        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[
+        Kind::MalformedRequest,
+        Kind::SessionBusy,
+        Kind::QuotaExceeded,
+        Kind::QueueFull,
+        Kind::WorkTimeout,
+    ]
+);
 
 /// Take a snapshot
 ///
@@ -52,7 +50,7 @@ impl utoipa::IntoResponses for Problems {
     params(("id" = Uuid, Path, description = "The session's id")),
     responses(
         (
-            status = 200, description = "The session as bytes", body = Vec<u8>,
+            status = 200, description = "The session as bytes", body = BinaryBody,
             content_type = "application/vnd.bagtrack.snapshot"
         ),
         Problems
@@ -70,7 +68,7 @@ pub async fn get(
     let client = state.clients.account(&client).request()?;
     let mut charge = ByteCharge::new(&state.uploads, client.bytes());
     let queue = state.admission.enter(client.lane(), Box::new(client))?;
-    let permit = session.visit()?;
+    let permit = session.enter()?;
     let keys = state.access.snapshots.clone();
     let take =
         move |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot(&keys));

@@ -2,14 +2,14 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{Answer, replayed_header};
-use super::openapi::problem_responses::{self, problem_responses};
-use super::openapi::request_bodies::{FormBody, JsonBody};
+use super::openapi::problem_responses::{self, operation_problems};
+use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use super::target_box::TargetBox;
-use super::upload::session_request::SessionRequest;
-use super::upload::settings::{FrameCount, Settings, WholeNumber};
+use super::target_box::{BoxInput, BoxText, TargetBox};
+use super::upload::session_request::{SessionRequest, renew_if_busy};
+use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use super::work;
 use crate::sessions::WorkMeter;
 use axum::Json;
@@ -22,13 +22,14 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct TargetSettings {
-    /// The corrected box: `x,y,width,height`, or a JSON object with these names. May be in the query or in the body.
-    #[param(value_type = String, required = false, example = "10,20,30,40")]
-    #[schema(nullable = false)]
+    /// The corrected box: `x,y,width,height`, or a JSON object with these names. In the query or in the
+    /// body; that of the body counts.
+    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
+    #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = u64, required = false)]
-    #[schema(value_type = Option<u64>, nullable = false)]
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
     frame: Option<WholeNumber>,
 }
 
@@ -40,22 +41,19 @@ impl Settings for TargetSettings {
 type TargetForm = FormBody<TargetSettings>;
 type TargetJson = JsonBody<TargetSettings>;
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::MissingBox,
-            Kind::FrameOutOfOrder,
-            Kind::FrameDiffers,
-            Kind::FrameSizeMismatch,
-            Kind::InvalidBox,
-            Kind::SessionBusy,
-        ];
-        problem_responses(&[problem_responses::UPLOAD, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    problem_responses::SESSION,
+    &[
+        Kind::MissingBox,
+        Kind::FrameOutOfOrder,
+        Kind::FrameDiffers,
+        Kind::FrameSizeMismatch,
+        Kind::InvalidBox,
+        Kind::SessionBusy,
+    ]
+);
 
 /// Correct the box
 ///
@@ -73,7 +71,7 @@ impl utoipa::IntoResponses for Problems {
     request_body(
         description = "The frame in one of three forms.",
         content(
-            (Vec<u8> = "image/jpeg"), (Vec<u8> = "image/png"), (Vec<u8> = "image/webp"),
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (TargetForm = "multipart/form-data"),
             (
                 TargetJson = "application/json",
@@ -110,10 +108,12 @@ pub async fn put(
     let metrics = state.metrics.tracking.clone();
     let correct =
         move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
+    let session = request.permit.session().clone();
+    let answered = work::on_session(&state, request.permit, request.queue, correct).await;
     let Answered {
         estimates,
         replayed,
-    } = work::on_session(&state, request.permit, request.queue, correct).await?;
+    } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
     let answer = Json(Answer::from(estimates[0])).into_response();
     Ok(replayed_header(replayed, answer))
 }

@@ -5,6 +5,11 @@ use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;
 use std::str::FromStr;
+use utoipa::openapi::schema::{
+    AnyOfBuilder, ArrayBuilder, ObjectBuilder, Schema, SchemaFormat, Type,
+};
+use utoipa::openapi::{Ref, RefOr};
+use utoipa::{PartialSchema, ToSchema};
 
 /// A box in the pixels of the uploaded frame; the origin is the frame's top-left corner. It may reach over the edge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, utoipa::ToSchema)]
@@ -15,9 +20,62 @@ pub struct TargetBox {
     /// Top edge.
     y: f64,
     /// Width, above 0.
+    #[schema(exclusive_minimum = 0.0)]
     width: f64,
     /// Height, above 0.
+    #[schema(exclusive_minimum = 0.0)]
     height: f64,
+}
+
+/// A number in `x,y,width,height`; the last two are above 0.
+const NUMBER: &str = r"(?:[0-9]{1,5}(?:\.[0-9]{1,4})?)";
+
+/// What a text has to be to be taken as a box. A JSON object or array in a text is taken, too.
+fn text_schema() -> ObjectBuilder {
+    let pattern = format!("^-?{NUMBER},-?{NUMBER},{NUMBER},{NUMBER}$");
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::Custom("box".to_owned())))
+        .pattern(Some(pattern))
+        .examples(["10,20,30,40"])
+}
+
+/// A box as a text, in the query and in forms.
+#[derive(Debug)]
+pub struct BoxText;
+
+impl ToSchema for BoxText {}
+
+impl PartialSchema for BoxText {
+    fn schema() -> RefOr<Schema> {
+        text_schema().build().into()
+    }
+}
+
+/// A box in a JSON body: an object, four numbers, or a text.
+#[derive(Debug)]
+pub struct BoxInput;
+
+impl ToSchema for BoxInput {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((TargetBox::name().into(), TargetBox::schema()));
+    }
+}
+
+impl PartialSchema for BoxInput {
+    fn schema() -> RefOr<Schema> {
+        let number = ObjectBuilder::new().schema_type(Type::Number);
+        let four = ArrayBuilder::new()
+            .items(number)
+            .min_items(Some(4))
+            .max_items(Some(4));
+        let forms = AnyOfBuilder::new()
+            .item(Ref::from_schema_name(TargetBox::name()))
+            .item(four)
+            .item(text_schema())
+            .item(ObjectBuilder::new().schema_type(Type::Null));
+        forms.into()
+    }
 }
 
 impl From<Rect> for TargetBox {

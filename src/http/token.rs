@@ -2,7 +2,7 @@
 
 use super::auth::caller::Caller;
 use super::auth::token::SessionToken;
-use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
@@ -42,15 +42,12 @@ pub struct TokenView {
     expires_at: String,
 }
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[Kind::MalformedRequest, Kind::Forbidden];
-        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[Kind::MalformedRequest, Kind::Forbidden]
+);
 
 /// Make a session token
 ///

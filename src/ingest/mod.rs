@@ -26,7 +26,6 @@
 //! ```
 
 mod catch_decoder_panic;
-mod containers;
 mod decode;
 mod deinterleave;
 mod error;
@@ -35,12 +34,16 @@ mod jpeg_markers;
 mod limits;
 mod luma;
 mod orientation;
+mod png_chunks;
+mod prefix_codes;
 mod raster;
 mod scratch;
 mod sniff;
 mod stored_image;
 #[cfg(feature = "turbo")]
 mod turbo;
+mod vp8l;
+mod webp_chunks;
 
 pub use decode::{decode, decode_to, recycle, size};
 pub use error::IngestError;

@@ -1,12 +1,13 @@
 //! PNG and WebP, through the `image` crate.
 
-use super::containers::{Png, read_webp};
 use super::error::IngestError;
 use super::limits::Limits;
 use super::luma::{chroma_of, luma_of};
 use super::orientation;
+use super::png_chunks::Png;
 use super::sniff::Format;
 use super::stored_image::{Channel, StoredImage};
+use super::webp_chunks::WebP;
 use crate::tracker::{FrameFormat, ycbcr};
 use image::codecs::png::PngDecoder;
 use image::codecs::webp::WebPDecoder;
@@ -38,17 +39,14 @@ pub(super) fn decode_webp(
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    let webp = read_webp(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
+    let webp = WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
-    decode(
-        decoder,
-        Format::WebP,
-        webp.working_bytes_per_pixel(),
-        0,
-        limits,
-        format,
-    )
+    limits.check_size(decoder.dimensions().0, decoder.dimensions().1)?;
+    let codes = webp.memory_of_codes(decoder.dimensions());
+    let codes = codes.ok_or_else(|| Format::WebP.damaged("its codes cannot be read"))?;
+    let per_pixel = webp.working_bytes_per_pixel();
+    decode(decoder, Format::WebP, per_pixel, codes, limits, format)
 }
 
 /// Width and height of a PNG as it is shown.
@@ -60,7 +58,7 @@ pub(super) fn size_of_png(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), I
 
 /// Width and height of a WebP as it is shown.
 pub(super) fn size_of_webp(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
-    read_webp(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
+    WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
     let mut decoder =
         WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
     let (width, height) = decoder.dimensions();
@@ -75,12 +73,12 @@ fn read_png<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Png<'a>, IngestError
     Ok(png)
 }
 
-/// Decodes to luma. `copied` bytes were allocated already.
+/// Decodes to luma. `beside` bytes are allocated beside what depends on the number of pixels.
 fn decode(
     mut decoder: impl ImageDecoder,
     file: Format,
     working_bytes_per_pixel: u64,
-    copied: u64,
+    beside: u64,
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
@@ -88,7 +86,7 @@ fn decode(
     limits.check_size(width, height)?;
     // The decoded image, what the decoder needs beside it, the luma, and the chroma in half of the columns and rows.
     let pixels = u64::from(width) * u64::from(height);
-    let beside = working_bytes_per_pixel * pixels + pixels * 3 / 2 + copied;
+    let beside = working_bytes_per_pixel * pixels + pixels * 3 / 2 + beside;
     limits.check_memory(decoder.total_bytes() + beside)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let source = (width, height);

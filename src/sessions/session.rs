@@ -148,8 +148,8 @@ impl Session {
         Duration::from_millis(self.expires_ms.load(Ordering::Relaxed))
     }
 
-    /// A frame came: the session expires an idle time from now.
-    fn renew(&self) {
+    /// The session expires an idle time from now: a frame was taken, or only the service is to blame that it was not.
+    pub fn renew(&self) {
         let expires = milliseconds(self.clock.now() + self.idle);
         self.expires_ms.fetch_max(expires, Ordering::Relaxed);
     }
@@ -168,29 +168,14 @@ impl Session {
         self.closed.store(true, Ordering::Release);
     }
 
-    /// Takes a permit of the session, for a frame: the session lives on.
+    /// Takes a permit of the session. That alone does not keep the session alive for longer.
     ///
     /// # Errors
     /// All permits are taken.
     pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
-        let permit = self.permit(true)?;
-        self.renew();
-        Ok(permit)
-    }
-
-    /// Takes a permit of the session, to look at it: this does not keep the session alive.
-    ///
-    /// # Errors
-    /// All permits are taken.
-    pub fn visit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
-        self.permit(false)
-    }
-
-    fn permit(self: &Arc<Self>, renews: bool) -> Result<SessionPermit, SessionBusy> {
         let permit = self.permits.clone().try_acquire_owned();
         Ok(SessionPermit {
             session: self.clone(),
-            renews,
             _permit: permit.map_err(|_| SessionBusy)?,
         })
     }
@@ -212,7 +197,6 @@ fn milliseconds(time: Duration) -> u64 {
 #[derive(Debug)]
 pub struct SessionPermit {
     session: Arc<Session>,
-    renews: bool,
     _permit: OwnedSemaphorePermit,
 }
 
@@ -235,14 +219,6 @@ impl SessionPermit {
             state,
             permit: self,
         })
-    }
-}
-
-impl Drop for SessionPermit {
-    fn drop(&mut self) {
-        if self.renews {
-            self.session.renew();
-        }
     }
 }
 

@@ -215,3 +215,26 @@ async fn the_service_does_not_open_itself_to_a_network_by_accident() {
         "{message}"
     );
 }
+
+#[tokio::test]
+async fn a_key_of_the_metrics_is_needed_where_there_is_one_and_good_for_nothing_else() {
+    const METRICS: &str = "metrics-metrics-metrics";
+    let mut app = TestApplication::start_with(|config| {
+        config.access.api_keys = vec![Secret::from("ann:0123456789abcdef")];
+        config.access.metrics_key = Some(Secret::from(METRICS));
+    })
+    .await;
+    let id = app.open().await;
+    expect_problem(app.get("/metrics").await, "unauthorized").await;
+    app.key = None;
+    expect_problem(app.get("/metrics").await, "unauthorized").await;
+    app.key = Some(METRICS.to_owned());
+    assert_eq!(app.get("/metrics").await.status(), StatusCode::OK);
+    expect_problem(app.get_session(&id).await, "unauthorized").await;
+    let mut config = Config {
+        listen: "127.0.0.1:0".parse().unwrap(),
+        ..Config::default()
+    };
+    config.access.metrics_key = Some(Secret::from("short"));
+    assert!(Application::bind(config).await.is_err());
+}

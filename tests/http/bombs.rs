@@ -3,29 +3,18 @@
 use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
-use crate::raw::RawConnection;
-use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+use image::{GrayImage, ImageFormat, Luma};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode};
-use std::io::Cursor;
 use std::time::{Duration, Instant};
 
 /// A box in a frame of 8000 x 5000.
 const LARGE_BOX: &str = "2000,1500,1600,1200";
 
-/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take tenths of a second to decode.
-fn bomb() -> Vec<u8> {
-    let picture = DynamicImage::ImageLuma8(GrayImage::from_pixel(8192, 4094, Luma([77])));
-    let mut bytes = Cursor::new(Vec::new());
-    let rgb = DynamicImage::ImageRgb8(picture.to_rgb8());
-    rgb.write_to(&mut bytes, ImageFormat::WebP).unwrap();
-    bytes.into_inner()
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn sixty_four_bombs_of_another_size_hold_no_worker() {
     let app = TestApplication::start().await;
-    let bomb = bomb();
+    let bomb = heavy::bomb();
     assert!(bomb.len() < 20_000, "{}", bomb.len());
     let (id, other) = (app.open().await, app.open().await);
     let form = || {
@@ -108,21 +97,8 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     });
     let app = app.await;
     let (session, id) = (heavy::open(&app).await, app.open().await);
-    let request = heavy::post(&app, &session, 2 * heavy::FRAMES)
-        .build()
-        .unwrap();
-    let media_type = request.headers()["content-type"]
-        .to_str()
-        .unwrap()
-        .to_owned();
-    let body = heavy::encoded(request).await;
-    let mut client = RawConnection::open(app.address).await;
-    let head = format!(
-        "POST {session}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\n\r\n",
-        body.len()
-    );
-    client.send(head).await;
-    client.send(body).await;
+    let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
+    let client = heavy::send_raw(&app, &format!("{session}/frames"), request).await;
     // Asked in a way that takes no place itself.
     let full = async { while app.get("/readyz").await.status() == StatusCode::OK {} };
     tokio::time::timeout(Duration::from_secs(60), full)

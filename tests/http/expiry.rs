@@ -88,6 +88,48 @@ async fn a_session_without_frames_goes_soon_and_the_first_frame_keeps_it() {
 }
 
 #[tokio::test]
+async fn a_frame_that_is_refused_does_not_keep_its_session_alive() {
+    let app = TestApplication::start_with(|config| config.session_idle = IDLE).await;
+    let (id, new) = (app.open().await, app.open().await);
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    let refused = app.post_frame(&new, b"no frame".to_vec()).await;
+    expect_problem(refused, "unsupported-image").await;
+    app.clock.advance(Duration::from_secs(61));
+    expect_problem(app.get_session(&new).await, "session-expired").await;
+    app.clock.advance(ALMOST - Duration::from_secs(61));
+    let other = app.post_frame(&id, pictures::png_of(64, 48)).await;
+    expect_problem(other, "frame-size-mismatch").await;
+    let mut damaged = pictures::png(2);
+    damaged.truncate(300);
+    expect_problem(app.post_frame(&id, damaged).await, "frame-damaged").await;
+    expect_problem(app.post_frame(&id, Vec::new()).await, "missing-frame").await;
+    app.clock.advance(IDLE - ALMOST);
+    expect_problem(app.get_session(&id).await, "session-expired").await;
+}
+
+#[tokio::test]
+async fn a_frame_that_finds_no_room_and_one_sent_again_keep_their_session_alive() {
+    let app = TestApplication::start_with(|config| {
+        config.session_idle = IDLE;
+        config.limits.client_requests = Some(1);
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let first = || app.post_numbered(&id, 1, pictures::png(1));
+    expect(first().await, StatusCode::OK).await;
+    app.clock.advance(ALMOST);
+    expect(first().await, StatusCode::OK).await;
+    app.clock.advance(ALMOST);
+    let target = format!("/sessions/{}/frames", app.open().await);
+    let held = RawConnection::hold(app.address, "POST", &target, 1000).await;
+    let refused = app.post_frame(&id, pictures::png(2)).await;
+    expect_problem(refused, "quota-exceeded").await;
+    drop(held);
+    app.clock.advance(ALMOST);
+    expect(app.get_session(&id).await, StatusCode::OK).await;
+}
+
+#[tokio::test]
 async fn looking_at_a_session_does_not_keep_it_alive() {
     let app = TestApplication::start_with(|config| config.session_idle = IDLE).await;
     let id = app.open().await;

@@ -177,11 +177,28 @@ async fn unknown_and_doubled_names_are_refused_and_the_known_ones_named() {
     }
     let form = Form::new()
         .part("frame", part(png.clone()))
+        .text("box", BOX)
         .text("box", BOX);
-    let doubled = app.request(Method::POST, "/sessions", &[("box", BOX)]);
-    let doubled = doubled.multipart(form).send().await.unwrap();
+    let doubled = post_form(&app, Method::POST, "/sessions", form).await;
     let problem = expect_problem(doubled, "malformed-request").await;
     assert!(problem["detail"].as_str().unwrap().contains("twice"));
+}
+
+#[tokio::test]
+async fn a_setting_of_the_body_counts_before_that_of_the_query() {
+    let app = TestApplication::start().await;
+    let query = [("box", "1,2,30,40"), ("seed", "1")];
+    let form = || {
+        let frame = part(pictures::png(0));
+        Form::new().part("frame", frame).text("box", BOX)
+    };
+    let body = json!({"frame": base64(pictures::png(0)), "box": BOX});
+    let request = || app.request(Method::POST, "/sessions", &query);
+    for request in [request().multipart(form()), request().json(&body)] {
+        let created = expect(request.send().await.unwrap(), StatusCode::CREATED).await;
+        assert_eq!(created["box"]["x"], 20.0, "{created}");
+        assert_eq!(created["params"]["seed"], 1, "{created}");
+    }
 }
 
 #[tokio::test]

@@ -2,8 +2,11 @@
 
 use crate::application::{BOX, TestApplication};
 use crate::pictures;
+use crate::raw::RawConnection;
+use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, RequestBuilder, StatusCode};
+use std::io::Cursor;
 use std::time::Duration;
 use tokio::task::JoinSet;
 
@@ -12,6 +15,15 @@ pub const FRAMES: usize = 200;
 
 const PARAMS: &str = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
     "update_every": 1, "history": 10, "basis_dim": 6}"#;
+
+/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take a worker tenths of a second, in one piece.
+pub fn bomb() -> Vec<u8> {
+    let picture = RgbImage::from_pixel(8192, 4094, Rgb([77; 3]));
+    let mut bytes = Cursor::new(Vec::new());
+    let picture = DynamicImage::ImageRgb8(picture);
+    picture.write_to(&mut bytes, ImageFormat::WebP).unwrap();
+    bytes.into_inner()
+}
 
 /// Opens a session whose frames take long; gives its path.
 pub async fn open(app: &TestApplication) -> String {
@@ -55,34 +67,19 @@ pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
     busy
 }
 
-/// Keeps more requests waiting for the only worker than it gets through in the time that a request may take, until
-/// the returned value is dropped.
-pub async fn flood(app: &TestApplication) -> JoinSet<()> {
-    let mut sessions = Vec::new();
-    for _ in 0..80 {
-        sessions.push(open(app).await);
-    }
-    let mut busy = JoinSet::new();
-    for session in &sessions {
-        let url = format!("http://{}{session}/frames", app.address);
-        let client = app.client.clone();
-        busy.spawn(async move {
-            while let Ok(_answered) = client.post(&url).body(pictures::png(1)).send().await {}
-        });
-    }
-    let late =
-        async { while app.get(&format!("{}/snapshot", sessions[0])).await.status() != 503 {} };
-    tokio::time::timeout(Duration::from_secs(60), late)
-        .await
-        .unwrap();
-    busy
-}
-
-/// The bytes of a request's body.
-pub async fn encoded(mut request: reqwest::Request) -> bytes::Bytes {
+/// Sends a request with a body for this path by hand.
+pub async fn send_raw(app: &TestApplication, path: &str, request: RequestBuilder) -> RawConnection {
+    let mut request = request.build().unwrap();
     let body = request.body_mut().take().expect("it has a body");
-    http_body_util::BodyExt::collect(body)
-        .await
-        .unwrap()
-        .to_bytes()
+    let body = http_body_util::BodyExt::collect(body).await.unwrap();
+    let body = body.to_bytes();
+    let media_type = request.headers()["content-type"].to_str().unwrap();
+    let length = body.len();
+    let head = format!(
+        "POST {path} HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\n\r\n"
+    );
+    let mut client = RawConnection::open(app.address).await;
+    client.send(head).await;
+    client.send(body).await;
+    client
 }

@@ -87,19 +87,8 @@ async fn an_address_has_a_share_of_the_connections() {
 async fn a_half_closed_connection_gets_its_answer() {
     let app = TestApplication::start().await;
     let session = heavy::open(&app).await;
-    let request = heavy::post(&app, &session, 10).build().unwrap();
-    let media_type = request.headers()["content-type"]
-        .to_str()
-        .unwrap()
-        .to_owned();
-    let body = heavy::encoded(request).await;
-    let mut client = RawConnection::open(app.address).await;
-    let head = format!(
-        "POST {session}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\n\r\n",
-        body.len()
-    );
-    client.send(head).await;
-    client.send(body).await;
+    let request = heavy::post(&app, &session, 10);
+    let mut client = heavy::send_raw(&app, &format!("{session}/frames"), request).await;
     client.close_sending().await;
     let answer = client.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");

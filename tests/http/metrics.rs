@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-async fn metrics(app: &TestApplication) -> String {
+/// What `/metrics` says.
+pub async fn metrics(app: &TestApplication) -> String {
     let response = app.get("/metrics").await;
     let media_type = response.headers()["content-type"].to_str().unwrap();
     assert!(
@@ -19,7 +20,7 @@ async fn metrics(app: &TestApplication) -> String {
 }
 
 /// The value of the only line that begins with `name` and has all these labels.
-fn value(text: &str, name: &str, labels: &[&str]) -> f64 {
+pub fn value(text: &str, name: &str, labels: &[&str]) -> f64 {
     let mut lines = text.lines().filter(|line| {
         let (series, _) = line.rsplit_once(' ').unwrap_or((line, ""));
         let (found, rest) = series.split_once('{').unwrap_or((series, ""));

@@ -44,7 +44,7 @@ async fn a_frame_sent_again_gets_the_stored_answer() {
             problem["status"].as_u64(),
             problem["expected_frame"].as_u64()
         ),
-        (Some(422), Some(2))
+        (Some(409), Some(2))
     );
     for number in [0, 3, u64::MAX] {
         let response = app.post_numbered(&id, number, pictures::png(1)).await;

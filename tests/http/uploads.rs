@@ -1,6 +1,7 @@
 //! What bodies hold while they arrive: memory as far as they have come, and no place in the queue.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::connections::expect_body_timeouts;
 use crate::pictures;
 use crate::raw::RawConnection;
 use base64::Engine;
@@ -90,24 +91,7 @@ async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
     });
     let app = app.await;
     let id = app.open().await;
-    for media_type in [
-        "image/jpeg",
-        "application/json",
-        "multipart/form-data; boundary=b",
-    ] {
-        let mut connection = RawConnection::open(app.address).await;
-        let head = format!(
-            "POST /sessions/{id}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\n\
-             Content-Length: 9000000\r\n\r\n--b\r\n"
-        );
-        connection.send(head).await;
-        let answer = connection.read_answer().await;
-        assert!(answer.starts_with("HTTP/1.1 408"), "{media_type}: {answer}");
-        assert!(
-            answer.contains("urn:bagtrack:problem:body-timeout"),
-            "{answer}"
-        );
-    }
+    expect_body_timeouts(&app, &id).await;
     assert_eq!(app.frames_of(&id).await, 1);
 }
 

@@ -28,7 +28,8 @@ pub enum AccessError {
     Contradiction,
     /// A secret can be guessed.
     #[error(
-        "--snapshot-keys (BAGTRACK_SNAPSHOT_KEYS) must be secrets of at least {MIN_SECRET_BYTES} characters"
+        "--snapshot-keys (BAGTRACK_SNAPSHOT_KEYS) and --metrics-key (BAGTRACK_METRICS_KEY) must be secrets of at least \
+         {MIN_SECRET_BYTES} characters"
     )]
     ShortSecret,
 }
@@ -58,7 +59,7 @@ impl Access {
         }
         let secrets = &config.snapshot_keys;
         let is_short = |secret: &_| AsRef::<[u8]>::as_ref(secret).len() < MIN_SECRET_BYTES;
-        if secrets.iter().any(is_short) {
+        if secrets.iter().chain(&config.metrics_key).any(is_short) {
             return Err(AccessError::ShortSecret);
         }
         let mut snapshots = MacKeys::new(SNAPSHOT_KEY_CONTEXT, secrets);

@@ -42,8 +42,8 @@ pub struct AccessConfig {
         arg(
             long,
             env = "BAGTRACK_API_KEYS",
-            value_delimiter = ',',
             hide_env_values = true,
+            value_delimiter = ',',
             value_name = "NAME:KEY"
         )
     )]
@@ -74,12 +74,23 @@ pub struct AccessConfig {
         arg(
             long,
             env = "BAGTRACK_SNAPSHOT_KEYS",
-            value_delimiter = ',',
             hide_env_values = true,
+            value_delimiter = ',',
             value_name = "SECRET"
         )
     )]
     pub snapshot_keys: Vec<Secret>,
+    /// Key that alone reads `/metrics`, at least 16 characters [default: every API key does].
+    #[cfg_attr(
+        feature = "cli",
+        arg(
+            long,
+            env = "BAGTRACK_METRICS_KEY",
+            hide_env_values = true,
+            value_name = "KEY"
+        )
+    )]
+    pub metrics_key: Option<Secret>,
     /// Accept snapshots that are not signed with a secret, and sign none where no secret is given.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_UNSIGNED_SNAPSHOTS",

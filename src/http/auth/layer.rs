@@ -28,12 +28,34 @@ pub async fn authenticate(
             request.extensions_mut().insert(caller);
             next.run(request).await
         }
-        None => {
-            let mut response = Problem::unauthorized().into_response();
-            response.headers_mut().insert(WWW_AUTHENTICATE, CHALLENGE);
-            response
-        }
+        None => unauthorized(),
     }
+}
+
+/// The middleware of `/metrics`: asks for the key of the metrics, where there is one, and else does as [`authenticate`].
+pub async fn authenticate_metrics(
+    state: State<AppState>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let Some(key) = &state.config.access.metrics_key else {
+        return authenticate(state, request, next).await;
+    };
+    // Digests are compared in constant time.
+    let digest = |text: &str| blake3::hash(text.as_bytes());
+    let presented = bearer(request.headers()).map(digest);
+    if presented != Some(digest(key.text())) {
+        return unauthorized();
+    }
+    let reader = Caller::with_key(Default::default());
+    request.extensions_mut().insert(reader);
+    next.run(request).await
+}
+
+fn unauthorized() -> Response {
+    let mut response = Problem::unauthorized().into_response();
+    response.headers_mut().insert(WWW_AUTHENTICATE, CHALLENGE);
+    response
 }
 
 fn caller(state: &AppState, headers: &HeaderMap) -> Option<Caller> {

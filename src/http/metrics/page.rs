@@ -1,7 +1,7 @@
 //! `GET /metrics`, for Prometheus.
 
 use crate::http::auth::caller::Caller;
-use crate::http::openapi::problem_responses::{self, problem_responses};
+use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
@@ -14,15 +14,11 @@ use axum::response::IntoResponse;
 /// The text format of Prometheus.
 const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[Kind::MalformedRequest, Kind::Unauthorized, Kind::Forbidden];
-        problem_responses(&[problem_responses::ALWAYS, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    &[Kind::MalformedRequest, Kind::Unauthorized, Kind::Forbidden]
+);
 
 /// Metrics for Prometheus
 #[utoipa::path(

@@ -53,6 +53,23 @@ pub fn problem_responses(kinds: &[&[Kind]]) -> BTreeMap<String, RefOr<Response>>
     responses.collect()
 }
 
+/// Names the problems of an operation, for its `responses(…)`.
+macro_rules! operation_problems {
+    ($name:ident, $($kinds:expr),+) => {
+        struct $name;
+
+        impl utoipa::IntoResponses for $name {
+            fn responses() -> std::collections::BTreeMap<
+                String,
+                utoipa::openapi::RefOr<utoipa::openapi::Response>,
+            > {
+                $crate::http::openapi::problem_responses::problem_responses(&[$($kinds),+])
+            }
+        }
+    };
+}
+pub(crate) use operation_problems;
+
 const EXAMPLE_ID: &str = "1da43888-6f49-40f8-a05c-7bb628ba4f6a";
 
 fn response(kinds: &[Kind]) -> Response {

@@ -5,10 +5,25 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 use utoipa::openapi::path::ParameterIn;
 use utoipa::openapi::schema::{
-    ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema, SchemaFormat, Type,
+    AdditionalProperties, AllOfBuilder, AnyOfBuilder, ArrayBuilder, KnownFormat, Object,
+    ObjectBuilder, Schema, SchemaFormat, Type,
 };
 use utoipa::openapi::{RefOr, Required};
 use utoipa::{PartialSchema, ToSchema};
+
+/// A body that is one file, and the answer that is one.
+#[derive(Debug)]
+pub struct BinaryBody;
+
+impl ToSchema for BinaryBody {}
+
+impl PartialSchema for BinaryBody {
+    fn schema() -> RefOr<Schema> {
+        let file = ObjectBuilder::new().schema_type(Type::String);
+        let binary = SchemaFormat::KnownFormat(KnownFormat::Binary);
+        file.format(Some(binary)).build().into()
+    }
+}
 
 /// The `multipart/form-data` body of the route with the settings `S`: a part for each file, and a text part for each
 /// setting.
@@ -40,6 +55,7 @@ impl<S: Settings> PartialSchema for FormBody<S> {
             FrameCount::One => file.build().into(),
             FrameCount::Several => ArrayBuilder::new()
                 .items(file.build())
+                .min_items(Some(1))
                 .description(Some("One file or more, each as a part with this name."))
                 .build()
                 .into(),
@@ -47,6 +63,7 @@ impl<S: Settings> PartialSchema for FormBody<S> {
         let settings = S::into_params(|| Some(ParameterIn::Query));
         let mut body = Object::new();
         body.description = Some("Files and the settings as texts.".to_owned());
+        body.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
         for setting in settings {
             // The field itself is private.
             let example = serde_json::to_value(&setting).ok();
@@ -92,8 +109,12 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
             FrameCount::Several => {
                 let frames = ArrayBuilder::new()
                     .items(base64("A JPEG, PNG or WebP file."))
+                    .min_items(Some(1))
                     .description(Some("Several frames, in order."));
                 body.properties.insert("frames".to_owned(), frames.into());
+                let has = |name: &str| ObjectBuilder::new().required(name);
+                let either = AnyOfBuilder::new().item(has("frame")).item(has("frames"));
+                return AllOfBuilder::new().item(body).item(either).into();
             }
         }
         Schema::Object(body).into()

@@ -98,7 +98,7 @@ impl Kind {
             Self::HostNotAllowed => (421, "host-not-allowed", "The service is not for this host"),
             Self::FrameDamaged => (422, "frame-damaged", "The frame cannot be decoded"),
             Self::FrameSizeMismatch => (422, "frame-size-mismatch", "The frame has another size than the session's frames"),
-            Self::FrameDiffers => (422, "frame-differs", "The frame number was used for another frame"),
+            Self::FrameDiffers => (409, "frame-differs", "The frame number was used for another frame"),
             Self::InvalidBox => (422, "invalid-box", "The box cannot be tracked"),
             Self::InvalidParameter => (422, "invalid-parameter", "A parameter cannot be used"),
             Self::InvalidSnapshot => (422, "invalid-snapshot", "The snapshot cannot be restored"),

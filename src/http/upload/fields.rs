@@ -3,7 +3,7 @@
 use super::texts::Texts;
 use axum::body::Bytes;
 
-/// The files of a body, and the texts of its settings and of those of the query.
+/// The files of a body, and the texts of its settings.
 #[derive(Debug)]
 pub(super) struct Fields {
     /// The files, in order.

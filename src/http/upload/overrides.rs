@@ -43,16 +43,14 @@ impl<'de> Deserialize<'de> for ParamOverrides {
 }
 
 impl ParamOverrides {
-    /// The parameters of `preset`, with `seed` (a random one when there is none) and these overrides.
+    /// The parameters of `preset` with these overrides, and with `seed`, where there is one. Without any seed a random one
+    /// is drawn.
     ///
     /// # Errors
-    /// A parameter is unknown or has the wrong type, or the seed is given twice.
+    /// A parameter is unknown or has the wrong type.
     pub fn resolve(self, preset: Preset, seed: Option<u64>) -> Result<Params, Problem> {
         let mut params = preset.params();
-        params.seed = seed.unwrap_or_else(|| rand::random_range(0..SEED_END));
-        if seed.is_some() && self.0.contains_key("seed") {
-            return Err(Problem::malformed("`seed` is given twice; give it once."));
-        }
+        params.seed = rand::random_range(0..SEED_END);
         // One at a time, so that a value of the wrong type can be named.
         for (name, value) in self.0 {
             let mut known = by_name(&params);
@@ -66,6 +64,7 @@ impl ParamOverrides {
                 ))
             })?;
         }
+        params.seed = seed.unwrap_or(params.seed);
         Ok(params)
     }
 }

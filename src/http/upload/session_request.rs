@@ -7,7 +7,7 @@ use super::uploaded::Upload;
 use crate::http::problems::problem::Problem;
 use crate::http::session_path::SessionPath;
 use crate::http::state::AppState;
-use crate::sessions::{QueuePermit, SessionPermit};
+use crate::sessions::{QueuePermit, Session, SessionPermit};
 use axum::extract::{FromRequest, FromRequestParts, Request};
 
 /// A request with frames for a live session, with its permits.
@@ -29,13 +29,25 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
         let (mut parts, body) = request.into_parts();
         let path = SessionPath::from_request_parts(&mut parts, state).await?;
         let permit = path.find(state)?.enter()?;
-        let client = admit(state, &parts)?;
-        let request = Request::from_parts(parts, body);
-        let (upload, queue) = Upload::read(state, client, texts, request).await?;
+        let read = async {
+            let client = admit(state, &parts)?;
+            let request = Request::from_parts(parts, body);
+            Upload::read(state, client, texts, request).await
+        };
+        let read = read.await;
+        let (upload, queue) =
+            read.inspect_err(|problem| renew_if_busy(permit.session(), problem))?;
         Ok(Self {
             permit,
             queue,
             upload,
         })
+    }
+}
+
+/// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it alive.
+pub fn renew_if_busy(session: &Session, problem: &Problem) {
+    if problem.retry_seconds().is_some() {
+        session.renew();
     }
 }

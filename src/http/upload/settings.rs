@@ -2,7 +2,9 @@
 
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 use std::borrow::Cow;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
+use utoipa::{IntoParams, Number, PartialSchema, ToSchema};
 
 /// How many frames a route takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,5 +36,38 @@ impl<'de> Deserialize<'de> for WholeNumber {
             let max = u64::MAX;
             D::Error::custom(format!("`{start}` is not a whole number from 0 to {max}"))
         })
+    }
+}
+
+fn number_schema(schema_type: impl Into<SchemaType>) -> ObjectBuilder {
+    ObjectBuilder::new()
+        .schema_type(schema_type)
+        .minimum(Some(Number::UInt(0)))
+        .maximum(Some(Number::UInt(usize::MAX)))
+}
+
+/// A whole number in the query and in forms.
+#[derive(Debug)]
+pub struct NumberText;
+
+impl ToSchema for NumberText {}
+
+impl PartialSchema for NumberText {
+    fn schema() -> RefOr<Schema> {
+        number_schema(Type::Integer).build().into()
+    }
+}
+
+/// A whole number in a JSON body, which may be a text.
+#[derive(Debug)]
+pub struct NumberInput;
+
+impl ToSchema for NumberInput {}
+
+impl PartialSchema for NumberInput {
+    fn schema() -> RefOr<Schema> {
+        let types = [Type::Integer, Type::String, Type::Null];
+        let number = number_schema(SchemaType::from_iter(types));
+        number.pattern(Some("^[0-9]{1,19}$")).build().into()
     }
 }

@@ -57,6 +57,14 @@ impl Texts {
         }
     }
 
+    /// These settings, and those of `others` that are not among them.
+    pub fn or(mut self, others: Self) -> Self {
+        for (name, text) in others.0 {
+            self.0.entry(name).or_insert(text);
+        }
+        self
+    }
+
     /// The settings.
     ///
     /// # Errors

@@ -27,7 +27,8 @@ pub struct Upload<S> {
 }
 
 impl<S: Settings> Upload<S> {
-    /// Reads the body, then takes a place in the queue; `texts` are the settings of the query. JSON is parsed on a
+    /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
+    /// their names. JSON is parsed on a
     /// worker. The place holds `permit` and the memory of the files until the request's work has ended.
     ///
     /// # Errors
@@ -54,7 +55,7 @@ impl<S: Settings> Upload<S> {
         let media_type = media_type(&request);
         let mut fields = Fields {
             files: Vec::new(),
-            texts,
+            texts: Texts::default(),
         };
         let mut json = None;
         if media_type == "multipart/form-data" {
@@ -83,10 +84,10 @@ impl<S: Settings> Upload<S> {
             };
             fields = work::run(state, queue.clone(), parse).await?;
         }
-        let Fields { files, texts } = fields;
+        let Fields { files, texts: own } = fields;
         check_files(&files, max_files)?;
         let upload = Self {
-            settings: texts.parse()?,
+            settings: own.or(texts).parse()?,
             is_snapshot: media_type == snapshot::MEDIA_TYPE,
             files,
         };

@@ -1,10 +1,10 @@
-//! The chunk structure of PNG and WebP, read before decoding: whether the file is whole. The decoders would not notice
-//! a missing end, or would allocate as many bytes as a chunk claims.
+//! The chunk structure of PNG, read before decoding: whether the file is whole, and what decoding needs of it.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-const CUT_SHORT: &str = "it is cut short";
+/// Why a file is refused that ends before its end marker.
+pub(super) const CUT_SHORT: &str = "it is cut short";
 
 /// The chunks that pixels and their orientation depend on. Others are left out before decoding: a colour profile or a
 /// text of a few hundred kilobytes may unpack to hundreds of megabytes.
@@ -87,65 +87,4 @@ impl<'a> Png<'a> {
         }
         Cow::Owned(kept)
     }
-}
-
-/// What decoding a WebP takes beside its output.
-#[derive(Debug, Default)]
-pub(super) struct WebP {
-    lossless: bool,
-    alpha: bool,
-    animated: bool,
-}
-
-impl WebP {
-    /// Bytes a pixel that the decoder allocates beside its output. Lossless: the image in RGBA, and what its transforms
-    /// read. Lossy: three planes, and where it has an alpha channel that channel by itself, as a lossless image. An
-    /// animation has its canvas besides, and its first image in RGBA.
-    pub(super) fn working_bytes_per_pixel(&self) -> u64 {
-        let lossy = 2 + if self.alpha { 7 } else { 0 };
-        let still = lossy.max(if self.lossless { 6 } else { 0 });
-        still + if self.animated { 8 } else { 0 }
-    }
-
-    fn add(&mut self, kind: &[u8]) {
-        match kind {
-            b"VP8L" => self.lossless = true,
-            b"ALPH" => self.alpha = true,
-            // Its image may be of either kind.
-            b"ANMF" => {
-                *self = Self {
-                    lossless: true,
-                    alpha: true,
-                    animated: true,
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Walks the chunks of a WebP up to the length that its RIFF header notes.
-pub(super) fn read_webp(bytes: &[u8]) -> Result<WebP, &'static str> {
-    let mut webp = WebP::default();
-    let length = |at: usize| -> Option<usize> {
-        let field: &[u8; 4] = bytes.get(at..)?.first_chunk()?;
-        usize::try_from(u32::from_le_bytes(*field)).ok()
-    };
-    let end = length(4)
-        .and_then(|riff| riff.checked_add(8))
-        .ok_or(CUT_SHORT)?;
-    if end > bytes.len() {
-        return Err(CUT_SHORT);
-    }
-    let mut at = 12;
-    while at < end {
-        let data = length(at + 4).ok_or(CUT_SHORT)?;
-        let data_end = at.checked_add(8 + data).ok_or(CUT_SHORT)?;
-        if data_end > end {
-            return Err(CUT_SHORT);
-        }
-        webp.add(&bytes[at..at + 4]);
-        at = data_end + data % 2;
-    }
-    Ok(webp)
 }

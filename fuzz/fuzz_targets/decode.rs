@@ -1,0 +1,40 @@
+//! Image files: what is taken has the size that its header says, and keeps the limits.
+#![no_main]
+
+use bagtrack::ingest::{decode_to, recycle, size, Limits};
+use bagtrack::tracker::FrameFormat;
+use libfuzzer_sys::fuzz_target;
+use std::cell::Cell;
+use std::sync::Once;
+
+static HOOK: Once = Once::new();
+
+fuzz_target!(|data: &[u8]| {
+    // libFuzzer's hook aborts at every panic; those of a decoder are caught, and the file is refused.
+    HOOK.call_once(|| std::panic::set_hook(Box::new(|_| ())));
+    let limits = Limits {
+        max_side: 1024,
+        max_pixels: 1 << 18,
+        max_memory: 16 << 20,
+        ..Limits::default()
+    };
+    let stored = Cell::new((0, 0));
+    let format = |source: (u32, u32)| {
+        stored.set(source);
+        FrameFormat {
+            size: (source.0.div_ceil(2), source.1.div_ceil(2)),
+            has_color: true,
+        }
+    };
+    if let Ok(frame) = decode_to(data, &limits, &format) {
+        let (width, height) = stored.get();
+        assert_eq!(
+            size(data, &limits),
+            Ok((width, height)),
+            "the header says otherwise"
+        );
+        assert!(frame.width() <= width && frame.height() <= height);
+        assert!(u64::from(width) * u64::from(height) <= limits.max_pixels);
+        recycle(frame);
+    }
+});

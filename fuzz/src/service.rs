@@ -1,0 +1,184 @@
+//! The service, and what must hold for each of its answers.
+
+use axum::body::{Body, Bytes};
+use axum::http::{HeaderMap, Method, Request, StatusCode};
+use axum::Router;
+use bagtrack::http::{Application, Config};
+use bagtrack::sessions::{MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use http_body_util::BodyExt;
+use serde_json::Value;
+use std::cell::Cell;
+use std::convert::Infallible;
+use std::time::Duration;
+use tokio::runtime::Runtime;
+use tower::ServiceExt;
+
+/// Requests after which the samples of the histograms are summed up; a served application does that by the clock.
+const REQUESTS_BETWEEN_UPKEEP: u32 = 1000;
+
+/// The service in this process.
+pub struct Service {
+    runtime: Runtime,
+    router: Router,
+    requests: Cell<u32>,
+}
+
+/// An answer.
+pub struct Answer {
+    pub status: StatusCode,
+    pub headers: HeaderMap,
+    pub body: Bytes,
+}
+
+impl Answer {
+    /// The body as JSON.
+    pub fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).expect("the answer is JSON")
+    }
+
+    /// The path of the session that was opened, if one was.
+    pub fn session(&self) -> Option<String> {
+        let path = self.headers.get("location")?;
+        Some(path.to_str().expect("a path is text").to_owned())
+    }
+}
+
+impl Service {
+    /// With small limits, so that inputs are small too.
+    pub fn new() -> Self {
+        // libFuzzer's hook aborts at every panic, those that the service answers with an error too.
+        std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
+        let mut config = Config {
+            listen: ([127, 0, 0, 1], 0).into(),
+            workers: Some(1),
+            max_body_bytes: 1 << 20,
+            max_frame_side: 1024,
+            max_frame_pixels: 1 << 20,
+            max_frame_memory: 32 << 20,
+            max_frames: 4,
+            // A sanitizer makes work slow.
+            work_timeout: Duration::from_secs(600),
+            ..Config::default()
+        };
+        config.access.unsigned_snapshots = true;
+        config.limits.max_request_cpu = Duration::from_secs(600);
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build();
+        let runtime = runtime.expect("the system gives a runtime");
+        let application = runtime.block_on(Application::bind(config));
+        let router = application.expect("the settings are valid").into_router();
+        Self {
+            runtime,
+            router,
+            requests: Cell::new(0),
+        }
+    }
+
+    /// Sends a request whose body arrives in pieces of `piece` bytes. Every answer is success, or a problem document of
+    /// the client's doing.
+    pub fn send_in_pieces(
+        &self,
+        (method, path): (Method, &str),
+        media_type: &str,
+        body: &[u8],
+        piece: usize,
+    ) -> Answer {
+        let pieces: Vec<Result<Bytes, Infallible>> = body
+            .chunks(piece.max(1))
+            .map(|piece| Ok(Bytes::copy_from_slice(piece)))
+            .collect();
+        let body = Body::from_stream(futures_util::stream::iter(pieces));
+        let request = Request::builder()
+            .method(method)
+            .uri(path)
+            .header("host", "localhost");
+        let request = request.header("content-type", media_type).body(body);
+        let request = request.expect("the path and the type are valid");
+        let answer = self.runtime.block_on(async {
+            let answer = self.router.clone().oneshot(request).await;
+            let (head, body) = answer.expect("it cannot fail").into_parts();
+            let body = body.collect().await.expect("answers come from memory");
+            Answer {
+                status: head.status,
+                headers: head.headers,
+                body: body.to_bytes(),
+            }
+        });
+        let text = || String::from_utf8_lossy(&answer.body).into_owned();
+        assert!(
+            !answer.status.is_server_error(),
+            "{}: {}",
+            answer.status,
+            text()
+        );
+        if answer.status.is_client_error() {
+            assert_eq!(
+                answer.headers["content-type"],
+                "application/problem+json",
+                "{}",
+                text()
+            );
+            assert_eq!(answer.json()["status"], answer.status.as_u16());
+        }
+        self.requests.set(self.requests.get() + 1);
+        if self.requests.get() == REQUESTS_BETWEEN_UPKEEP {
+            self.send((Method::GET, "/metrics"), "text/plain", b"");
+            self.requests.set(0);
+        }
+        answer
+    }
+
+    /// Sends a request.
+    pub fn send(&self, target: (Method, &str), media_type: &str, body: &[u8]) -> Answer {
+        self.send_in_pieces(target, media_type, body, body.len())
+    }
+
+    /// Opens a session with this body and sends it the same body as its next frames; ends the session.
+    pub fn upload_twice(&self, query: &str, media_type: &str, body: &[u8], piece: usize) {
+        let create = format!("/sessions{query}");
+        let created = self.send_in_pieces((Method::POST, &create), media_type, body, piece);
+        let Some(session) = created.session() else {
+            return;
+        };
+        let post = format!("{session}/frames");
+        let posted = self.send_in_pieces((Method::POST, &post), media_type, body, piece);
+        let taken = match posted.status.is_success() {
+            true => posted.json()["answers"].as_array().map_or(1, Vec::len) as u64,
+            false => 0,
+        };
+        assert_eq!(self.frames(&session), Some(1 + taken), "{session}");
+        self.delete(&session);
+    }
+
+    /// How many frames a session has taken; none if there is no such session.
+    pub fn frames(&self, session: &str) -> Option<u64> {
+        let view = self.send((Method::GET, session), "text/plain", b"");
+        match view.status {
+            StatusCode::OK => Some(view.json()["frames"].as_u64().expect("a number")),
+            _ => None,
+        }
+    }
+
+    /// Ends a session.
+    pub fn delete(&self, session: &str) {
+        let deleted = self.send((Method::DELETE, session), "text/plain", b"");
+        assert_eq!(deleted.status, StatusCode::NO_CONTENT);
+    }
+}
+
+impl Default for Service {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A snapshot with these bytes as its content, with the code of unsigned ones.
+pub fn snapshot_of(version: u8, content: &[u8]) -> Vec<u8> {
+    let none: &[&str] = &[];
+    let keys = MacKeys::new(SNAPSHOT_KEY_CONTEXT, none).accepting_unsigned(false);
+    let mut bytes = [SNAPSHOT_MAGIC, &[version], content].concat();
+    let code = keys.sign(&bytes);
+    bytes.extend_from_slice(&code);
+    bytes
+}

@@ -1,0 +1,104 @@
+"""What no schema can tell: which bytes are a picture, which box lies on it, and which parameters are too much together.
+
+schemathesis loads this file (`SCHEMATHESIS_HOOKS`). Pictures of one size are sent wherever a file is described, as are
+snapshots of a session that is opened here. Requests that are meant to be valid get a box inside the picture, a fresh
+idempotency key, and few tracker parameters. Requests that are meant to be invalid are sent as they were made.
+"""
+
+import base64
+import os
+import struct
+import uuid
+import zlib
+
+import requests
+import schemathesis
+from hypothesis import strategies as st
+from schemathesis.transport.serialization import Binary
+
+WIDTH, HEIGHT = 64, 48
+URL = os.environ["BAGTRACK_URL"]
+
+
+def png(t):
+    """Picture t: a bright target on a pattern."""
+    def pixel(x, y):
+        inside = 20 + t <= x < 36 + t and 15 <= y < 27
+        return 150 + ((x - t) * 11 ^ y * 7) % 100 if inside else (x * 3 ^ y * 5) % 90
+
+    rows = b"".join(b"\0" + bytes(pixel(x, y) for x in range(WIDTH)) for y in range(HEIGHT))
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", WIDTH, HEIGHT, 8, 0, 0, 0, 0)),
+        (b"IDAT", zlib.compress(rows)),
+        (b"IEND", b""),
+    ]
+    body = b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+PICTURES = [png(t) for t in range(4)]
+
+
+def snapshot():
+    """The bytes of a session."""
+    created = requests.post(f"{URL}/sessions", params={"box": "20,15,16,12"}, data=PICTURES[0], timeout=60)
+    created.raise_for_status()
+    return requests.get(f"{URL}{created.headers['location']}/snapshot", timeout=60).content
+
+
+for kind in ["image/png", "image/jpeg", "image/webp"]:
+    schemathesis.openapi.media_type(kind, st.sampled_from(PICTURES))
+# The parts of forms.
+schemathesis.openapi.format("binary", st.sampled_from(PICTURES).map(Binary))
+schemathesis.openapi.media_type("application/vnd.bagtrack.snapshot", st.just(snapshot()))
+
+
+def box(number):
+    """A box inside the picture, for a number."""
+    return {"x": number % 30, "y": number % 20, "width": 12 + number % 10, "height": 10 + number % 8}
+
+
+def text_of(box):
+    return f"{box['x']},{box['y']},{box['width']},{box['height']}"
+
+
+schemathesis.openapi.format("box", st.integers(0, 99).map(lambda number: text_of(box(number))))
+schemathesis.openapi.format("json", st.sampled_from(["{}", '{"particles": 80}', '{"seed": 7, "sigma": 0.3}']))
+
+
+@schemathesis.hook
+def before_call(context, case, kwargs):
+    if case.meta is None or not case.meta.generation.mode.is_positive:
+        return
+    before_call.count += 1
+    count = before_call.count
+    media_type = case.media_type or ""
+    query = case.query or {}
+    if case.headers and "Idempotency-Key" in case.headers:
+        # A key belongs to one request.
+        case.headers["Idempotency-Key"] = str(uuid.uuid4())
+    body = case.body if isinstance(case.body, dict) else None
+    if body is not None and media_type == "application/json":
+        if isinstance(body.get("box"), (dict, list)):
+            body["box"] = box(count)
+        if body.get("params") is not None:
+            # Each value is in its range; large ones can be too much together.
+            body["params"] = {name: body["params"][name] for name in ("seed",) if name in body["params"]}
+        picture = base64.b64encode(PICTURES[count % len(PICTURES)]).decode()
+        if body.get("frame") is not None:
+            body["frame"] = picture
+        if body.get("frames") is not None:
+            body["frames"] = [picture for _ in body["frames"]]
+    if media_type == "application/vnd.bagtrack.snapshot":
+        # It holds all settings.
+        query.clear()
+    elif case.operation.path in ("/sessions", "/sessions/{id}/target") and case.method.upper() in ("POST", "PUT"):
+        # The box may be in the query or in the body, and has to be in one of them.
+        if "box" not in query and not (body and body.get("box")):
+            query["box"] = text_of(box(count))
+            case.query = query
+
+
+before_call.count = 0
