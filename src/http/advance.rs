@@ -16,6 +16,8 @@ pub struct NextFrames {
     pub files: Vec<Bytes>,
     /// The box in the only frame, where the user corrects it.
     pub correction: Option<Rect>,
+    /// How many of the last answers are kept at least, for a client that takes up where its line broke.
+    pub kept: usize,
 }
 
 /// The answers to a request.
@@ -65,12 +67,12 @@ impl NextFrames {
         let estimates = match self.correction {
             Some(target) => {
                 let (fingerprint, frame) = &frames[0];
-                let estimate = state.retarget(*fingerprint, frame, target);
+                let estimate = state.retarget(*fingerprint, frame, target, self.kept);
                 estimate
                     .map(|estimate| vec![estimate])
                     .map_err(|error| StepError::Refused { index: 0, error })
             }
-            None => state.step(&frames, meter),
+            None => state.step(&frames, meter, self.kept),
         };
         let took = meter.cpu_time().saturating_sub(started);
         frames

@@ -3,6 +3,7 @@
 use super::metrics::page as metrics_page;
 use super::problems::document::ProblemDocument;
 use super::state::AppState;
+use super::stream::handshake;
 use super::{create, frames, health, session, snapshot, target, token};
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
@@ -56,6 +57,7 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(target::put))
         .routes(routes!(snapshot::get))
         .routes(routes!(token::create))
+        .routes(routes!(handshake::open))
 }
 
 /// `/metrics`.

@@ -94,6 +94,7 @@ pub async fn post(
         number: request.upload.settings.frame.map(|number| number.0),
         files: request.upload.files,
         correction: None,
+        kept: 0,
     };
     let queue = request.queue.for_frames(next.files.len());
     let limits = state.config.request_limits();

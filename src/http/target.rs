@@ -105,6 +105,7 @@ pub async fn put(
         number: settings.frame.map(|number| number.0),
         files: request.upload.files,
         correction: Some(target.into()),
+        kept: 0,
     };
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();

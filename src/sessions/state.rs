@@ -10,7 +10,7 @@ use crate::tracker::{Estimate, Frame, Rect, Tracker, TrackerError};
 #[derive(Debug)]
 pub struct SessionState {
     tracker: Tracker,
-    /// The answers to the last request, oldest first; at least one.
+    /// The last answers, oldest first: those to the last request, and more where that asked for it.
     recent: Vec<Answered>,
 }
 
@@ -84,7 +84,25 @@ impl SessionState {
         replay::decide(&self.recent, number, posted, given)
     }
 
-    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on.
+    /// The stored answers from frame `number` on, oldest first; none where one of them is not stored any more. All have
+    /// been answered from the next frame on.
+    pub fn answers_from(&self, number: u64) -> Option<Vec<Estimate>> {
+        let next = self.tracker.estimate().frame + 1;
+        let count = usize::try_from(next.checked_sub(number)?).ok()?;
+        let first = self.recent.len().checked_sub(count)?;
+        let stored = &self.recent[first..];
+        Some(stored.iter().map(|answered| answered.estimate).collect())
+    }
+
+    /// Stores new answers, and of those before them as many as make `kept` together.
+    fn store(&mut self, answered: Vec<Answered>, kept: usize) {
+        let older = kept.saturating_sub(answered.len()).min(self.recent.len());
+        self.recent.drain(..self.recent.len() - older);
+        self.recent.extend(answered);
+    }
+
+    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on. The answers
+    /// are stored, and at least the last `kept`.
     ///
     /// # Errors
     /// The tracker refused a frame, or the work was stopped. The session is unchanged.
@@ -92,6 +110,7 @@ impl SessionState {
         &mut self,
         frames: &[(Fingerprint, Frame)],
         meter: &mut WorkMeter,
+        kept: usize,
     ) -> Result<Vec<Estimate>, StepError> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());
@@ -115,12 +134,12 @@ impl SessionState {
         }
         let estimates = answered.iter().map(|answered| answered.estimate).collect();
         if !answered.is_empty() {
-            self.recent = answered;
+            self.store(answered, kept);
         }
         Ok(estimates)
     }
 
-    /// Takes the next frame with its box given by the user.
+    /// Takes the next frame with its box given by the user. The answer is stored, and at least the last `kept`.
     ///
     /// # Errors
     /// The tracker refused the frame or the box. The session is unchanged.
@@ -129,13 +148,15 @@ impl SessionState {
         fingerprint: Fingerprint,
         frame: &Frame,
         given: Rect,
+        kept: usize,
     ) -> Result<Estimate, TrackerError> {
         let estimate = self.tracker.retarget(frame, given)?;
-        self.recent = vec![Answered {
+        let answered = Answered {
             fingerprint,
             given: Some(given),
             estimate,
-        }];
+        };
+        self.store(vec![answered], kept);
         Ok(estimate)
     }
 }

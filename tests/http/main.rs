@@ -26,5 +26,8 @@ mod provoke;
 mod quotas;
 mod raw;
 mod replay;
+mod slow_line;
 mod snapshots;
+mod stream;
+mod stream_client;
 mod uploads;
