@@ -2,6 +2,7 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{FrameAnswers, replayed_header};
+use super::frame_order::wait_for_turn;
 use super::openapi::problem_responses::{self, problem_responses};
 use super::openapi::request_bodies::{FormBody, JsonBody};
 use super::problems::kind::Kind;
@@ -42,6 +43,7 @@ impl utoipa::IntoResponses for Problems {
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
         let own = &[
             Kind::FrameOutOfOrder,
+            Kind::NotInOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::SessionBusy,
@@ -57,7 +59,7 @@ impl utoipa::IntoResponses for Problems {
 /// before the first is tracked: if one is bad, none is taken.
 ///
 /// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
-/// number is processed; the last request's numbers with the same bytes get the stored answers again, with the
+/// number is processed, one that comes a little early waits for its turn, and the last request's numbers with the same bytes get the stored answers again, with the
 /// header `Replayed: true`.
 ///
 /// `curl --data-binary @next.jpg http://localhost:8080/sessions/$ID/frames`
@@ -96,6 +98,7 @@ pub async fn post(
         correction: None,
         kept: 0,
     };
+    wait_for_turn(&request.permit, next.number).await?;
     let queue = request.queue.for_frames(next.files.len());
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();

@@ -42,6 +42,7 @@ mod draining;
 #[cfg(feature = "otel")]
 mod exported_span;
 mod forwarded;
+mod frame_order;
 mod frames;
 mod head_problems;
 mod health;

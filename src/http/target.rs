@@ -2,6 +2,7 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{Answer, replayed_header};
+use super::frame_order::wait_for_turn;
 use super::openapi::problem_responses::{self, problem_responses};
 use super::openapi::request_bodies::{FormBody, JsonBody};
 use super::problems::kind::Kind;
@@ -48,6 +49,7 @@ impl utoipa::IntoResponses for Problems {
         let own = &[
             Kind::MissingBox,
             Kind::FrameOutOfOrder,
+            Kind::NotInOrder,
             Kind::FrameDiffers,
             Kind::FrameSizeMismatch,
             Kind::InvalidBox,
@@ -107,6 +109,7 @@ pub async fn put(
         correction: Some(target.into()),
         kept: 0,
     };
+    wait_for_turn(&request.permit, next.number).await?;
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
     let correct =

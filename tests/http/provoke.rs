@@ -155,7 +155,7 @@ impl Attempt {
             }
             "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
             "request-too-costly" => self.frames = 2,
-            "session-busy" | "quota-exceeded" => {
+            "session-busy" | "quota-exceeded" | "not-in-order" => {
                 let id = self.id.as_ref().unwrap();
                 let target = format!("/sessions/{id}/frames");
                 let held = RawConnection::hold(self.app.address, "POST", &target, 1000);

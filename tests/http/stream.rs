@@ -243,7 +243,7 @@ async fn a_stream_ends_with_its_session() {
 
 #[tokio::test]
 async fn an_idle_stream_is_pinged_and_a_silent_one_closed() {
-    let ping = Duration::from_millis(50);
+    let ping = Duration::from_millis(300);
     let app = TestApplication::start_with(|config| config.limits.ping_interval = ping).await;
     let id = app.open().await;
     let silent = StreamClient::open(&app, &id, "").await;

@@ -113,6 +113,13 @@ impl Problem {
         )
     }
 
+    /// The frame has no number, and came while another request was at the session.
+    pub fn not_in_order() -> Self {
+        let detail = "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each \
+            answer. This one was not tracked.";
+        Self::new(Kind::NotInOrder, detail)
+    }
+
     /// The path and query have more bytes than they may.
     pub fn uri_too_long() -> Self {
         Self::new(Kind::UriTooLong, "Send settings in the body.")
