@@ -4,7 +4,7 @@ use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
 use crate::sessions::{Fingerprint, LockedSession, ReplayDecision, StepError, WorkMeter};
-use crate::tracker::{Estimate, Frame, FrameFormat, Rect, TrackerError};
+use crate::tracker::{Estimate, Frame, FrameFormat, Rect, Seen, TrackerError};
 use axum::body::Bytes;
 
 /// The next frames of a session, as they were received.
@@ -18,6 +18,8 @@ pub struct NextFrames {
     pub correction: Option<Rect>,
     /// How many of the last answers are kept at least, for a client that takes up where its line broke.
     pub kept: usize,
+    /// Whether the client wants to know what the tracker saw.
+    pub sees: bool,
 }
 
 /// The answers to a request.
@@ -27,6 +29,8 @@ pub struct Answered {
     pub estimates: Vec<Estimate>,
     /// Whether they were given before.
     pub replayed: bool,
+    /// What the tracker saw in the last frame, where that was asked for and the frame was tracked now.
+    pub seen: Option<Seen>,
 }
 
 impl NextFrames {
@@ -56,6 +60,7 @@ impl NextFrames {
             return Ok(Answered {
                 estimates,
                 replayed: true,
+                seen: None,
             });
         }
         self.check_sizes(limits, locked.session().source_size())?;
@@ -64,6 +69,7 @@ impl NextFrames {
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let (before, started) = (locked.session().latest(), meter.cpu_time());
         let state = locked.state();
+        let mut seen = (self.sees && self.correction.is_none()).then(Seen::default);
         let estimates = match self.correction {
             Some(target) => {
                 let (fingerprint, frame) = &frames[0];
@@ -72,7 +78,7 @@ impl NextFrames {
                     .map(|estimate| vec![estimate])
                     .map_err(|error| StepError::Refused { index: 0, error })
             }
-            None => state.step(&frames, meter, self.kept),
+            None => state.step(&frames, meter, self.kept, seen.as_mut()),
         };
         let took = meter.cpu_time().saturating_sub(started);
         frames
@@ -89,6 +95,7 @@ impl NextFrames {
         Ok(Answered {
             estimates,
             replayed: false,
+            seen,
         })
     }
 

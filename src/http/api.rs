@@ -4,7 +4,7 @@ use super::metrics::page as metrics_page;
 use super::problems::document::ProblemDocument;
 use super::state::AppState;
 use super::stream::handshake;
-use super::{create, frames, health, session, snapshot, target, token};
+use super::{bag_picture, create, frames, health, session, snapshot, target, token};
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
@@ -56,6 +56,7 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(frames::post))
         .routes(routes!(target::put))
         .routes(routes!(snapshot::get))
+        .routes(routes!(bag_picture::get))
         .routes(routes!(token::create))
         .routes(routes!(handshake::open))
 }

@@ -97,6 +97,7 @@ pub async fn post(
         files: request.upload.files,
         correction: None,
         kept: 0,
+        sees: false,
     };
     wait_for_turn(&request.permit, next.number).await?;
     let queue = request.queue.for_frames(next.files.len());
@@ -107,6 +108,7 @@ pub async fn post(
     let Answered {
         estimates,
         replayed,
+        ..
     } = work::on_session(&state, request.permit, queue, advance).await?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))

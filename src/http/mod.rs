@@ -26,6 +26,7 @@ mod answer;
 mod answer_problems;
 mod api;
 mod auth;
+mod bag_picture;
 mod client;
 mod clients;
 mod config;
@@ -59,6 +60,8 @@ mod problems;
 mod request_id;
 mod request_log;
 mod router;
+#[cfg(feature = "eval")]
+mod sample_clips;
 mod saturation;
 mod security_headers;
 mod server;

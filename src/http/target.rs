@@ -108,6 +108,7 @@ pub async fn put(
         files: request.upload.files,
         correction: Some(target.into()),
         kept: 0,
+        sees: false,
     };
     wait_for_turn(&request.permit, next.number).await?;
     let limits = state.config.request_limits();
@@ -117,6 +118,7 @@ pub async fn put(
     let Answered {
         estimates,
         replayed,
+        ..
     } = work::on_session(&state, request.permit, request.queue, correct).await?;
     let answer = Json(Answer::from(estimates[0])).into_response();
     Ok(replayed_header(replayed, answer))

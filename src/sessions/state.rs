@@ -4,7 +4,7 @@ use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::work_limit::{Stopped, WorkMeter};
-use crate::tracker::{Estimate, Frame, Rect, Tracker, TrackerError};
+use crate::tracker::{BagEntry, Estimate, Frame, Rect, Seen, Tracker, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug)]
@@ -63,6 +63,11 @@ impl SessionState {
         SessionSnapshot::encode(&self.tracker, &self.recent, keys)
     }
 
+    /// The bag, for people to look at.
+    pub fn bag(&self) -> Vec<BagEntry> {
+        self.tracker.bag()
+    }
+
     /// The tracker.
     pub(super) fn tracker(&self) -> &Tracker {
         &self.tracker
@@ -102,7 +107,7 @@ impl SessionState {
     }
 
     /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on. The answers
-    /// are stored, and at least the last `kept`.
+    /// are stored, and at least the last `kept`. `seen` becomes what the tracker saw in the last frame.
     ///
     /// # Errors
     /// The tracker refused a frame, or the work was stopped. The session is unchanged.
@@ -111,6 +116,7 @@ impl SessionState {
         frames: &[(Fingerprint, Frame)],
         meter: &mut WorkMeter,
         kept: usize,
+        mut seen: Option<&mut Seen>,
     ) -> Result<Vec<Estimate>, StepError> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());
@@ -118,7 +124,15 @@ impl SessionState {
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {
             let going_on = meter.check().map_err(StepError::Stopped);
             let refused = |error| StepError::Refused { index, error };
-            match going_on.and_then(|()| self.tracker.step(frame).map_err(refused)) {
+            let mut step = || match seen.as_deref_mut() {
+                Some(seen) => {
+                    let (estimate, saw) = self.tracker.step_seeing(frame)?;
+                    *seen = saw;
+                    Ok(estimate)
+                }
+                None => self.tracker.step(frame),
+            };
+            match going_on.and_then(|()| step().map_err(refused)) {
                 Ok(estimate) => answered.push(Answered {
                     fingerprint: *fingerprint,
                     given: None,

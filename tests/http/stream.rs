@@ -65,6 +65,37 @@ async fn a_box_before_a_frame_corrects_the_target() {
 }
 
 #[tokio::test]
+async fn what_the_tracker_saw_is_told_where_it_is_asked_for() {
+    let app = TestApplication::start().await;
+    let expected = posted(&app, 2).await;
+    let id = app.open().await;
+    let mut stream = StreamClient::open(&app, &id, "").await;
+    stream.say(r#"{"see": true}"#).await;
+    stream.send(pictures::png(1)).await;
+    stream.send(pictures::png(2)).await;
+    let mut answer = stream.message().await;
+    let particles = answer["particles"].take();
+    let particles: Vec<[f64; 4]> = serde_json::from_value(particles).unwrap();
+    let votes: Vec<f64> = serde_json::from_value(answer["votes"].take()).unwrap();
+    assert!((20..=200).contains(&particles.len()), "{particles:?}");
+    assert!(
+        particles.is_sorted_by(|a, b| a[3] >= b[3]),
+        "likeliest first"
+    );
+    let sum: f64 = particles.iter().map(|particle| particle[3]).sum();
+    assert!((0.5..=1.001).contains(&sum), "{sum}");
+    // The likeliest one is where the answer is, at (22, 16) with 16 x 12 pixels.
+    let [x, y, width, _] = particles[0];
+    assert!((x - 30.0).abs() < 3.0 && (y - 22.0).abs() < 3.0 && (width - 16.0).abs() < 3.0);
+    assert!((votes.iter().sum::<f64>() - 1.0).abs() < 0.01, "{votes:?}");
+    // To look changes nothing, and is asked for each time.
+    let answer = answer.as_object_mut().unwrap();
+    answer.retain(|name, _| name != "particles" && name != "votes");
+    assert_eq!(Value::Object(answer.clone()), expected[0]);
+    assert_eq!(stream.message().await, expected[1]);
+}
+
+#[tokio::test]
 async fn a_refused_frame_gets_its_problem_in_its_place_and_changes_nothing() {
     let app = TestApplication::start().await;
     let expected = posted(&app, 2).await;

@@ -10,7 +10,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use crate::http::work;
 use crate::sessions::{LockedSession, QueuePermit, SessionPermit, WorkMeter};
-use crate::tracker::Estimate;
+use crate::tracker::{Estimate, Seen};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -40,11 +40,22 @@ pub struct FrameWork {
     pub newest_wins: bool,
 }
 
+/// The answer to a frame.
+#[derive(Debug)]
+pub struct Given {
+    /// Where the target is.
+    pub estimate: Estimate,
+    /// Whether it was given before.
+    pub replayed: bool,
+    /// What the tracker saw, where that was asked for.
+    pub seen: Option<Seen>,
+}
+
 /// What became of a frame.
 #[derive(Debug)]
 pub struct Done {
-    /// The answer, and whether it was given before; or the problem.
-    pub answer: Result<(Estimate, bool), Problem>,
+    /// The answer, or the problem.
+    pub answer: Result<Given, Problem>,
     /// Frames before it that were skipped.
     pub skipped: u64,
 }
@@ -125,7 +136,7 @@ impl FrameWork {
         self: &Arc<Self>,
         frame: ArrivedFrame,
         (session, queue): (SessionPermit, QueuePermit),
-    ) -> Result<(Estimate, bool), Problem> {
+    ) -> Result<Given, Problem> {
         let ArrivedFrame {
             header,
             file,
@@ -144,6 +155,7 @@ impl FrameWork {
             files: vec![file],
             correction: header.r#box.map(Into::into),
             kept: MAX_KEPT.min(config.max_frames),
+            sees: header.see,
         };
         let (limits, stream) = (config.request_limits(), self.clone());
         let advance = move |locked: &mut LockedSession, meter: &mut WorkMeter| {
@@ -157,7 +169,12 @@ impl FrameWork {
         let Answered {
             estimates,
             replayed,
+            seen,
         } = work::on_session(&self.state, session, queue, advance).await?;
-        Ok((estimates[0], replayed))
+        Ok(Given {
+            estimate: estimates[0],
+            replayed,
+            seen,
+        })
     }
 }

@@ -53,7 +53,11 @@ struct Problems;
 impl utoipa::IntoResponses for Problems {
     fn responses()
     -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[Kind::MalformedRequest, Kind::FrameOutOfOrder];
+        let own = &[
+            Kind::MalformedRequest,
+            Kind::FrameOutOfOrder,
+            Kind::SessionBusy,
+        ];
         problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
     }
 }
@@ -61,7 +65,8 @@ impl utoipa::IntoResponses for Problems {
 /// Send frames over a WebSocket
 ///
 /// A binary message is a frame. A text message before it may give its number or a corrected box: `{"frame": 7}`,
-/// `{"box": [12, 22, 30, 40]}`. All answers are text messages. The first is `{"next": N}`, the number of the next
+/// `{"box": [12, 22, 30, 40]}`. With `{"see": true}` the answer has the particles (centre, width and weight of the 200
+/// likeliest) and the votes of the bag's entries. All answers are text messages. The first is `{"next": N}`, the number of the next
 /// frame. Then each frame gets its answer, or a problem document, in order. A problem leaves the session as it was.
 ///
 /// Send further frames without waiting for the answers, at most 32. If the line breaks, open the stream again with
@@ -100,7 +105,8 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let account = state.clients.account(&Client::of(&parts));
     let max_bytes = max_message_bytes(&state, &session);
     let mut buffers = ByteCharge::new(&state.uploads, account.bytes());
-    buffers.grow(max_bytes + READ_BYTES + WRITE_BYTES)?;
+    // A message in pieces is there twice: the pieces that have come, and the one that comes.
+    buffers.grow(2 * max_bytes + READ_BYTES + WRITE_BYTES)?;
     // The stream before this one tracks no further frame.
     let place = state.streams.take(session.id());
     let (next, stored) = stand(&state, &session, settings.from).await?;

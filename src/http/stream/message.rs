@@ -3,10 +3,12 @@
 use crate::http::answer::Answer;
 use crate::http::problems::problem::Problem;
 use crate::http::target_box::TargetBox;
-use crate::tracker::Estimate;
+use crate::tracker::{Estimate, Seen};
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
 
+/// Most particles in an answer.
+const MAX_PARTICLES: usize = 200;
 /// Most bytes of a text message.
 const MAX_TEXT_BYTES: usize = 4096;
 
@@ -20,6 +22,9 @@ pub struct FrameHeader {
     /// The box in it, where the user corrects it.
     #[serde(default, deserialize_with = "target_box")]
     pub r#box: Option<TargetBox>,
+    /// Whether the answer shall tell what the tracker saw.
+    #[serde(default)]
+    pub see: bool,
 }
 
 /// A box as an object, an array, or the text that queries have.
@@ -73,6 +78,38 @@ pub struct StreamAnswer {
     /// Whether the service is about to end.
     #[serde(skip_serializing_if = "is_false")]
     draining: bool,
+    #[serde(flatten)]
+    seen: Option<SeenView>,
+}
+
+/// What the tracker saw in the frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct SeenView {
+    /// For the likeliest particles, likeliest first: centre (x, y), width, and weight.
+    particles: Vec<[f64; 4]>,
+    /// For each entry of the bag, oldest first, its share of the vote for the best particle.
+    votes: Vec<f64>,
+}
+
+impl From<Seen> for SeenView {
+    fn from(mut seen: Seen) -> Self {
+        seen.particles.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let shown = seen.particles.iter().take(MAX_PARTICLES);
+        let round = |value: f64, digits: f64| (value * digits).round() / digits;
+        let particles = shown.map(|(area, weight)| {
+            let (x, y) = area.center();
+            [
+                round(x, 10.0),
+                round(y, 10.0),
+                round(area.width, 10.0),
+                round(*weight, 1e5),
+            ]
+        });
+        Self {
+            particles: particles.collect(),
+            votes: seen.votes.iter().map(|vote| round(*vote, 1e4)).collect(),
+        }
+    }
 }
 
 impl StreamAnswer {
@@ -83,7 +120,14 @@ impl StreamAnswer {
             skipped,
             replayed,
             draining,
+            seen: None,
         }
+    }
+
+    /// With what the tracker saw.
+    pub fn with_seen(mut self, seen: Option<Seen>) -> Self {
+        self.seen = seen.map(SeenView::from);
+        self
     }
 }
 

@@ -1,7 +1,7 @@
 //! A stream from its first message to its end: reads frames, sends answers, pings.
 
 use super::end::End;
-use super::frame_work::{Done, FrameWork};
+use super::frame_work::{Done, FrameWork, Given};
 use super::message::{FrameHeader, Hello, StreamAnswer};
 use super::waiting::ArrivedFrame;
 use crate::http::connection_hold::ConnectionHold;
@@ -128,9 +128,10 @@ impl SessionStream {
                     }
                     counts.skipped += skipped;
                     match answer {
-                        Ok((estimate, replayed)) => {
+                        Ok(Given { estimate, replayed, seen }) => {
                             counts.answered += 1;
-                            send(socket, &self.answer(estimate, skipped, replayed)).await?;
+                            let answer = self.answer(estimate, skipped, replayed);
+                            send(socket, &answer.with_seen(seen)).await?;
                         }
                         Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
                         Err(problem) => {

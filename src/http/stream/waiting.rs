@@ -99,7 +99,10 @@ mod tests {
         let budget = ByteBudget::new(1);
         let r#box = corrects.then(|| "1,2,3,4".parse().unwrap());
         Ok(ArrivedFrame {
-            header: FrameHeader { frame: None, r#box },
+            header: FrameHeader {
+                r#box,
+                ..FrameHeader::default()
+            },
             file: Bytes::from_static(name.as_bytes()),
             charge: ByteCharge::new(&budget, &budget),
         })
