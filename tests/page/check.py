@@ -32,6 +32,7 @@ class Checks:
     def __init__(self, playwright, service, arguments):
         self.playwright = playwright
         self.service = service
+        self.program = arguments.program
         self.shots = arguments.shots
         self.from_disk = arguments.from_disk
         self.faults = []
@@ -340,9 +341,34 @@ def ended_session(checks):
         choose(page, "card")
         drag(page, checks.clips["card"]["truth"][0])
     frames(page, 10)
-    checks.service.process_delete(response.value.json()["id"])
+    checks.service.delete(response.value.json()["id"])
     said(page, "The session has ended")
     page.context.close()
+
+
+def key_needed(checks):
+    service = Service(checks.program, BAGTRACK_API_KEYS="page:0123456789abcdef")
+    page = checks.page(url=service.url, allowed=("401",))
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    said(page, "does not know this key")
+    page.locator("#key").fill("0123456789abcdef")
+    page.keyboard.press("Enter")
+    frames(page, 20)
+    page.context.close()
+    service.stop()
+
+
+def busy_service(checks):
+    service = Service(checks.program, "--max-sessions", "1")
+    box = ",".join(str(value) for value in checks.clips["card"]["truth"][0][:4])
+    service.call("POST", f"/sessions?box={box}", service.bytes("/sample/card/0.jpg"))
+    page = checks.page(url=service.url, allowed=("503",))
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    said(page, "The service is busy")
+    page.context.close()
+    service.stop()
 
 
 ALL = [
@@ -356,6 +382,8 @@ ALL = [
     camera,
     camera_refused,
     ended_session,
+    key_needed,
+    busy_service,
 ]
 
 

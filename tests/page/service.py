@@ -1,6 +1,7 @@
 """The service, and a line to it that can be cut."""
 
 import json
+import os
 import re
 import socket
 import subprocess
@@ -12,9 +13,10 @@ import urllib.request
 class Service:
     """The program on a free port."""
 
-    def __init__(self, program, *flags):
+    def __init__(self, program, *flags, **environment):
         command = [program, "serve", "--listen", "127.0.0.1:0", *flags]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        environment = {**os.environ, **environment}
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
         for line in self.process.stderr:
             found = re.search(r"http://127\.0\.0\.1:(\d+)", line)
             if found:
@@ -45,10 +47,10 @@ class Service:
         frames = (self.bytes(f"/sample/{clip}/{index}.jpg") for index in range(1, count))
         path = f"/sessions/{created['id']}/frames"
         answers = [self.call("POST", path, frame) for frame in frames]
-        self.process_delete(created["id"])
+        self.delete(created["id"])
         return answers
 
-    def process_delete(self, session):
+    def delete(self, session):
         request = urllib.request.Request(f"{self.url}/sessions/{session}", method="DELETE")
         urllib.request.urlopen(request).close()
 
