@@ -166,12 +166,11 @@ def same_as_the_api(checks, table, clip, box, seed):
 
 
 def weight_and_first_picture(checks):
-    sizes = {}
     page = checks.page()
-    page.on("response", lambda response: sizes.update({response.url: len(response.body())}))
-    page.reload()
     page.wait_for_load_state("networkidle")
-    total = sum(sizes.values())
+    sizes = page.evaluate("""['navigation', 'resource'].flatMap((kind) => performance.getEntriesByType(kind))
+        .map((entry) => [entry.name, entry.decodedBodySize])""")
+    total = sum(size for _, size in sizes)
     print(f"  the page has {total} bytes in {len(sizes)} files")
     assert 10_000 < total <= MAX_BYTES, sizes
     seconds = []
