@@ -4,7 +4,7 @@ use axum::body::{Body, Bytes, HttpBody};
 use axum::response::Response;
 use http_body::{Frame, SizeHint};
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -24,6 +24,8 @@ pub struct Activity {
     state: AtomicU8,
     /// Nanoseconds from [`START`] to when it became idle.
     idle_since: AtomicU64,
+    /// Whether a stream has taken the connection over.
+    streams: AtomicBool,
     /// Told when the connection is to end.
     pub shed: Notify,
 }
@@ -34,6 +36,7 @@ impl Activity {
         let activity = Self {
             state: AtomicU8::new(IDLE),
             idle_since: AtomicU64::new(0),
+            streams: AtomicBool::new(false),
             shed: Notify::new(),
         };
         activity.idle();
@@ -50,8 +53,18 @@ impl Activity {
     /// not yet a request.
     pub fn idle_since(&self) -> Option<Duration> {
         let since = Duration::from_nanos(self.idle_since.load(Ordering::Relaxed));
-        let is_idle = self.state.load(Ordering::Acquire) == IDLE;
+        let is_idle = self.state.load(Ordering::Acquire) == IDLE && !self.is_stream();
         is_idle.then_some(since)
+    }
+
+    /// A stream takes the connection over: it is never idle again.
+    pub fn stream(&self) {
+        self.streams.store(true, Ordering::Release);
+    }
+
+    /// Whether a stream has taken the connection over.
+    pub fn is_stream(&self) -> bool {
+        self.streams.load(Ordering::Acquire)
     }
 
     /// Whether a whole request has come whose answer is still being made or sent.

@@ -4,7 +4,7 @@ use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
 use crate::ingest::{self, Limits};
 use crate::sessions::{Fingerprint, LockedSession, ReplayDecision, StepError, WorkMeter};
-use crate::tracker::{Estimate, Frame, FrameFormat, Rect, TrackerError};
+use crate::tracker::{Estimate, Frame, FrameFormat, Rect, Seen, TrackerError};
 use axum::body::Bytes;
 
 /// The next frames of a session, as they were received.
@@ -16,6 +16,10 @@ pub struct NextFrames {
     pub files: Vec<Bytes>,
     /// The box in the only frame, where the user corrects it.
     pub correction: Option<Rect>,
+    /// How many of the last answers are kept at least, for a client that takes up where its line broke.
+    pub kept: usize,
+    /// Whether the client wants to know what the tracker saw.
+    pub sees: bool,
 }
 
 /// The answers to a request.
@@ -25,6 +29,8 @@ pub struct Answered {
     pub estimates: Vec<Estimate>,
     /// Whether they were given before.
     pub replayed: bool,
+    /// What the tracker saw in the last frame, where that was asked for and the frame was tracked now.
+    pub seen: Option<Seen>,
 }
 
 impl NextFrames {
@@ -55,6 +61,7 @@ impl NextFrames {
             return Ok(Answered {
                 estimates,
                 replayed: true,
+                seen: None,
             });
         }
         self.check_sizes(limits, locked.session().source_size())?;
@@ -63,15 +70,16 @@ impl NextFrames {
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let (before, started) = (locked.session().latest(), meter.cpu_time());
         let state = locked.state();
+        let mut seen = (self.sees && self.correction.is_none()).then(Seen::default);
         let estimates = match self.correction {
             Some(target) => {
                 let (fingerprint, frame) = &frames[0];
-                let estimate = state.retarget(*fingerprint, frame, target);
+                let estimate = state.retarget(*fingerprint, frame, target, self.kept);
                 estimate
                     .map(|estimate| vec![estimate])
                     .map_err(|error| StepError::Refused { index: 0, error })
             }
-            None => state.step(&frames, meter),
+            None => state.step(&frames, meter, self.kept, seen.as_mut()),
         };
         let took = meter.cpu_time().saturating_sub(started);
         frames
@@ -89,6 +97,7 @@ impl NextFrames {
         Ok(Answered {
             estimates,
             replayed: false,
+            seen,
         })
     }
 

@@ -3,7 +3,8 @@
 use super::metrics::page as metrics_page;
 use super::problems::document::ProblemDocument;
 use super::state::AppState;
-use super::{create, frames, health, session, snapshot, target, token};
+use super::stream::handshake;
+use super::{bag_picture, create, frames, health, session, snapshot, target, token};
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
@@ -55,7 +56,9 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(frames::post))
         .routes(routes!(target::put))
         .routes(routes!(snapshot::get))
+        .routes(routes!(bag_picture::get))
         .routes(routes!(token::create))
+        .routes(routes!(handshake::open))
 }
 
 /// `/metrics`.

@@ -161,6 +161,11 @@ impl Account {
         })
     }
 
+    /// The bytes that the client may have inside.
+    pub fn bytes(&self) -> &ByteBudget {
+        &self.bytes
+    }
+
     /// Whether the client may have one more session.
     ///
     /// # Errors
@@ -200,7 +205,7 @@ impl RequestPermit {
 
     /// The bytes that the client may have inside.
     pub fn bytes(&self) -> &ByteBudget {
-        &self.account.bytes
+        self.account.bytes()
     }
 
     /// Counts the frames of the request.

@@ -90,7 +90,8 @@ impl AsyncRead for ConnectionIo {
         let before = buffer.filled().len();
         ready!(self.stream.as_mut().poll_read(cx, buffer))?;
         let is_closed = buffer.filled().len() == before && buffer.remaining() > 0;
-        if is_closed && self.activity.idle_since().is_none() {
+        let waits = self.activity.idle_since().is_none() && !self.activity.is_stream();
+        if is_closed && waits {
             let patience = match self.activity.is_answering() {
                 true => self.half_close_timeout,
                 false => self.half_close_timeout.min(READING),

@@ -2,6 +2,7 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{FrameAnswers, replayed_header};
+use super::frame_order::wait_for_turn;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
@@ -41,6 +42,7 @@ operation_problems!(
     problem_responses::SESSION,
     &[
         Kind::FrameOutOfOrder,
+        Kind::NotInOrder,
         Kind::FrameDiffers,
         Kind::FrameSizeMismatch,
         Kind::SessionBusy,
@@ -54,8 +56,8 @@ operation_problems!(
 /// before the first is tracked: if one is bad, none is taken.
 ///
 /// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
-/// number is processed; the last request's numbers with the same bytes get the stored answers again, with the
-/// header `Replayed: true`.
+/// number is processed, one that comes a little early waits for its turn, and the last request's numbers with the same
+/// bytes get the stored answers again, with the header `Replayed: true`.
 ///
 /// `curl --data-binary @next.jpg http://localhost:8080/sessions/$ID/frames`
 #[utoipa::path(
@@ -91,7 +93,10 @@ pub async fn post(
         number: request.upload.settings.frame.map(|number| number.0),
         files: request.upload.files,
         correction: None,
+        kept: 0,
+        sees: false,
     };
+    wait_for_turn(&request.permit, next.number).await?;
     let queue = request.queue.for_frames(next.files.len());
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
@@ -102,6 +107,7 @@ pub async fn post(
     let Answered {
         estimates,
         replayed,
+        ..
     } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
     let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
     Ok(replayed_header(replayed, answers))

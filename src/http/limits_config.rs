@@ -47,6 +47,13 @@ pub struct LimitsConfig {
         value_parser = humantime::parse_duration
     ))]
     pub half_close_timeout: Duration,
+    /// A stream is pinged this often; one whose client is not heard of in that time is closed.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_PING_INTERVAL",
+        default_value = shown(LimitsConfig::default().ping_interval),
+        value_parser = humantime::parse_duration
+    ))]
+    pub ping_interval: Duration,
     /// Most connections of one address, trusted proxies excepted [default: a quarter of `max-connections`].
     #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS"))]
     pub client_connections: Option<usize>,
@@ -101,6 +108,7 @@ impl Default for LimitsConfig {
             body_grace: Duration::from_secs(5),
             write_timeout: Duration::from_secs(30),
             half_close_timeout: Duration::from_secs(5),
+            ping_interval: Duration::from_secs(20),
             client_connections: None,
             client_sessions: None,
             max_session_bytes: None,
@@ -119,7 +127,7 @@ impl LimitsConfig {
         &self,
         moment: &std::ops::RangeInclusive<Duration>,
         body: usize,
-    ) -> [(&'static str, bool, &'static str); 11] {
+    ) -> [(&'static str, bool, &'static str); 12] {
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let share = |share: Option<usize>| share.is_none_or(|share| share >= 1);
@@ -140,6 +148,11 @@ impl LimitsConfig {
             (
                 "half-close-timeout",
                 moment.contains(&self.half_close_timeout),
+                duration,
+            ),
+            (
+                "ping-interval",
+                moment.contains(&self.ping_interval),
                 duration,
             ),
             (

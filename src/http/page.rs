@@ -1,26 +1,81 @@
-//! `/`: a page for people that says what the service is and how to call it.
+//! `/`: the page for people, with its style sheet and its scripts. All of it is in the program.
+//!
+//! Browsers ask again each time, and get 304 as long as the program is the same.
 
+use super::problems::problem::Problem;
 use super::security_headers::PAGE_POLICY;
-use axum::http::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE};
-use axum::response::IntoResponse;
+use axum::extract::Path;
+use axum::extract::rejection::PathRejection;
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, IF_NONE_MATCH,
+};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
 
-/// The page.
-pub async fn index() -> impl IntoResponse {
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// A file of the page: its name, media type and text.
+type File = (&'static str, &'static str, &'static str);
+
+macro_rules! file {
+    ($name:literal, $media_type:ident) => {
+        (
+            $name,
+            $media_type,
+            include_str!(concat!("../../web/", $name)),
+        )
+    };
+}
+
+const INDEX: File = file!("index.html", HTML);
+
+const FILES: [File; 12] = [
+    file!("page.css", CSS),
+    file!("main.js", SCRIPT),
+    file!("api.js", SCRIPT),
+    file!("box.js", SCRIPT),
+    file!("chart.js", SCRIPT),
+    file!("clip.js", SCRIPT),
+    file!("problems.js", SCRIPT),
+    file!("run.js", SCRIPT),
+    file!("save.js", SCRIPT),
+    file!("stage.js", SCRIPT),
+    file!("stream.js", SCRIPT),
+    file!("video.js", SCRIPT),
+];
+
+/// `/`.
+pub async fn index(headers: HeaderMap) -> Response {
+    respond(INDEX, &headers)
+}
+
+/// `/page/{file}`.
+pub async fn asset(
+    path: Result<Path<String>, PathRejection>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let Path(path) = path.map_err(|_| Problem::route_not_found())?;
+    let file = FILES.iter().find(|(name, ..)| *name == path);
+    let file = file.ok_or_else(Problem::route_not_found)?;
+    Ok(respond(*file, &headers))
+}
+
+fn respond((_, media_type, text): File, headers: &HeaderMap) -> Response {
+    let tag = format!("\"{:032x}\"", xxhash_rust::xxh3::xxh3_128(text.as_bytes()));
+    let known = headers
+        .get(IF_NONE_MATCH)
+        .and_then(|value| value.to_str().ok());
+    let is_known = known.is_some_and(|known| known.contains(&tag));
     let headers = [
-        (CONTENT_TYPE, "text/html; charset=utf-8"),
-        (CONTENT_SECURITY_POLICY, PAGE_POLICY),
+        (CONTENT_TYPE, media_type.to_owned()),
+        (CONTENT_SECURITY_POLICY, PAGE_POLICY.to_owned()),
+        (CACHE_CONTROL, "no-cache".to_owned()),
+        (ETAG, tag),
     ];
-    (headers, include_str!("page.html"))
-}
-
-/// Its style sheet.
-pub async fn style() -> impl IntoResponse {
-    let headers = [(CONTENT_TYPE, "text/css; charset=utf-8")];
-    (headers, include_str!("page.css"))
-}
-
-/// Its script.
-pub async fn script() -> impl IntoResponse {
-    let headers = [(CONTENT_TYPE, "text/javascript; charset=utf-8")];
-    (headers, include_str!("page.js"))
+    match is_known {
+        true => (StatusCode::NOT_MODIFIED, headers).into_response(),
+        false => (headers, text).into_response(),
+    }
 }

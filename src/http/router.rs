@@ -13,6 +13,8 @@ use super::metrics::layer::count_request;
 use super::problems::problem::Problem;
 use super::request_id::{REQUEST_ID, remove_unusable_id};
 use super::request_log::log_request;
+#[cfg(feature = "eval")]
+use super::sample_clips;
 use super::security_headers::secure;
 use super::state::AppState;
 use super::{docs, page};
@@ -69,10 +71,14 @@ fn routes(state: &AppState) -> Router<AppState> {
     let (sessions, _) = api::sessions().split_for_parts();
     let (metrics, _) = api::metrics().split_for_parts();
     let (probes, _) = api::probes().split_for_parts();
-    Router::new()
+    let pages = Router::new()
         .route("/", get(page::index))
-        .route("/page.css", get(page::style))
-        .route("/page.js", get(page::script))
+        .route("/page/{file}", get(page::asset));
+    #[cfg(feature = "eval")]
+    let pages = pages
+        .route("/sample/{clip}/clip.json", get(sample_clips::view))
+        .route("/sample/{clip}/{frame}", get(sample_clips::frame));
+    pages
         .route("/openapi.json", get(docs::document))
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))

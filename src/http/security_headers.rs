@@ -12,9 +12,9 @@ use axum::response::Response;
 const STRICT: &str =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// The page at `/`: its own style sheet and script.
+/// The page at `/`: its own style sheet, scripts and pictures, files that the user opens, and calls to this service.
 pub const PAGE_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
-    script-src 'self'; style-src 'self'; img-src data:";
+    script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src blob:; connect-src 'self'";
 
 /// Swagger UI: its own files, styles within its elements, and calls to this service.
 pub const DOCS_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \

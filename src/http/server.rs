@@ -9,6 +9,7 @@ use super::auth::keys::ApiKeys;
 use super::client::Peer;
 use super::config::Config;
 use super::config_validation::ConfigError;
+use super::connection_hold::ConnectionHold;
 use super::connection_io::ConnectionIo;
 use super::connections::{Connections, NoRoom};
 use super::forwarded::is_trusted;
@@ -25,7 +26,6 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use std::io::{self, Write};
 use std::net::SocketAddr;
@@ -142,12 +142,12 @@ impl Application {
             extra,
         } = self;
         let config = &state.config;
-        let graceful = GracefulShutdown::new();
+        let (ending, _) = watch::channel(false);
         let (keep_alive, cut_off) = watch::channel(());
         let sweeper = tokio::spawn(sweep(state.clone()));
         {
             let service = router(state.clone(), extra);
-            let accepting = accept(&listener, config, service, &graceful, cut_off);
+            let accepting = accept(&listener, config, service, &ending, cut_off);
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
@@ -163,7 +163,9 @@ impl Application {
         }
         drop(listener);
         sweeper.abort();
-        let ended = timeout(config.shutdown_timeout, graceful.shutdown()).await;
+        ending.send_replace(true);
+        // Each connection, and each stream that took one over, holds a receiver.
+        let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
         ended.is_ok()
     }
@@ -174,7 +176,7 @@ async fn accept(
     listener: &TcpListener,
     config: &Config,
     service: Router,
-    graceful: &GracefulShutdown,
+    ending: &watch::Sender<bool>,
     cut_off: watch::Receiver<()>,
 ) {
     let limits = &config.limits;
@@ -219,7 +221,9 @@ async fn accept(
             limits.write_timeout,
             limits.half_close_timeout,
         );
-        let service = TowerToHyperService::new(service.clone().layer(Extension(Peer(peer))));
+        let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
+        let service = service.clone().layer(Extension(Peer(peer)));
+        let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
         let watched = service_fn(move |request: Request<Incoming>| {
             let activity = activity.clone();
             let request = request.map(|body| activity.receive(Body::new(body)));
@@ -227,19 +231,7 @@ async fn accept(
             async move { answer.await.map(|answer| activity.answer(answer)) }
         });
         let connection = builder.serve_connection(TokioIo::new(io), watched);
-        let connection = graceful.watch(connection);
-        let mut cut_off = cut_off.clone();
-        tokio::spawn(async move {
-            let shed = permit.activity.clone();
-            let _permit = permit;
-            tokio::select! {
-                result = connection => if let Err(error) = result {
-                    tracing::debug!(%error, "connection ended");
-                },
-                () = shed.shed.notified() => tracing::debug!("idle connection closed for another"),
-                _ = cut_off.changed() => tracing::warn!("connection cut off"),
-            }
-        });
+        tokio::spawn(hold.serve(connection.with_upgrades()));
     }
 }
 

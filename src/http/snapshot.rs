@@ -68,7 +68,7 @@ pub async fn get(
     let client = state.clients.account(&client).request()?;
     let mut charge = ByteCharge::new(&state.uploads, client.bytes());
     let queue = state.admission.enter(client.lane(), Box::new(client))?;
-    let permit = session.enter()?;
+    let permit = session.visit()?;
     let keys = state.access.snapshots.clone();
     let take =
         move |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot(&keys));

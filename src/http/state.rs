@@ -6,6 +6,7 @@ use super::config::Config;
 use super::idempotency::IdempotencyStore;
 use super::metrics::registry::Metrics;
 use super::saturation::Saturation;
+use super::stream::open_streams::OpenStreams;
 use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,6 +35,8 @@ pub struct Shared {
     pub metrics: Metrics,
     /// The answers to requests with an idempotency key.
     pub opened: IdempotencyStore,
+    /// The open streams.
+    pub streams: OpenStreams,
     /// Whether `/readyz` has found the queue full.
     pub saturation: Saturation,
     clock: Clock,
@@ -69,6 +72,7 @@ impl AppState {
             access,
             metrics: Metrics::new(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
+            streams: OpenStreams::default(),
             saturation: Saturation::default(),
             clock,
             draining: AtomicBool::new(false),

@@ -2,6 +2,7 @@
 
 use super::advance::{Answered, NextFrames};
 use super::answer::{Answer, replayed_header};
+use super::frame_order::wait_for_turn;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
@@ -48,6 +49,7 @@ operation_problems!(
     &[
         Kind::MissingBox,
         Kind::FrameOutOfOrder,
+        Kind::NotInOrder,
         Kind::FrameDiffers,
         Kind::FrameSizeMismatch,
         Kind::InvalidBox,
@@ -103,7 +105,10 @@ pub async fn put(
         number: settings.frame.map(|number| number.0),
         files: request.upload.files,
         correction: Some(target.into()),
+        kept: 0,
+        sees: false,
     };
+    wait_for_turn(&request.permit, next.number).await?;
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
     let correct =
@@ -113,6 +118,7 @@ pub async fn put(
     let Answered {
         estimates,
         replayed,
+        ..
     } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
     let answer = Json(Answer::from(estimates[0])).into_response();
     Ok(replayed_header(replayed, answer))

@@ -24,7 +24,11 @@ impl Format {
         }
     }
 
-    pub(super) fn encode(self, picture: &RgbImage) -> ImageResult<Vec<u8>> {
+    /// The bytes of a file with this picture.
+    ///
+    /// # Errors
+    /// What the encoder says.
+    pub fn encode(self, picture: &RgbImage) -> ImageResult<Vec<u8>> {
         let mut bytes = Vec::new();
         match self {
             Format::Jpeg => picture

@@ -29,6 +29,7 @@ mod owner;
 mod registry;
 mod replay;
 mod session;
+mod short_id;
 mod snapshot;
 mod state;
 mod work_limit;
@@ -43,9 +44,8 @@ pub use mac::{MAC_BYTES, MacKeys};
 pub use owner::Owner;
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
-pub use session::{
-    Lease, LockedSession, Session, SessionBusy, SessionClosed, SessionPermit, short_id,
-};
+pub use session::{Lease, LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
+pub use short_id::short_id;
 pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
 pub use state::{SessionState, StepError};
 pub use work_limit::{Stopped, WorkLimit, WorkMeter};

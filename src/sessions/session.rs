@@ -7,13 +7,18 @@
 use super::admission::Held;
 use super::clock::Clock;
 use super::owner::Owner;
+use super::short_id::short_id;
 use super::state::SessionState;
 use crate::tracker::{Estimate, FrameFormat, Params};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
-use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard, OwnedSemaphorePermit, Semaphore, watch};
+use tokio::time::timeout;
 use uuid::Uuid;
+
+/// How many frames a numbered one may be ahead of its turn.
+const MAX_EARLY: u64 = 16;
 
 /// All permits of the session are taken; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -48,8 +53,10 @@ pub struct Session {
     max_requests: usize,
     /// The place of the session in its client's quota.
     _held: Held,
-    /// The last answer, to be read without waiting for the lock.
-    latest: Mutex<Estimate>,
+    /// The last answer, to be read and waited for without the lock.
+    latest: watch::Sender<Estimate>,
+    /// Requests with frames at this session.
+    frame_requests: AtomicUsize,
     clock: Clock,
     idle: Duration,
     /// When the session expires, by its clock.
@@ -57,7 +64,7 @@ pub struct Session {
     closed: AtomicBool,
     /// Called when the session is freed.
     #[cfg(test)]
-    pub(super) on_drop: Mutex<Option<Box<dyn FnOnce() + Send>>>,
+    pub(super) on_drop: std::sync::Mutex<Option<Box<dyn FnOnce() + Send>>>,
 }
 
 #[cfg(test)]
@@ -70,10 +77,7 @@ impl std::fmt::Debug for Session {
 #[cfg(test)]
 impl Drop for Session {
     fn drop(&mut self) {
-        let on_drop = self
-            .on_drop
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner);
+        let on_drop = self.on_drop.get_mut().expect("no probe panics");
         on_drop.take().into_iter().for_each(|probe| probe());
     }
 }
@@ -94,7 +98,8 @@ impl Session {
             source_size: state.tracker().source_size(),
             frame_format: state.tracker().frame_format(),
             params: state.tracker().params().clone(),
-            latest: Mutex::new(state.tracker().estimate()),
+            latest: watch::Sender::new(state.tracker().estimate()),
+            frame_requests: AtomicUsize::new(0),
             state: Arc::new(AsyncMutex::new(state)),
             permits: Arc::new(Semaphore::new(max_requests)),
             max_requests,
@@ -104,7 +109,7 @@ impl Session {
             expires_ms: AtomicU64::new(milliseconds(first)),
             closed: AtomicBool::new(false),
             #[cfg(test)]
-            on_drop: Mutex::default(),
+            on_drop: std::sync::Mutex::default(),
         })
     }
 
@@ -140,7 +145,7 @@ impl Session {
 
     /// The last answer.
     pub fn latest(&self) -> Estimate {
-        *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+        *self.latest.borrow()
     }
 
     /// When the session expires unless a frame comes, by its clock.
@@ -168,25 +173,30 @@ impl Session {
         self.closed.store(true, Ordering::Release);
     }
 
-    /// Takes a permit of the session. That alone does not keep the session alive for longer.
+    /// Takes a permit of the session, for frames. That alone does not keep the session alive for longer.
     ///
     /// # Errors
     /// All permits are taken.
     pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+        let mut permit = self.visit()?;
+        permit.has_frames = true;
+        permit.overlaps = self.frame_requests.fetch_add(1, Ordering::AcqRel) > 0;
+        Ok(permit)
+    }
+
+    /// Takes a permit of the session, to look at it.
+    ///
+    /// # Errors
+    /// All permits are taken.
+    pub fn visit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
         let permit = self.permits.clone().try_acquire_owned();
         Ok(SessionPermit {
             session: self.clone(),
+            has_frames: false,
+            overlaps: false,
             _permit: permit.map_err(|_| SessionBusy)?,
         })
     }
-}
-
-/// The beginning of an id, for the log.
-pub fn short_id(id: Uuid) -> String {
-    let mut text = id.simple().to_string();
-    text.truncate(8);
-    text.push('…');
-    text
 }
 
 fn milliseconds(time: Duration) -> u64 {
@@ -197,6 +207,8 @@ fn milliseconds(time: Duration) -> u64 {
 #[derive(Debug)]
 pub struct SessionPermit {
     session: Arc<Session>,
+    has_frames: bool,
+    overlaps: bool,
     _permit: OwnedSemaphorePermit,
 }
 
@@ -204,6 +216,25 @@ impl SessionPermit {
     /// The session.
     pub fn session(&self) -> &Arc<Session> {
         &self.session
+    }
+
+    /// Whether another request with frames was at the session when this one came.
+    pub fn overlaps(&self) -> bool {
+        self.overlaps
+    }
+
+    /// Waits for the turn of frame `number` where it comes a little early, at most so long. The last free place of the
+    /// session is left to the frame whose turn it is.
+    pub async fn wait_for_turn(&self, number: u64, patience: Duration) {
+        let session = &self.session;
+        let early = number.saturating_sub(session.latest().frame + 1);
+        if !(1..=MAX_EARLY).contains(&early) || session.permits.available_permits() == 0 {
+            return;
+        }
+        let mut latest = session.latest.subscribe();
+        let turn = latest.wait_for(|latest| latest.frame + 1 >= number);
+        // Whoever came too early is told so by its number.
+        let _ = timeout(patience, turn).await;
     }
 
     /// Waits for the session, in order of arrival.
@@ -219,6 +250,14 @@ impl SessionPermit {
             state,
             permit: self,
         })
+    }
+}
+
+impl Drop for SessionPermit {
+    fn drop(&mut self) {
+        if self.has_frames {
+            self.session.frame_requests.fetch_sub(1, Ordering::AcqRel);
+        }
     }
 }
 
@@ -250,9 +289,6 @@ impl Drop for LockedSession {
             return;
         }
         let latest = self.state.tracker().estimate();
-        *session
-            .latest
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner) = latest;
+        session.latest.send_replace(latest);
     }
 }

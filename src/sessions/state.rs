@@ -4,13 +4,13 @@ use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::work_limit::{Stopped, WorkMeter};
-use crate::tracker::{Estimate, Frame, Rect, Tracker, TrackerError};
+use crate::tracker::{BagEntry, Estimate, Frame, Rect, Seen, Tracker, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug)]
 pub struct SessionState {
     tracker: Tracker,
-    /// The answers to the last request, oldest first; at least one.
+    /// The last answers, oldest first: those to the last request, and more where that asked for it.
     recent: Vec<Answered>,
 }
 
@@ -63,6 +63,11 @@ impl SessionState {
         SessionSnapshot::encode(&self.tracker, &self.recent, keys)
     }
 
+    /// The bag, for people to look at.
+    pub fn bag(&self) -> Vec<BagEntry> {
+        self.tracker.bag()
+    }
+
     /// The tracker.
     pub(super) fn tracker(&self) -> &Tracker {
         &self.tracker
@@ -84,7 +89,25 @@ impl SessionState {
         replay::decide(&self.recent, number, posted, given)
     }
 
-    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on.
+    /// The stored answers from frame `number` on, oldest first; none where one of them is not stored any more. All have
+    /// been answered from the next frame on.
+    pub fn answers_from(&self, number: u64) -> Option<Vec<Estimate>> {
+        let next = self.tracker.estimate().frame + 1;
+        let count = usize::try_from(next.checked_sub(number)?).ok()?;
+        let first = self.recent.len().checked_sub(count)?;
+        let stored = &self.recent[first..];
+        Some(stored.iter().map(|answered| answered.estimate).collect())
+    }
+
+    /// Stores new answers, and of those before them as many as make `kept` together.
+    fn store(&mut self, answered: Vec<Answered>, kept: usize) {
+        let older = kept.saturating_sub(answered.len()).min(self.recent.len());
+        self.recent.drain(..self.recent.len() - older);
+        self.recent.extend(answered);
+    }
+
+    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on. The answers
+    /// are stored, and at least the last `kept`. `seen` becomes what the tracker saw in the last frame.
     ///
     /// # Errors
     /// The tracker refused a frame, or the work was stopped. The session is unchanged.
@@ -92,6 +115,8 @@ impl SessionState {
         &mut self,
         frames: &[(Fingerprint, Frame)],
         meter: &mut WorkMeter,
+        kept: usize,
+        mut seen: Option<&mut Seen>,
     ) -> Result<Vec<Estimate>, StepError> {
         // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
         let before = (frames.len() > 1).then(|| self.tracker.clone());
@@ -99,7 +124,15 @@ impl SessionState {
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {
             let going_on = meter.check().map_err(StepError::Stopped);
             let refused = |error| StepError::Refused { index, error };
-            match going_on.and_then(|()| self.tracker.step(frame).map_err(refused)) {
+            let mut step = || match seen.as_deref_mut() {
+                Some(seen) => {
+                    let (estimate, saw) = self.tracker.step_seeing(frame)?;
+                    *seen = saw;
+                    Ok(estimate)
+                }
+                None => self.tracker.step(frame),
+            };
+            match going_on.and_then(|()| step().map_err(refused)) {
                 Ok(estimate) => answered.push(Answered {
                     fingerprint: *fingerprint,
                     given: None,
@@ -115,12 +148,12 @@ impl SessionState {
         }
         let estimates = answered.iter().map(|answered| answered.estimate).collect();
         if !answered.is_empty() {
-            self.recent = answered;
+            self.store(answered, kept);
         }
         Ok(estimates)
     }
 
-    /// Takes the next frame with its box given by the user.
+    /// Takes the next frame with its box given by the user. The answer is stored, and at least the last `kept`.
     ///
     /// # Errors
     /// The tracker refused the frame or the box. The session is unchanged.
@@ -129,13 +162,15 @@ impl SessionState {
         fingerprint: Fingerprint,
         frame: &Frame,
         given: Rect,
+        kept: usize,
     ) -> Result<Estimate, TrackerError> {
         let estimate = self.tracker.retarget(frame, given)?;
-        self.recent = vec![Answered {
+        let answered = Answered {
             fingerprint,
             given: Some(given),
             estimate,
-        }];
+        };
+        self.store(vec![answered], kept);
         Ok(estimate)
     }
 }

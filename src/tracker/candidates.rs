@@ -201,9 +201,14 @@ impl Candidates {
         self.samples.truncate(count);
     }
 
+    /// The distances of particle `index` to the entries of the bag.
+    pub fn distances_of(&self, index: usize) -> &[f64] {
+        &self.distances[index * self.entries()..][..self.entries()]
+    }
+
     /// What particle `index` says of itself; the running mean is that of the distance to the first entry.
     pub fn evidence(&self, index: usize, mean_first_distance: f64) -> Evidence {
-        let distances = &self.distances[index * self.entries()..][..self.entries()];
+        let distances = self.distances_of(index);
         Evidence {
             first_distance: distances[0],
             mean_first_distance,

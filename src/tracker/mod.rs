@@ -40,6 +40,7 @@
 //! ```
 
 mod appearance;
+mod bag_view;
 mod candidates;
 mod classifier;
 mod confidence;
@@ -56,6 +57,7 @@ mod motion;
 mod observe;
 mod params;
 mod scale;
+mod seen;
 mod snapshot;
 mod start;
 mod state;
@@ -66,6 +68,7 @@ mod weights;
 mod workspace;
 
 pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
+pub use bag_view::{BagEntry, VectorView};
 pub use confidence::score::{Evidence, PREDICTORS, ScoreModel};
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
@@ -79,4 +82,5 @@ pub(crate) use image::{area_average::area_average, ycbcr};
 pub use input::LEAST_BOX_SIDE;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
+pub use seen::Seen;
 pub use tracker::Tracker;

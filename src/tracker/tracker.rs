@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::tracker::bag_view::BagEntry;
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
@@ -9,6 +10,7 @@ use crate::tracker::image::frame::{Frame, FrameFormat};
 use crate::tracker::image::rect::Rect;
 use crate::tracker::input;
 use crate::tracker::params::table::Params;
+use crate::tracker::seen::Seen;
 use crate::tracker::snapshot;
 use crate::tracker::state::State;
 use crate::tracker::workspace;
@@ -55,6 +57,21 @@ impl Tracker {
         let (estimate, evidence) = workspace::with(|workspace| self.state.step(&frame, workspace));
         self.evidence = Some(evidence);
         Ok(estimate)
+    }
+
+    /// Like [`step`](Self::step), and tells what the tracker saw.
+    ///
+    /// # Errors
+    /// As for [`step`](Self::step).
+    pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
+        let frame = self.checked(frame)?;
+        let (estimate, evidence, seen) = workspace::with(|workspace| {
+            let (estimate, evidence) = self.state.step(&frame, workspace);
+            let seen = Seen::of(&self.state, &workspace.candidates);
+            (estimate, evidence, seen)
+        });
+        self.evidence = Some(evidence);
+        Ok((estimate, seen))
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.
@@ -104,6 +121,13 @@ impl Tracker {
         let state = &self.state;
         let boxes = state.particles.iter().map(|it| state.target_of(it));
         boxes.zip(state.weights.iter().copied())
+    }
+
+    /// The entries of the bag, oldest first, for people to look at.
+    pub fn bag(&self) -> Vec<BagEntry> {
+        let entries = self.state.bag.entries().iter();
+        let view = |entry| BagEntry::of(entry, &self.state.params);
+        entries.map(view).collect()
     }
 
     /// The parameters of this tracker.

@@ -1,26 +1,70 @@
 //! Many requests at once.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
 use reqwest::StatusCode;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn posts_at_once_on_one_session_are_served_one_after_the_other() {
+async fn numbered_posts_at_once_are_tracked_in_the_order_of_their_numbers() {
     let app = TestApplication::start_with(|config| config.session_queue = 32).await;
-    let id = app.open().await;
-    let posts = (1..=20).map(|t| app.post_frame(&id, pictures::png(t)));
-    let responses = futures_util::future::join_all(posts).await;
-    let mut frames = Vec::new();
-    for response in responses {
-        let answer = expect(response, StatusCode::OK).await;
-        frames.push(answer["frame"].as_u64().unwrap());
+    let (id, other) = (app.open().await, app.open().await);
+    // The last comes first.
+    let posts = (1..=16).rev();
+    let posts = posts.map(|t| app.post_numbered(&id, t, pictures::png(t as u32)));
+    let mut together = Vec::new();
+    for response in futures_util::future::join_all(posts).await {
+        together.push(expect(response, StatusCode::OK).await);
     }
-    frames.sort_unstable();
-    assert_eq!(frames, (1..=20).collect::<Vec<u64>>());
-    assert_eq!(app.frames_of(&id).await, 21);
+    together.reverse();
+    let mut alone = Vec::new();
+    for t in 1..=16 {
+        let response = app.post_frame(&other, pictures::png(t)).await;
+        alone.push(expect(response, StatusCode::OK).await);
+    }
+    assert_eq!(together, alone);
+}
+
+#[tokio::test]
+async fn an_early_frame_waits_for_its_turn_for_a_bounded_time() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let started = Instant::now();
+    let alone = app.post_numbered(&id, 2, pictures::png(2)).await;
+    expect_problem(alone, "frame-out-of-order").await;
+    assert!(started.elapsed() > Duration::from_secs(1), "it waited");
+    let far = app.post_numbered(&id, 99, pictures::png(2)).await;
+    expect_problem(far, "frame-out-of-order").await;
+    let early = app.post_numbered(&id, 2, pictures::png(2));
+    let due = async {
+        // A post without a number tells whether the early one is there.
+        let probe = async || app.post_frame(&id, b"no image".to_vec()).await;
+        while probe().await.status() != StatusCode::CONFLICT {}
+        app.post_numbered(&id, 1, pictures::png(1)).await
+    };
+    let (early, due) = tokio::join!(early, due);
+    assert_eq!(expect(due, StatusCode::OK).await["frame"], 1);
+    assert_eq!(expect(early, StatusCode::OK).await["frame"], 2);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn unnumbered_posts_at_once_are_refused_but_for_the_first() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let frame = pictures::png(1);
+    let target = format!("/sessions/{id}/frames");
+    let mut first = RawConnection::hold(app.address, "POST", &target, frame.len()).await;
+    let second = app.post_frame(&id, pictures::png(2)).await;
+    expect_problem(second, "not-in-order").await;
+    let corrected = app.put_target(&id, pictures::png(2), &[("box", BOX)]).await;
+    expect_problem(corrected, "not-in-order").await;
+    first.send(&frame).await;
+    assert!(first.read_to_end().await.starts_with("HTTP/1.1 200"));
+    // The next one finds nobody there.
+    let next = app.post_frame(&id, pictures::png(2)).await;
+    assert_eq!(expect(next, StatusCode::OK).await["frame"], 2);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -51,9 +95,9 @@ async fn a_session_takes_a_bounded_number_of_requests_and_frees_their_places() {
     let app = TestApplication::start_with(|config| config.session_queue = 2).await;
     let (id, other) = (app.open().await, app.open().await);
     let frame = pictures::png(1);
-    let target = format!("/sessions/{id}/frames");
-    let mut first = RawConnection::hold(app.address, "POST", &target, frame.len()).await;
-    let mut second = RawConnection::hold(app.address, "POST", &target, frame.len()).await;
+    let target = |number: u32| format!("/sessions/{id}/frames?frame={number}");
+    let mut first = RawConnection::hold(app.address, "POST", &target(1), frame.len()).await;
+    let mut second = RawConnection::hold(app.address, "POST", &target(2), frame.len()).await;
     expect_problem(app.post_frame(&id, frame.clone()).await, "session-busy").await;
     // Looking at it and other sessions go on.
     assert_eq!(app.frames_of(&id).await, 1);

@@ -293,3 +293,29 @@ async fn a_bad_frame_in_a_batch_is_named_and_none_is_tracked() {
         assert_eq!(app.frames_of(&id).await, 1);
     }
 }
+
+#[tokio::test]
+async fn a_file_that_curl_sent_as_text_is_recognised() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let frame = pictures::png(1);
+    let stripped: Vec<u8> = frame
+        .iter()
+        .copied()
+        .filter(|byte| !b"\0\r\n".contains(byte))
+        .collect();
+    let send = async |body: Vec<u8>| {
+        let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+        let request = request.header("content-type", "application/x-www-form-urlencoded");
+        request.body(body).send().await.unwrap()
+    };
+    let problem = expect_problem(send(stripped).await, "frame-damaged").await;
+    assert!(
+        problem["detail"]
+            .as_str()
+            .unwrap()
+            .contains("--data-binary")
+    );
+    // This is how curl labels a whole file.
+    expect(send(frame).await, StatusCode::OK).await;
+}

@@ -2,6 +2,7 @@
 
 mod access;
 mod application;
+mod bag;
 mod binary;
 mod bombs;
 mod capacity;
@@ -19,6 +20,7 @@ mod log;
 mod metrics;
 mod openapi;
 mod origins;
+mod page;
 mod pictures;
 mod problems;
 mod process;
@@ -26,5 +28,8 @@ mod provoke;
 mod quotas;
 mod raw;
 mod replay;
+mod slow_line;
 mod snapshots;
+mod stream;
+mod stream_client;
 mod uploads;

@@ -103,7 +103,7 @@ async fn every_answer_tells_browsers_what_it_may_do() {
     let app = TestApplication::start().await;
     for path in [
         "/",
-        "/page.js",
+        "/page/main.js",
         "/docs/",
         "/openapi.json",
         "/healthz",
@@ -153,7 +153,10 @@ async fn the_pages_keep_to_their_policies() {
             assert!(!source.starts_with("http"), "{path}: {source}");
         }
     }
-    for (path, media_type) in [("/page.js", "text/javascript"), ("/page.css", "text/css")] {
+    for (path, media_type) in [
+        ("/page/main.js", "text/javascript"),
+        ("/page/page.css", "text/css"),
+    ] {
         let response = app.get(path).await;
         assert_eq!(response.status(), StatusCode::OK);
         let got = response.headers()["content-type"].to_str().unwrap();

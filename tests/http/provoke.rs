@@ -136,6 +136,7 @@ impl Attempt {
                 self.path = template.replace("{id}", "67e55044-10b1-426f-9247-bb680e5fe0c8");
             }
             "body-timeout" => self.without_body = true,
+            "frame-out-of-order" if template.ends_with("/stream") => self.query.push(("from", "9")),
             "frame-out-of-order" => self.query.push(("frame", "9")),
             "frame-differs" => {
                 self.query.push(("frame", "0"));
@@ -155,7 +156,7 @@ impl Attempt {
             }
             "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
             "request-too-costly" => self.frames = 2,
-            "session-busy" | "quota-exceeded" => {
+            "session-busy" | "quota-exceeded" | "not-in-order" => {
                 let id = self.id.as_ref().unwrap();
                 let target = format!("/sessions/{id}/frames");
                 let held = RawConnection::hold(self.app.address, "POST", &target, 1000);
@@ -176,6 +177,14 @@ impl Attempt {
         let mut request = self
             .app
             .request(self.method.clone(), &self.path, &self.query);
+        if self.path.ends_with("/stream") {
+            // What opens a WebSocket; the key may be any 16 bytes.
+            request = request
+                .header("connection", "upgrade")
+                .header("upgrade", "websocket")
+                .header("sec-websocket-version", "13")
+                .header("sec-websocket-key", "AAAAAAAAAAAAAAAAAAAAAA==");
+        }
         if self.without_body {
             let never = futures_util::stream::pending::<Result<Vec<u8>, std::io::Error>>();
             return request

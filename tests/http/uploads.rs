@@ -43,10 +43,11 @@ async fn the_bodies_of_all_requests_together_are_bounded_by_what_has_arrived() {
         config.limits.client_upload_bytes = Some(200_000);
     });
     let app = app.await;
-    let id = app.open().await;
-    let target = format!("/sessions/{id}/frames");
+    let (id, other, third) = (app.open().await, app.open().await, app.open().await);
+    let target = format!("/sessions/{other}/frames");
     let post = || app.post_frame(&id, pictures::png(1));
     let mut held = RawConnection::hold(app.address, "POST", &target, 49_000).await;
+    let target = format!("/sessions/{third}/frames");
     let mut more = RawConnection::hold(app.address, "POST", &target, 49_000).await;
     expect(post().await, StatusCode::OK).await;
     held.send([7; 48_000]).await;

@@ -1,11 +1,13 @@
 //! Who makes a request.
 
+use super::token::SessionToken;
 use crate::http::problems::problem::Problem;
 use crate::sessions::Owner;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use std::io;
 use std::sync::Arc;
+use std::time::SystemTime;
 use uuid::Uuid;
 
 /// Who makes a request, as the layer [`authenticate`](super::layer::authenticate) has found.
@@ -14,18 +16,32 @@ pub struct Caller {
     owner: Owner,
     /// The only session that may be used, where the request came with a session token.
     only: Option<Uuid>,
+    /// When the token ends, where the request came with one.
+    until: Option<SystemTime>,
 }
 
 impl Caller {
     /// Whoever has the key of this owner.
     pub fn with_key(owner: Owner) -> Self {
-        Self { owner, only: None }
+        Self {
+            owner,
+            only: None,
+            until: None,
+        }
     }
 
-    /// Whoever has a token for this session of this owner.
-    pub fn with_token(owner: Owner, session: Uuid) -> Self {
-        let only = Some(session);
-        Self { owner, only }
+    /// Whoever has this token.
+    pub fn with_token(token: SessionToken) -> Self {
+        Self {
+            owner: token.owner,
+            only: Some(token.session),
+            until: Some(token.expires),
+        }
+    }
+
+    /// Whether the caller came with a token that has ended by `now`.
+    pub fn has_ended(&self, now: SystemTime) -> bool {
+        self.until.is_some_and(|until| now >= until)
     }
 
     /// Whose sessions these are.

@@ -1,4 +1,7 @@
 //! Finds out who makes a request, from its header `Authorization: Bearer …`.
+//!
+//! A page cannot set that header where it opens a stream. There a session token may stand among the protocols that it
+//! offers (`Sec-WebSocket-Protocol`). An API key may not: it has no business in a page.
 
 use super::caller::Caller;
 use super::token;
@@ -6,7 +9,7 @@ use crate::http::client::Client;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
-use axum::http::header::{AUTHORIZATION, WWW_AUTHENTICATE};
+use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -59,12 +62,13 @@ fn unauthorized() -> Response {
 }
 
 fn caller(state: &AppState, headers: &HeaderMap) -> Option<Caller> {
-    let (keys, presented) = (&state.access.keys, bearer(headers));
+    let keys = &state.access.keys;
+    let presented = bearer(headers).or_else(|| offered_token(headers));
     if let Some(text) = presented.filter(|text| text.starts_with(token::PREFIX)) {
         let token = state.access.tokens.verify(text, state.now())?;
         // The token ends with its key.
         let has_key = !keys.are_needed() || keys.has_owner(&token.owner);
-        return has_key.then(|| Caller::with_token(token.owner, token.session));
+        return has_key.then(|| Caller::with_token(token));
     }
     match keys.are_needed() {
         true => Some(Caller::with_key(keys.owner(presented?.as_bytes())?)),
@@ -81,4 +85,18 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
     let (scheme, text) = value.to_str().ok()?.split_once(' ')?;
     let is_bearer = scheme.eq_ignore_ascii_case("bearer");
     is_bearer.then(|| text.trim())
+}
+
+/// The session token among the protocols that a page offers.
+fn offered_token(headers: &HeaderMap) -> Option<&str> {
+    if headers.contains_key(AUTHORIZATION) {
+        return None;
+    }
+    let offers = headers.get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+    let offers = offers
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    offers
+        .map(str::trim)
+        .find(|offer| offer.starts_with(token::PREFIX))
 }

@@ -115,6 +115,7 @@ fn example(kind: Kind) -> Problem {
         Kind::SessionNotFound => Problem::session_not_found(),
         Kind::MethodNotAllowed => Problem::method_not_allowed(),
         Kind::BodyTimeout => Problem::body_timeout(),
+        Kind::NotInOrder => Problem::not_in_order(),
         Kind::FrameOutOfOrder => Problem::from(ReplayError::OutOfOrder {
             got: 9,
             expected: 4,

@@ -22,7 +22,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
+    /// A problem of this kind.
+    pub fn new(kind: Kind, detail: impl Into<String>) -> Self {
         Self {
             kind,
             detail: detail.into(),
@@ -111,6 +112,13 @@ impl Problem {
             Kind::MethodNotAllowed,
             "The header `Allow` lists the methods there are.",
         )
+    }
+
+    /// The frame has no number, and came while another request was at the session.
+    pub fn not_in_order() -> Self {
+        let detail = "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each \
+            answer. This one was not tracked.";
+        Self::new(Kind::NotInOrder, detail)
     }
 
     /// The path and query have more bytes than they may.

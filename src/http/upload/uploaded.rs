@@ -6,6 +6,7 @@ use super::settings::{FrameCount, Settings};
 use super::texts::Texts;
 use super::{body, json, multipart};
 use crate::http::clients::RequestPermit;
+use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use crate::http::{snapshot, work};
@@ -14,6 +15,14 @@ use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
 use std::sync::Arc;
+
+/// What curl calls a body, whatever it is.
+const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
+/// Least bytes of a body that is told to have lost some.
+const MIN_STRIPPED: usize = 256;
+
+const STRIPPED: &str =
+    "The file has lost its line breaks and zeros, as `curl -d` does: use `--data-binary @file`.";
 
 /// What a client uploaded.
 #[derive(Debug)]
@@ -70,6 +79,8 @@ impl<S: Settings> Upload<S> {
             if media_type == "application/json" || bytes.starts_with(b"{") {
                 charge.grow(json::DECODED_PER_BYTE * bytes.len())?;
                 json = Some(bytes);
+            } else if media_type == FORM_URLENCODED && is_stripped(&bytes) {
+                return Err(Problem::new(Kind::FrameDamaged, STRIPPED));
             } else if !bytes.is_empty() {
                 fields.files.push(bytes);
             }
@@ -94,6 +105,12 @@ impl<S: Settings> Upload<S> {
         permit.count_frames(upload.files.len())?;
         Ok((upload, queue))
     }
+}
+
+/// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.
+fn is_stripped(bytes: &[u8]) -> bool {
+    let is_lost = |byte: &u8| matches!(byte, 0 | b'\n' | b'\r');
+    bytes.len() >= MIN_STRIPPED && !bytes.iter().any(is_lost)
 }
 
 fn check_files(files: &[Bytes], max_files: usize) -> Result<(), Problem> {

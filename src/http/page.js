@@ -1,1 +1,0 @@
-for (const host of document.querySelectorAll(".host")) host.textContent = location.origin;

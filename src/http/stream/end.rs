@@ -1,0 +1,51 @@
+//! How a stream ends, and what its client is told.
+
+use crate::http::problems::problem::Problem;
+use axum::extract::ws::{CloseFrame, close_code};
+
+/// Close codes from here on are an HTTP status and this.
+const OF_STATUS: u16 = 4000;
+/// Another stream took the place: as a conflict.
+const REPLACED: u16 = OF_STATUS + 409;
+
+/// Why a stream ends.
+#[derive(Debug)]
+pub enum End {
+    /// The client closed it, or has gone.
+    Gone,
+    /// The client has not answered a ping.
+    Silent,
+    /// The service ends.
+    Shutdown,
+    /// A newer stream of the session took its place.
+    Replaced,
+    /// There is nothing to go on with: the session has ended, the token is no longer good, or a message is no message.
+    Problem(Problem),
+}
+
+impl End {
+    /// What the log says.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::Gone => "the client closed it",
+            Self::Silent => "the client is silent",
+            Self::Shutdown => "the service ends",
+            Self::Replaced => "a newer stream took its place",
+            Self::Problem(problem) => problem.kind().slug(),
+        }
+    }
+
+    /// The close frame, where the client still reads.
+    pub fn close_frame(&self) -> Option<CloseFrame> {
+        let code = match self {
+            Self::Gone | Self::Silent => return None,
+            Self::Shutdown => close_code::AWAY,
+            Self::Replaced => REPLACED,
+            Self::Problem(problem) => OF_STATUS + problem.kind().status().as_u16(),
+        };
+        Some(CloseFrame {
+            code,
+            reason: self.reason().into(),
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! Opens a stream.
+
+use super::frame_work::FrameWork;
+use super::session_stream::SessionStream;
+use super::waiting::Waiting;
+use crate::http::auth::caller::Caller;
+use crate::http::client::Client;
+use crate::http::connection_hold::ConnectionHold;
+use crate::http::openapi::problem_responses::{self, problem_responses};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::request_id;
+use crate::http::session_path::SessionPath;
+use crate::http::state::AppState;
+use crate::sessions::{ByteCharge, ReplayError, Session};
+use crate::tracker::Estimate;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{FromRequestParts, Query, Request, State};
+use axum::http::Uri;
+use axum::response::Response;
+use serde::Deserialize;
+use std::io;
+use std::sync::{Arc, Mutex};
+use tokio::time::timeout;
+use tracing::Instrument;
+
+/// The protocol that a client may offer. A page has to offer one beside its token.
+const PROTOCOL: &str = "bagtrack";
+/// Most bytes that a connection reads at once.
+const READ_BYTES: usize = 32 << 10;
+/// Most bytes of answers that wait to be written. They are written as soon as there are any.
+const WRITE_BYTES: usize = 64 << 10;
+/// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
+const BYTES_PER_PIXEL: usize = 4;
+/// And for what stands beside the pixels.
+const BESIDE_BYTES: usize = 256 << 10;
+
+/// The settings of a stream.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct StreamSettings {
+    /// The first frame whose answer the client has not got: the stored answers from it on are sent again.
+    #[param(required = false, nullable = false)]
+    from: Option<u64>,
+    /// Whether a frame that waits is skipped when a newer one comes.
+    #[param(required = false, nullable = false, default = false)]
+    drop: Option<bool>,
+}
+
+struct Problems;
+
+impl utoipa::IntoResponses for Problems {
+    fn responses()
+    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
+        let own = &[
+            Kind::MalformedRequest,
+            Kind::FrameOutOfOrder,
+            Kind::SessionBusy,
+        ];
+        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
+    }
+}
+
+/// Send frames over a WebSocket
+///
+/// A binary message is a frame. A text message before it may give its number or a corrected box: `{"frame": 7}`,
+/// `{"box": [12, 22, 30, 40]}`. With `{"see": true}` the answer has the particles (centre, width and weight of the 200
+/// likeliest) and the votes of the bag's entries. All answers are text messages. The first is `{"next": N}`, the number of the next
+/// frame. Then each frame gets its answer, or a problem document, in order. A problem leaves the session as it was.
+///
+/// Send further frames without waiting for the answers, at most 32. If the line breaks, open the stream again with
+/// `?from=N`, N being the first frame without an answer: the stored answers come again, with `"replayed": true`, and
+/// frames go on with the number `next`. With `drop=true` a frame that waits is skipped for a newer one; `"skipped"` in
+/// an answer counts the frames before it that were.
+///
+/// A page sends its session token as a protocol: `new WebSocket(url, ["bagtrack", token])`. The service closes with
+/// 4000 and the status of a problem (410: the session has expired), 4409 when a newer stream of the session has taken
+/// its place, and 1001 when it ends. A session has one stream at a time.
+#[utoipa::path(
+    get, path = "/sessions/{id}/stream", tag = "sessions", operation_id = "openStream",
+    params(
+        ("id" = Uuid, Path, description = "The session's id"),
+        StreamSettings,
+    ),
+    responses((status = 101, description = "The stream is open"), Problems)
+)]
+pub async fn open(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
+    let request_id = request_id::of(&request);
+    let (mut parts, _) = request.into_parts();
+    let settings = settings(&parts.uri)?;
+    let path = SessionPath::from_request_parts(&mut parts, &state).await?;
+    let session = path.find(&state)?;
+    let upgrade = WebSocketUpgrade::from_request_parts(&mut parts, &state).await;
+    let upgrade = upgrade.map_err(|error| {
+        let detail = format!("{error}. This call opens a WebSocket.");
+        Problem::malformed(detail)
+    })?;
+    let connection = parts.extensions.get::<ConnectionHold>().cloned();
+    let connection = connection.ok_or_else(|| {
+        let error = io::Error::other("the service does not know the connection of a request");
+        Problem::internal(Arc::new(error))
+    })?;
+    let caller = Caller::from_request_parts(&mut parts, &state).await?;
+    let account = state.clients.account(&Client::of(&parts));
+    let max_bytes = max_message_bytes(&state, &session);
+    let mut buffers = ByteCharge::new(&state.uploads, account.bytes());
+    // A message in pieces is there twice: the pieces that have come, and the one that comes.
+    buffers.grow(2 * max_bytes + READ_BYTES + WRITE_BYTES)?;
+    // The stream before this one tracks no further frame.
+    let place = state.streams.take(session.id());
+    let (next, stored) = stand(&state, &session, settings.from).await?;
+    let newest_wins = settings.drop.unwrap_or(false);
+    let stream = SessionStream {
+        work: Arc::new(FrameWork {
+            state,
+            caller,
+            account,
+            session: session.id(),
+            place,
+            waiting: Mutex::new(Waiting::new(newest_wins)),
+            newest_wins,
+        }),
+        connection,
+        buffers,
+        next,
+        stored,
+        request_id,
+        path: parts.uri.path().to_owned(),
+    };
+    let span = tracing::Span::current();
+    Ok(upgrade
+        .protocols([PROTOCOL])
+        .read_buffer_size(READ_BYTES)
+        .write_buffer_size(0)
+        .max_write_buffer_size(WRITE_BYTES)
+        .max_message_size(max_bytes)
+        .max_frame_size(max_bytes)
+        .on_upgrade(move |socket| stream.run(socket).instrument(span)))
+}
+
+fn settings(uri: &Uri) -> Result<StreamSettings, Problem> {
+    let Query(settings) = Query::try_from_uri(uri)
+        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
+    Ok(settings)
+}
+
+/// Most bytes of a message: of one frame.
+fn max_message_bytes(state: &AppState, session: &Session) -> usize {
+    let (width, height) = session.source_size();
+    let pixels = usize::try_from(u64::from(width) * u64::from(height)).unwrap_or(usize::MAX);
+    let usual = pixels
+        .saturating_mul(BYTES_PER_PIXEL)
+        .saturating_add(BESIDE_BYTES);
+    usual.min(state.config.max_frame_bytes)
+}
+
+/// The number of the session's next frame, and its stored answers from frame `from` on. Waits for the frame at work, of
+/// the stream before this one too.
+async fn stand(
+    state: &AppState,
+    session: &Arc<Session>,
+    from: Option<u64>,
+) -> Result<(u64, Vec<Estimate>), Problem> {
+    let waiting = timeout(state.config.work_timeout, session.visit()?.lock());
+    let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
+    let expected = session.latest().frame + 1;
+    let from = from.unwrap_or(expected);
+    let stored = locked.state().answers_from(from);
+    let stored = stored.ok_or(ReplayError::OutOfOrder {
+        got: from,
+        expected,
+    })?;
+    Ok((expected, stored))
+}

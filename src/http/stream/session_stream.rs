@@ -1,0 +1,228 @@
+//! A stream from its first message to its end: reads frames, sends answers, pings.
+
+use super::end::End;
+use super::frame_work::{Done, FrameWork, Given};
+use super::message::{FrameHeader, Hello, StreamAnswer};
+use super::waiting::ArrivedFrame;
+use crate::http::connection_hold::ConnectionHold;
+use crate::http::problems::document::ProblemDocument;
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::sessions::ByteCharge;
+use crate::tracker::Estimate;
+use axum::body::Bytes;
+use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use serde::Serialize;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::{Instant, interval_at, timeout};
+
+/// Time for a client to answer the close.
+const CLOSING: Duration = Duration::from_secs(2);
+
+/// An open stream.
+pub struct SessionStream {
+    /// What its frames have in common.
+    pub work: Arc<FrameWork>,
+    /// The connection that it took over.
+    pub connection: ConnectionHold,
+    /// The memory of the buffers that messages are received in.
+    pub buffers: ByteCharge,
+    /// The number of the next frame.
+    pub next: u64,
+    /// The stored answers that the client asked for.
+    pub stored: Vec<Estimate>,
+    /// The id of the request that opened it, for problems.
+    pub request_id: String,
+    /// The path of that request.
+    pub path: String,
+}
+
+type Answering = Pin<Box<dyn Future<Output = Option<Done>> + Send>>;
+
+/// What the log tells of a stream.
+#[derive(Debug, Default)]
+struct Counts {
+    answered: u64,
+    skipped: u64,
+    refused: u64,
+}
+
+impl SessionStream {
+    /// Serves the stream until it ends.
+    pub async fn run(mut self, mut socket: WebSocket) {
+        self.connection.activity().stream();
+        let started = Instant::now();
+        let mut counts = Counts::default();
+        let mut cut_off = self.connection.clone();
+        let end = tokio::select! {
+            end = self.serve(&mut socket, &mut counts) => end,
+            () = cut_off.cut_off() => return tracing::warn!("stream cut off"),
+        };
+        let Counts {
+            answered,
+            skipped,
+            refused,
+        } = counts;
+        let seconds = started.elapsed().as_secs_f64();
+        let reason = end.reason();
+        tracing::info!(answered, skipped, refused, seconds, reason, "stream ended");
+        let _ = timeout(CLOSING, self.close(socket, end)).await;
+    }
+
+    async fn serve(&mut self, socket: &mut WebSocket, counts: &mut Counts) -> End {
+        match self.exchange(socket, counts).await {
+            Ok(end) => end,
+            // Whoever cannot be written to has gone.
+            Err(_) => End::Gone,
+        }
+    }
+
+    async fn exchange(
+        &mut self,
+        socket: &mut WebSocket,
+        counts: &mut Counts,
+    ) -> Result<End, axum::Error> {
+        send(socket, &Hello { next: self.next }).await?;
+        for estimate in std::mem::take(&mut self.stored) {
+            send(socket, &self.answer(estimate, 0, true)).await?;
+        }
+        let work = self.work.clone();
+        let mut header = Ok(FrameHeader::default());
+        let mut answering: Option<Answering> = None;
+        let period = work.state.config.limits.ping_interval;
+        let mut pings = interval_at(Instant::now() + period, period);
+        let (mut is_heard, mut is_ending) = (true, false);
+        loop {
+            if answering.is_none() && !work.waiting().is_empty() {
+                answering = Some(Box::pin(work.clone().answer_next()));
+            }
+            if answering.is_none() && is_ending {
+                return Ok(End::Shutdown);
+            }
+            let may_come = !is_ending && !work.waiting().is_full();
+            tokio::select! {
+                message = socket.recv(), if may_come => {
+                    is_heard = true;
+                    match message {
+                        None | Some(Ok(Message::Close(_))) => return Ok(End::Gone),
+                        Some(Ok(Message::Text(text))) => header = FrameHeader::parse(&text),
+                        Some(Ok(Message::Binary(file))) => {
+                            let header = std::mem::replace(&mut header, Ok(FrameHeader::default()));
+                            let arrived = header.and_then(|header| self.charged(header, file));
+                            work.waiting().push(arrived);
+                        }
+                        Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                        Some(Err(error)) => {
+                            let detail = format!("The message cannot be read: {error}.");
+                            return Ok(End::Problem(Problem::malformed(detail)));
+                        }
+                    }
+                }
+                done = wait_for(&mut answering) => {
+                    answering = None;
+                    let Some(Done { answer, skipped }) = done else { continue };
+                    if work.place.is_replaced() {
+                        return Ok(End::Replaced);
+                    }
+                    counts.skipped += skipped;
+                    match answer {
+                        Ok(Given { estimate, replayed, seen }) => {
+                            counts.answered += 1;
+                            let answer = self.answer(estimate, skipped, replayed);
+                            send(socket, &answer.with_seen(seen)).await?;
+                        }
+                        Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
+                        Err(problem) => {
+                            counts.refused += 1;
+                            self.send_problem(socket, &problem).await?;
+                        }
+                    }
+                }
+                _ = pings.tick() => {
+                    if let Err(problem) = work.check_access() {
+                        return Ok(End::Problem(problem));
+                    }
+                    // While frames wait nothing is read, so nothing can be heard.
+                    if !is_heard && may_come {
+                        return Ok(End::Silent);
+                    }
+                    is_heard = false;
+                    socket.send(Message::Ping(Bytes::new())).await?;
+                }
+                () = work.place.replaced() => return Ok(End::Replaced),
+                () = self.connection.ending(), if !is_ending => is_ending = true,
+            }
+        }
+    }
+
+    /// A frame with the memory that it takes.
+    fn charged(&self, header: FrameHeader, file: Bytes) -> Result<ArrivedFrame, Problem> {
+        let budgets = (&self.work.state.uploads, self.work.account.bytes());
+        let mut charge = ByteCharge::new(budgets.0, budgets.1);
+        charge.grow(file.len())?;
+        self.work
+            .state
+            .metrics
+            .received_bytes
+            .increment(file.len() as u64);
+        Ok(ArrivedFrame {
+            header,
+            file,
+            charge,
+        })
+    }
+
+    fn answer(&self, estimate: Estimate, skipped: u64, replayed: bool) -> StreamAnswer {
+        StreamAnswer::new(estimate, skipped, replayed, self.work.state.is_draining())
+    }
+
+    async fn send_problem(
+        &self,
+        socket: &mut WebSocket,
+        problem: &Problem,
+    ) -> Result<(), axum::Error> {
+        self.work.state.metrics.problem(problem.kind());
+        if let Some(cause) = problem.cause() {
+            tracing::error!(problem = problem.kind().slug(), %cause, "a frame failed");
+        }
+        let (path, id) = (self.path.clone(), self.request_id.clone());
+        send(socket, &ProblemDocument::new(problem, path, id)).await
+    }
+
+    /// Tells the client why, and waits until it has closed too: else its system might throw away what it has not read.
+    async fn close(self, mut socket: WebSocket, end: End) {
+        if let End::Problem(problem) = &end {
+            let _ = self.send_problem(&mut socket, problem).await;
+        }
+        let Some(frame) = end.close_frame() else {
+            return;
+        };
+        if socket.send(Message::Close(Some(frame))).await.is_ok() {
+            while let Some(Ok(_)) = socket.recv().await {}
+        }
+        drop(self.buffers);
+    }
+}
+
+/// Whether nothing can be tracked after this problem.
+fn ends_stream(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::SessionNotFound | Kind::SessionExpired | Kind::Unauthorized | Kind::Internal
+    )
+}
+
+/// What becomes of the frame at work; for ever where there is none.
+async fn wait_for(answering: &mut Option<Answering>) -> Option<Done> {
+    match answering {
+        Some(answering) => answering.await,
+        None => std::future::pending().await,
+    }
+}
+
+async fn send(socket: &mut WebSocket, message: &impl Serialize) -> Result<(), axum::Error> {
+    let text = serde_json::to_string(message).map_err(axum::Error::new)?;
+    socket.send(Message::Text(Utf8Bytes::from(text))).await
+}

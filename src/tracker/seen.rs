@@ -1,0 +1,41 @@
+//! What a step saw, for people who want to look at it. A step that is not asked copies nothing.
+
+use crate::tracker::candidates::Candidates;
+use crate::tracker::image::rect::Rect;
+use crate::tracker::state::State;
+use crate::tracker::weights::likelihood;
+
+/// What one step saw.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Seen {
+    /// The particles that the answer was chosen from, in the order in which they were drawn: the box of each, in pixels
+    /// of the uploaded frame, and its weight. Weights are at least 0 and sum to 1.
+    pub particles: Vec<(Rect, f64)>,
+    /// For each entry of the bag, oldest first, its share of the likelihood of the best particle (equation 11): at least
+    /// 0, with the sum 1.
+    pub votes: Vec<f64>,
+}
+
+impl Seen {
+    /// Of a step with these candidates.
+    pub(crate) fn of(state: &State, candidates: &Candidates) -> Self {
+        let boxes = candidates.particles.iter();
+        let boxes = boxes.map(|particle| state.target_of(particle));
+        let best = likelihood::arg_max(&candidates.weights);
+        let sigma = state.params.sigma;
+        let distances = candidates.distances_of(best);
+        let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        let likelihoods = distances
+            .iter()
+            .map(|distance| ((least - distance) / sigma).exp());
+        let likelihoods: Vec<f64> = likelihoods.collect();
+        let sum: f64 = likelihoods.iter().sum();
+        Self {
+            particles: boxes.zip(candidates.weights.iter().copied()).collect(),
+            votes: likelihoods
+                .iter()
+                .map(|likelihood| likelihood / sum)
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The page at `/`, and the sample clips that it shows. `tests/page` has it in a browser.
+
+use crate::application::{TestApplication, expect, expect_problem};
+use reqwest::{Method, StatusCode};
+use std::collections::BTreeSet;
+
+/// The paths below `/page/` that a text names.
+fn named(text: &str) -> Vec<String> {
+    let texts = text.split(['"', '\'']);
+    let paths = texts.filter_map(|text| {
+        let file = text.strip_prefix("./").or(text.strip_prefix("/page/"))?;
+        (file.ends_with(".js") || file.ends_with(".css")).then(|| format!("/page/{file}"))
+    });
+    paths.collect()
+}
+
+#[tokio::test]
+async fn every_file_that_the_page_names_is_served_and_all_are_small() {
+    let app = TestApplication::start().await;
+    let mut open = vec!["/".to_owned()];
+    let (mut seen, mut bytes) = (BTreeSet::new(), 0);
+    while let Some(path) = open.pop() {
+        if !seen.insert(path.clone()) {
+            continue;
+        }
+        let response = app.get(&path).await;
+        assert_eq!(response.status(), StatusCode::OK, "{path}");
+        let text = response.text().await.unwrap();
+        bytes += text.len();
+        open.extend(named(&text));
+    }
+    assert_eq!(seen.len(), 13, "{seen:?}");
+    assert!(bytes < 150_000, "{bytes}");
+    expect_problem(app.get("/page/none.js").await, "route-not-found").await;
+}
+
+#[tokio::test]
+async fn a_browser_that_has_the_page_gets_no_second_copy() {
+    let app = TestApplication::start().await;
+    for path in ["/", "/page/main.js"] {
+        let first = app.get(path).await;
+        let tag = first.headers()["etag"].clone();
+        let again = app
+            .request(Method::GET, path, &[])
+            .header("if-none-match", tag);
+        let again = again.send().await.unwrap();
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
+        assert!(again.bytes().await.unwrap().is_empty());
+        let other = app
+            .request(Method::GET, path, &[])
+            .header("if-none-match", "\"0\"");
+        assert_eq!(other.send().await.unwrap().status(), StatusCode::OK);
+    }
+}
+
+#[tokio::test]
+async fn the_sample_clip_can_be_tracked() {
+    let app = TestApplication::start().await;
+    let clip = expect(app.get("/sample/card/clip.json").await, StatusCode::OK).await;
+    let truth = clip["truth"].as_array().unwrap();
+    assert_eq!(truth.len(), 150);
+    let frame = async |index: usize| {
+        let response = app.get(&format!("/sample/card/{index}.jpg")).await;
+        assert_eq!(response.headers()["content-type"], "image/jpeg");
+        assert!(
+            response.headers()["cache-control"]
+                .to_str()
+                .unwrap()
+                .contains("max-age")
+        );
+        response.bytes().await.unwrap().to_vec()
+    };
+    let values = |index: usize| -> Vec<f64> {
+        let row = truth[index].as_array().unwrap();
+        row.iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    let first: Vec<String> = values(0)[..4].iter().map(f64::to_string).collect();
+    let created = app
+        .create(frame(0).await, &[("box", &first.join(","))])
+        .await;
+    let created = expect(created, StatusCode::CREATED).await;
+    assert_eq!(created["image"]["width"], clip["width"]);
+    let id = created["id"].as_str().unwrap();
+    for index in 1..20 {
+        let answer = app.post_frame(id, frame(index).await).await;
+        let answer = expect(answer, StatusCode::OK).await;
+        let off = answer["box"]["x"].as_f64().unwrap() - values(index)[0];
+        assert!(off.abs() < 5.0, "frame {index}: {off}");
+    }
+    assert_eq!(frame(3).await, frame(3).await);
+    for path in [
+        "/sample/card/150.jpg",
+        "/sample/card/-1.jpg",
+        "/sample/card/1.png",
+        "/sample/none/1.jpg",
+        "/sample/none/clip.json",
+    ] {
+        expect_problem(app.get(path).await, "route-not-found").await;
+    }
+}

@@ -1,0 +1,127 @@
+//! A client of a session's stream.
+
+use crate::application::TestApplication;
+use futures_util::{SinkExt, StreamExt};
+use serde_json::Value;
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::client_async;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::http::Response;
+use tokio_tungstenite::tungstenite::{Error, Message};
+
+/// Longer than any test waits for something that does happen.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+pub struct StreamClient {
+    socket: WebSocketStream<TcpStream>,
+    /// The number of the next frame, as the service told.
+    pub next: u64,
+}
+
+/// What comes from the service.
+#[derive(Debug)]
+pub enum Received {
+    Message(Value),
+    Closed(u16),
+    Broken,
+}
+
+impl StreamClient {
+    /// Opens the stream of a session at `address`.
+    pub async fn try_open(
+        address: SocketAddr,
+        id: &str,
+        query: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, Response<Option<Vec<u8>>>> {
+        let url = format!("ws://{address}/sessions/{id}/stream{query}");
+        let mut request = url.into_client_request().unwrap();
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().unwrap());
+        }
+        let stream = TcpStream::connect(address).await.unwrap();
+        stream.set_nodelay(true).unwrap();
+        let socket = match client_async(request, stream).await {
+            Ok((socket, _)) => socket,
+            Err(Error::Http(response)) => return Err(*response),
+            Err(error) => panic!("{error}"),
+        };
+        let mut client = Self { socket, next: 0 };
+        let hello = client.message().await;
+        client.next = hello["next"].as_u64().unwrap();
+        Ok(client)
+    }
+
+    pub async fn open(app: &TestApplication, id: &str, query: &str) -> Self {
+        let opened = Self::try_open(app.address, id, query, &[]).await;
+        opened.unwrap_or_else(|response| panic!("{response:?}"))
+    }
+
+    pub async fn send(&mut self, frame: Vec<u8>) {
+        self.socket
+            .send(Message::binary(frame))
+            .await
+            .expect("the stream is open");
+    }
+
+    pub async fn say(&mut self, text: impl Into<String>) {
+        let text: String = text.into();
+        self.socket
+            .send(Message::text(text))
+            .await
+            .expect("the stream is open");
+    }
+
+    /// What comes next; pings are answered on the way.
+    pub async fn receive(&mut self) -> Received {
+        loop {
+            let next = timeout(PATIENCE, self.socket.next()).await;
+            match next.expect("something comes") {
+                Some(Ok(Message::Text(text))) => {
+                    return Received::Message(serde_json::from_str(&text).unwrap());
+                }
+                Some(Ok(Message::Close(frame))) => {
+                    return Received::Closed(frame.map_or(1005, |frame| frame.code.into()));
+                }
+                Some(Ok(_)) => {}
+                Some(Err(_)) | None => return Received::Broken,
+            }
+        }
+    }
+
+    /// The next message.
+    pub async fn message(&mut self) -> Value {
+        match self.receive().await {
+            Received::Message(message) => message,
+            other => panic!("{other:?} in place of a message"),
+        }
+    }
+
+    /// Waits for a ping, and does not answer it.
+    pub async fn ignore_pings(self) -> Vec<u8> {
+        use tokio::io::AsyncReadExt;
+        let mut stream = self.socket.into_inner();
+        let mut bytes = Vec::new();
+        let end = timeout(PATIENCE, stream.read_to_end(&mut bytes)).await;
+        let _ = end.expect("the service closes the connection");
+        bytes
+    }
+
+    /// The code that the stream is closed with.
+    pub async fn close_code(&mut self) -> u16 {
+        match self.receive().await {
+            Received::Closed(code) => code,
+            other => panic!("{other:?} in place of a close"),
+        }
+    }
+
+    /// Asks for a close and waits for it.
+    pub async fn close(mut self) {
+        self.socket.close(None).await.unwrap();
+        while let Some(Ok(_)) = self.socket.next().await {}
+    }
+}

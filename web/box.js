@@ -1,0 +1,111 @@
+// Drawing a box: by mouse, finger, pen or keyboard.
+
+/** @typedef {import("./api.js").Box} Box */
+
+/** Least side of a box in pixels of the frame. */
+const LEAST = 6;
+const STEP = 4;
+
+/** @type {Record<string, [number, number]>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+export class BoxDrawing {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {{start: () => boolean, change: (box: Box | undefined) => void, finish: (box: Box) => void}} told `start`
+   *   says whether a box may be drawn now.
+   */
+  constructor(canvas, told) {
+    this.canvas = canvas;
+    this.told = told;
+    /** @type {{x: number, y: number} | undefined} Where the pointer went down. */
+    this.from = undefined;
+    /** @type {Box | undefined} */
+    this.box = undefined;
+    canvas.addEventListener("pointerdown", (event) => this.down(event));
+    canvas.addEventListener("pointermove", (event) => this.move(event));
+    canvas.addEventListener("pointerup", (event) => this.up(event));
+    canvas.addEventListener("pointercancel", () => this.cancel());
+    canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** @param {PointerEvent} event */
+  at(event) {
+    const area = this.canvas.getBoundingClientRect();
+    const limit = (/** @type {number} */ value, /** @type {number} */ most) => Math.min(Math.max(value, 0), most);
+    return {
+      x: limit(((event.clientX - area.left) / area.width) * this.canvas.width, this.canvas.width),
+      y: limit(((event.clientY - area.top) / area.height) * this.canvas.height, this.canvas.height),
+    };
+  }
+
+  /** @param {PointerEvent} event */
+  down(event) {
+    if (event.button !== 0 || this.from || !this.told.start()) return;
+    this.canvas.setPointerCapture(event.pointerId);
+    this.from = this.at(event);
+    this.box = undefined;
+  }
+
+  /** @param {PointerEvent} event */
+  move(event) {
+    if (!this.from) return;
+    const to = this.at(event);
+    this.box = {
+      x: Math.min(this.from.x, to.x),
+      y: Math.min(this.from.y, to.y),
+      width: Math.abs(to.x - this.from.x),
+      height: Math.abs(to.y - this.from.y),
+    };
+    this.told.change(this.box);
+  }
+
+  /** @param {PointerEvent} event */
+  up(event) {
+    if (!this.from) return;
+    this.move(event);
+    this.from = undefined;
+    const box = this.box;
+    if (box && box.width >= LEAST && box.height >= LEAST) this.finish(box);
+    else this.cancel();
+  }
+
+  /** @param {Box} box */
+  finish(box) {
+    this.box = undefined;
+    this.told.finish(box);
+  }
+
+  cancel() {
+    this.from = undefined;
+    this.box = undefined;
+    this.told.change(undefined);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const arrow = ARROWS[event.key];
+    if (event.key === "Escape" && this.box) return this.cancel();
+    if (event.key === "Enter" && this.box) return this.finish(this.box);
+    if (!arrow && event.key !== "Enter") return;
+    event.preventDefault();
+    const { width, height } = this.canvas;
+    if (!this.box) {
+      if (!this.told.start()) return;
+      const side = Math.round(Math.min(width, height) / 4);
+      this.box = { x: (width - side) / 2, y: (height - side) / 2, width: side, height: side };
+    } else if (arrow) {
+      const [right, down] = [arrow[0] * STEP, arrow[1] * STEP];
+      const box = { ...this.box };
+      if (event.shiftKey) {
+        box.width = Math.max(LEAST, box.width + right);
+        box.height = Math.max(LEAST, box.height + down);
+      } else {
+        box.x += right;
+        box.y += down;
+      }
+      this.box = box;
+    }
+    this.told.change(this.box);
+  }
+}
