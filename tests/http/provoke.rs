@@ -284,11 +284,13 @@ impl Blocked {
 
     async fn attempt(&self, operation: &Operation) -> Response {
         let path = operation.path.replace("{id}", &self.id);
-        let query: &[(&str, &str)] =
-            match operation.path.ends_with("/frames") || !operation.takes_frames() {
-                true => &[],
-                false => &[("box", BOX)],
-            };
+        // Numbered, since frames without numbers may not come at once.
+        let query: &[(&str, &str)] = match (operation.takes_frames(), operation.path.as_str()) {
+            (false, _) => &[],
+            (_, path) if path.ends_with("/frames") => &[("frame", "1")],
+            (_, path) if path.ends_with("/target") => &[("box", BOX), ("frame", "1")],
+            _ => &[("box", BOX)],
+        };
         let mut request = self.app.request(operation.method.clone(), &path, query);
         if operation.takes_frames() {
             request = request.body(pictures::png(0));
