@@ -101,6 +101,28 @@ async fn the_three_forms_give_the_same_answers() {
     assert_eq!(answers, expect(c, StatusCode::OK).await);
 }
 
+/// A client in Python or JavaScript may write 46.0 for 46, which JSON does not tell apart.
+#[tokio::test]
+async fn a_float_without_a_fraction_is_a_whole_number() {
+    let app = TestApplication::start().await;
+    let body = |mut settings: Value| {
+        settings["frame"] = base64(pictures::png(0)).into();
+        settings["box"] = BOX.into();
+        settings
+    };
+    for (settings, seed) in [
+        (json!({"seed": 46.0}), 46),
+        (json!({"params": {"seed": 47.0}}), 47),
+    ] {
+        let created = post_json(&app, Method::POST, "/sessions", &body(settings)).await;
+        let created = expect(created, StatusCode::CREATED).await;
+        assert_eq!(created["params"]["seed"], seed);
+    }
+    let settings = json!({"params": {"seed": 46.5}});
+    let refused = post_json(&app, Method::POST, "/sessions", &body(settings)).await;
+    expect_problem(refused, "invalid-parameter").await;
+}
+
 #[tokio::test]
 async fn a_raw_body_needs_no_right_content_type() {
     let app = TestApplication::start().await;

@@ -1,5 +1,6 @@
 //! A preset with single parameters set otherwise.
 
+use super::settings::whole;
 use crate::http::problems::problem::Problem;
 use crate::tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
@@ -57,6 +58,10 @@ impl ParamOverrides {
             if !known.contains_key(&name) {
                 return Err(unknown(&name, &known));
             }
+            let value = match value.as_f64().and_then(whole) {
+                Some(whole) if value.is_f64() => Value::from(whole),
+                _ => value,
+            };
             known.insert(name.clone(), value.clone());
             params = serde_json::from_value(Value::Object(known)).map_err(|error| {
                 Problem::invalid_parameter(format!(

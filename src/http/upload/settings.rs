@@ -31,12 +31,20 @@ pub struct WholeNumber(pub u64);
 impl<'de> Deserialize<'de> for WholeNumber {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Cow::<str>::deserialize(deserializer)?;
-        text.parse().map(Self).map_err(|_| {
+        let float = || text.parse().ok().and_then(whole);
+        text.parse().ok().or_else(float).map(Self).ok_or_else(|| {
             let start: String = text.chars().take(64).collect();
             let max = u64::MAX;
             D::Error::custom(format!("`{start}` is not a whole number from 0 to {max}"))
         })
     }
+}
+
+/// A float without a fraction as a whole number: JSON does not tell 46.0 from 46. None from 2^53 on, where a float does
+/// not tell neighbours apart.
+pub fn whole(value: f64) -> Option<u64> {
+    let is_whole = value.fract() == 0.0 && (0.0..9_007_199_254_740_992.0).contains(&value);
+    is_whole.then_some(value as u64)
 }
 
 fn number_schema(schema_type: impl Into<SchemaType>) -> ObjectBuilder {
