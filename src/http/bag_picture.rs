@@ -1,7 +1,7 @@
 //! `GET /sessions/{id}/bag.png`: the bag as a contact sheet.
 
 use super::client::Client;
-use super::openapi::problem_responses::{self, problem_responses};
+use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
@@ -24,21 +24,18 @@ const TILE: u32 = 64;
 const GAP: u32 = 4;
 const GROUND: Rgb<u8> = Rgb([24, 25, 28]);
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::MalformedRequest,
-            Kind::SessionBusy,
-            Kind::QuotaExceeded,
-            Kind::QueueFull,
-            Kind::WorkTimeout,
-        ];
-        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[
+        Kind::MalformedRequest,
+        Kind::SessionBusy,
+        Kind::QuotaExceeded,
+        Kind::QueueFull,
+        Kind::WorkTimeout,
+    ]
+);
 
 /// See the bag
 ///

@@ -6,7 +6,7 @@ use super::waiting::Waiting;
 use crate::http::auth::caller::Caller;
 use crate::http::client::Client;
 use crate::http::connection_hold::ConnectionHold;
-use crate::http::openapi::problem_responses::{self, problem_responses};
+use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::request_id;
@@ -48,26 +48,24 @@ pub struct StreamSettings {
     drop: Option<bool>,
 }
 
-struct Problems;
-
-impl utoipa::IntoResponses for Problems {
-    fn responses()
-    -> std::collections::BTreeMap<String, utoipa::openapi::RefOr<utoipa::openapi::Response>> {
-        let own = &[
-            Kind::MalformedRequest,
-            Kind::FrameOutOfOrder,
-            Kind::SessionBusy,
-        ];
-        problem_responses(&[problem_responses::ALWAYS, problem_responses::SESSION, own])
-    }
-}
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[
+        Kind::MalformedRequest,
+        Kind::FrameOutOfOrder,
+        Kind::SessionBusy,
+    ]
+);
 
 /// Send frames over a WebSocket
 ///
 /// A binary message is a frame. A text message before it may give its number or a corrected box: `{"frame": 7}`,
 /// `{"box": [12, 22, 30, 40]}`. With `{"see": true}` the answer has the particles (centre, width and weight of the 200
-/// likeliest) and the votes of the bag's entries. All answers are text messages. The first is `{"next": N}`, the number of the next
-/// frame. Then each frame gets its answer, or a problem document, in order. A problem leaves the session as it was.
+/// likeliest) and the votes of the bag's entries. All answers are text messages. The first is `{"next": N}`, the number
+/// of the next frame. Then each frame gets its answer, or a problem document, in order. A problem leaves the session as
+/// it was.
 ///
 /// Send further frames without waiting for the answers, at most 32. If the line breaks, open the stream again with
 /// `?from=N`, N being the first frame without an answer: the stored answers come again, with `"replayed": true`, and
