@@ -146,6 +146,21 @@ fn a_session_in_color_goes_on_from_its_snapshot_bit_for_bit() {
     assert_eq!(tracker.snapshot(), restored.snapshot());
 }
 
+#[test]
+fn a_frame_of_bgr_triples_is_that_of_their_rgb_triples() {
+    let rgb = rgb(3);
+    let swapped: Vec<u8> = rgb
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .flat_map(|&[r, g, b]| [b, g, r])
+        .collect();
+    let size = (WIDTH as u32, HEIGHT as u32);
+    assert_eq!(Frame::from_bgr(size.0, size.1, &swapped), Ok(color(3)));
+    assert_ne!(Frame::from_bgr(size.0, size.1, &rgb), Ok(color(3)));
+    assert!(Frame::from_bgr(size.0, size.1, &swapped[1..]).is_err());
+}
+
 /// A frame of 1280 x 960 whose target is 40 pixels wide is seen in full; one whose target is 640 wide is not.
 #[test]
 fn the_resolution_follows_the_target() {

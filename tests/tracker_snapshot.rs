@@ -186,7 +186,7 @@ proptest! {
     ) {
         let mut body = body(&extended(5));
         for (index, which) in changes {
-            // What the camera and the running means say comes last.
+            // Colours, the small image and the running means come last.
             let first = if late { body.len() - 1200 } else { 0 };
             let at = first + index.index(body.len() - 4 - first);
             body[at..at + 4].copy_from_slice(&HOSTILE[which].to_le_bytes());

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::hint::black_box;
 
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField, convert};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, RealField, SMatrix, convert};
 use pulp::{Arch, Simd};
 
 use crate::clock;
@@ -18,9 +18,6 @@ mod combinations;
 #[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/element.rs"]
 mod element;
-#[allow(dead_code, unused_imports)]
-#[path = "../../src/tracker/linalg/exp.rs"]
-mod exp;
 #[allow(dead_code, unused_imports)]
 #[path = "../../src/tracker/linalg/gemm.rs"]
 mod gemm;
@@ -42,10 +39,9 @@ pub fn print() {
     }
     products::<f64>("f64", 45, 100, 1024);
     transform(17, 640);
-    for dim in [3, 5, 8] {
-        eigen(dim);
-    }
-    exponentials(2000);
+    eigen::<3>();
+    eigen::<5>();
+    eigen::<11>();
     angles(1000);
 }
 
@@ -137,18 +133,17 @@ fn transform(levels: usize, len: usize) {
     );
 }
 
-fn eigen(dim: usize) {
-    let vectors = DMatrix::from_vec(dim, dim + 2, numbers::<f64>(dim * (dim + 2), 5));
+fn eigen<const M: usize>() {
+    let vectors = DMatrix::from_vec(M, M + 2, numbers::<f64>(M * (M + 2), 5));
     let matrix = &vectors * vectors.transpose();
-    let mut spectrum = jacobi::Spectrum::default();
+    let fixed = SMatrix::<f64, M, M>::from_iterator(matrix.iter().copied());
     row(
-        format!("eigenvectors of a {dim} × {dim} matrix, f64"),
+        format!("eigenvectors of a {M} × {M} matrix, f64"),
         vec![
             (
                 "own",
                 Box::new(|| {
-                    let matrix = black_box(&matrix);
-                    spectrum.solve(dim, |i, j| matrix[(i, j)]);
+                    black_box(jacobi::eigenpairs(*black_box(&fixed)));
                 }),
             ),
             (
@@ -161,42 +156,12 @@ fn eigen(dim: usize) {
     );
 }
 
-#[pulp::with_simd(exponentials_of = Arch::new())]
-#[inline(always)]
-fn exponentials_simd<S: Simd>(_: S, values: &mut [f64]) {
-    exp::exp(values);
-}
-
 #[pulp::with_simd(angles_of = Arch::new())]
 #[inline(always)]
 fn angles_simd<S: Simd>(_: S, out: &mut [acos::Lanes], cosines: &[acos::Lanes]) {
     for (out, cosines) in out.iter_mut().zip(cosines) {
         *out = acos::squared_angles(cosines);
     }
-}
-
-fn exponentials(count: usize) {
-    let exponents: Vec<f64> = (0..count).map(|i| i as f64 * -0.017).collect();
-    let [mut own, mut by_std] = [(); 2].map(|()| vec![0.0; count]);
-    row(
-        format!("{count} exponentials, f64"),
-        vec![
-            (
-                "own",
-                Box::new(|| {
-                    own.copy_from_slice(black_box(&exponents));
-                    exponentials_of(&mut own);
-                }),
-            ),
-            (
-                "std",
-                Box::new(|| {
-                    by_std.copy_from_slice(black_box(&exponents));
-                    by_std.iter_mut().for_each(|value| *value = value.exp());
-                }),
-            ),
-        ],
-    );
 }
 
 fn angles(count: usize) {

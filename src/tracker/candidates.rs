@@ -5,14 +5,16 @@
 
 use std::ops::Range;
 
+use pulp::{Arch, Simd};
+
 use crate::tracker::appearance::point_distance::PointDistance;
 use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::features::centering::Centering;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::grassmann::evaluation::Evaluation;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::linalg::scratch::{AlignedBuffer, clear_and_reserve};
+use crate::tracker::linalg::vector_ops;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
 use crate::tracker::params::table::Params;
@@ -21,6 +23,22 @@ use crate::tracker::weights::likelihood::{self, Likelihoods};
 
 /// P at most.
 const MAX_HISTORY: usize = 10;
+
+/// Subtracts `mean` (nothing, where it is empty) from `vectors` of length `len`, and appends their squared lengths.
+#[pulp::with_simd(center = Arch::new())]
+#[inline(always)]
+fn center_simd<S: Simd>(
+    _: S,
+    vectors: &mut [f32],
+    len: usize,
+    mean: &[f32],
+    squares: &mut Vec<f32>,
+) {
+    for vector in vectors.chunks_exact_mut(len) {
+        vector_ops::add(vector, -1.0, mean);
+        squares.push(vector_ops::dot(vector, vector));
+    }
+}
 
 /// The particles of a frame, and all that is computed of them.
 #[derive(Debug, Default)]
@@ -117,20 +135,11 @@ impl Candidates {
         state: &State,
     ) {
         let range = self.values_of(&batch);
-        let centering = Some(Centering {
-            mean: state.background.mean(),
-            squares: &mut self.squares,
-        });
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors.values_mut()[range];
-        extractor.describe(
-            image,
-            particles,
-            &state.bounds,
-            &state.params,
-            vectors,
-            centering,
-        );
+        extractor.describe(image, particles, &state.bounds, &state.params, vectors);
+        let mean = state.background.mean();
+        center(vectors, self.len, mean, &mut self.squares);
     }
 
     /// (D) The distances and the discriminant's scores of a batch.
@@ -153,10 +162,10 @@ impl Candidates {
             return;
         };
         let mut history = [&[][..]; MAX_HISTORY];
-        for (slice, vector) in history.iter_mut().zip(&state.history) {
+        for (slice, vector) in history.iter_mut().zip(&state.history.exact) {
             *slice = vector;
         }
-        let history = &history[..state.history.len()];
+        let history = &history[..state.history.exact.len()];
         let distances = evaluation.compute_distances(vectors, history);
         self.distances.extend_from_slice(distances);
     }

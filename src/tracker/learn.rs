@@ -12,7 +12,7 @@ use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
-use crate::tracker::scale::{dsst, pyramid};
+use crate::tracker::scale::{maximum, pyramid};
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
@@ -81,14 +81,12 @@ impl State {
         let features = &mut learning.features;
         if Bag::admits(found.number, &self.params) {
             // V: the answer and the previous frames (equation 2).
-            for vector in &self.history {
-                features.extend_from_slice(vector);
-            }
+            self.history.append_to(features, &self.params);
             let bag = &mut learning.bag;
             self.bag
                 .admit(features, &self.background, &self.params, bag);
         }
-        self.push_history(features);
+        self.history.push(features, &self.params);
     }
 
     /// The target's rotation in `original`, in radians: the last one, or moved towards the likelier of two others.
@@ -166,16 +164,16 @@ impl State {
         }
         // A target that was lost may have come nearer.
         let reliance = match self.frames_lost {
-            0 => dsst::reliance(self.bounds.side(&self.answer)),
+            0 => maximum::reliance(self.bounds.side(&self.answer)),
             _ => 0.0,
         };
         let scale = found.scale * (self.answer.scale / found.scale).powf(reliance);
         let center = Particle { scale, ..found };
         self.describe_pyramid(image, &center, workspace);
-        let maximum = self.scale_filter.find(&mut workspace.learning.pyramid);
+        let found_at = self.scale_filter.find(&mut workspace.learning.pyramid);
         self.bounds.clamp(Particle {
             scale: scale
-                * (dsst::reliance(self.bounds.side(&center)) * maximum.gated_change()).exp(),
+                * (maximum::reliance(self.bounds.side(&center)) * found_at.gated_change()).exp(),
             ..found
         })
     }

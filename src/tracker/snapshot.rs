@@ -9,6 +9,7 @@
 //! postcard's encoding.
 
 use crate::tracker::appearance::bag::Bag;
+use crate::tracker::appearance::subspace;
 use crate::tracker::error::TrackerError;
 use crate::tracker::image::resolution::MAX_WORKING_SIDE;
 use crate::tracker::input;
@@ -20,7 +21,7 @@ use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 11;
+const VERSION: u32 = 14;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -85,7 +86,7 @@ fn check(state: &State) -> Result<(), TrackerError> {
     state.params.validate()?;
     let is_valid = check_numbers(state)
         && check_particles(state)
-        && check_history(state)
+        && state.history.is_valid_for(&state.params, MAX_FEATURE)
         && check_bag(&state.bag, &state.params)
         && check_extensions(state);
     if is_valid {
@@ -181,15 +182,6 @@ fn check_extensions(state: &State) -> bool {
         && (0.0..=1e6).contains(&state.update_gate.mean_distance)
 }
 
-fn check_history(state: &State) -> bool {
-    let len = state.params.feature_len();
-    (1..=state.params.history as usize).contains(&state.history.len())
-        && state
-            .history
-            .iter()
-            .all(|patch| patch.len() == len && are_features(patch))
-}
-
 fn check_bag(bag: &Bag, params: &Params) -> bool {
     let len = params.feature_len();
     (1..=params.bag_size as usize).contains(&bag.entries().len())
@@ -222,13 +214,8 @@ fn are_features(values: &[f32]) -> bool {
 
 fn is_orthonormal(columns: &[&[f32]]) -> bool {
     let count = columns.len();
-    let gram = crate::tracker::appearance::subspace::gram(columns);
-    gram.iter().enumerate().all(|(index, &product)| {
-        let expected = if index / count == index % count {
-            1.0
-        } else {
-            0.0
-        };
-        (product - expected).abs() <= ORTHONORMAL
-    })
+    let gram = subspace::gram(columns)
+        .view((0, 0), (count, count))
+        .into_owned();
+    gram.is_identity(ORTHONORMAL)
 }

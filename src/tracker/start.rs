@@ -1,13 +1,12 @@
 //! What a session starts with: the models of the first frame, and of a frame in which the user corrects the box.
 
-use std::collections::VecDeque;
-
 use rand_chacha::ChaCha8Rng;
 
 use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::appearance::bag::Bag;
 use crate::tracker::appearance::color_histogram::ColorHistogram;
+use crate::tracker::appearance::history::History;
 use crate::tracker::classifier::labels;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
@@ -57,7 +56,7 @@ impl State {
             answer,
             particles: Vec::new(),
             weights: Vec::new(),
-            history: VecDeque::new(),
+            history: History::default(),
             bag: Bag::default(),
             background: Background::default(),
             discriminant: Discriminant::default(),
@@ -77,7 +76,7 @@ impl State {
         state
             .bag
             .admit(features, &state.background, &state.params, bag);
-        state.push_history(features);
+        state.history.push(features, &state.params);
         state
     }
 
@@ -100,7 +99,7 @@ impl State {
         self.update_gate = UpdateGate::default();
         self.bag
             .admit_pinned(features, &self.background, &self.params, bag);
-        self.push_history(features);
+        self.history.push(features, &self.params);
         self.estimate = given(number, target);
     }
 

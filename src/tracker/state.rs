@@ -1,12 +1,11 @@
 //! What a session is: everything that a snapshot carries, and nothing else.
 
-use std::collections::VecDeque;
-
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::bag::Bag;
 use crate::tracker::appearance::color_histogram::ColorHistogram;
+use crate::tracker::appearance::history::History;
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::confidence::score::DistanceBaseline;
 use crate::tracker::confidence::update_gate::UpdateGate;
@@ -42,8 +41,7 @@ pub(crate) struct State {
     pub particles: Vec<Particle>,
     /// One for each particle, with the sum 1.
     pub weights: Vec<f64>,
-    /// The feature vectors of the last tracked frames, newest first, 1 to P of them.
-    pub history: VecDeque<Vec<f32>>,
+    pub history: History,
     pub bag: Bag,
     pub background: Background,
     pub discriminant: Discriminant,
@@ -95,19 +93,5 @@ impl State {
         let widest = frame.min(MAX_SEARCHED_SIDES * self.bounds.side(&self.answer));
         let max = (widest / 3.0 / std.max(1.0)).max(1.0);
         (1.0 + WIDENING * f64::from(self.frames_lost)).min(max)
-    }
-
-    /// Makes the first vector of `features` the newest of the history.
-    pub fn push_history(&mut self, features: &[f32]) {
-        let is_full = self.history.len() >= self.params.history as usize;
-        let oldest = if is_full {
-            self.history.pop_back()
-        } else {
-            None
-        };
-        let mut newest = oldest.unwrap_or_default();
-        newest.clear();
-        newest.extend_from_slice(&features[..self.params.feature_len()]);
-        self.history.push_front(newest);
     }
 }

@@ -7,13 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::span::{self, Span};
-use crate::tracker::appearance::subspace::AffineSubspace;
+use crate::tracker::appearance::subspace::{AffineSubspace, MAX_VECTORS};
 use crate::tracker::features::quantized::QuantizedVector;
-use crate::tracker::linalg::jacobi::Spectrum;
 use crate::tracker::params::table::Params;
-
-/// P + 1 at most.
-const MAX_VECTORS: usize = 11;
 
 /// One affine subspace of the bag.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -37,7 +33,6 @@ pub(crate) struct Bag {
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     span: span::Scratch,
-    spectrum: Spectrum,
 }
 
 impl Entry {
@@ -64,8 +59,7 @@ impl Entry {
                 *slice = vector;
             }
             let basis_dim = params.basis_dim as usize;
-            self.subspace
-                .fit(&slices[..count], basis_dim, &mut scratch.spectrum);
+            self.subspace.fit(&slices[..count], basis_dim);
         }
     }
 

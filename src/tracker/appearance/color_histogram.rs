@@ -8,6 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::tracker::appearance::sparse_bins;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::plane::Plane;
 use crate::tracker::linalg::scratch::clear_and_reserve;
@@ -28,6 +29,8 @@ const RATE: f32 = 0.04;
 const SURROUNDINGS_RATE: f32 = 0.08;
 /// The share of the first frame's histogram that stays.
 const FIRST_SHARE: f32 = 0.5;
+/// Less is nothing: a colour that was not seen for a hundred frames.
+const MIN_BIN: f32 = 1e-6;
 /// The mass that a colour never seen has, and the target's part of it: such colours are rather not the target's.
 const PRIOR_MASS: f32 = 2e-4;
 const PRIOR_TARGET: f32 = 0.3;
@@ -35,8 +38,11 @@ const PRIOR_TARGET: f32 = 0.3;
 /// The histograms: empty before the first frame, else each with the sum 1 or, of no pixels, 0.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct ColorHistogram {
+    #[serde(with = "sparse_bins")]
     first: Vec<f32>,
+    #[serde(with = "sparse_bins")]
     target: Vec<f32>,
+    #[serde(with = "sparse_bins")]
     surroundings: Vec<f32>,
 }
 
@@ -196,7 +202,8 @@ impl ColorHistogram {
             bins.resize(count, 0.0);
             let rate = if is_first { 1.0 } else { rate };
             for (bin, newest) in bins.iter_mut().zip(&scratch.counts) {
-                *bin += rate * (newest - *bin);
+                let value = *bin + rate * (newest - *bin);
+                *bin = if value > MIN_BIN { value } else { 0.0 };
             }
         }
         if is_first {

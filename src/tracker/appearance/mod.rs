@@ -2,11 +2,12 @@
 //!
 //! - `subspace`: an affine subspace A = {μ, U} as vectors (equation 1), for the printed evaluation.
 //! - `span`: the same as coefficients of the few vectors that it is made of, for single-vector candidates.
+//! - `history`: the vectors of the last tracked frames, of which a subspace is made.
 //! - `bag`: up to K subspaces, a new one every W frames (equation 3, section III-C).
 //! - `augmentation`: rotated copies of the first box's image, which make its subspace.
 //! - `background`: vectors of areas beside the target; `mahalanobis`: the metric that their covariance makes.
-//! - `color_histogram`: the colours of the target and of what is around it; `foreground_map`: how likely each pixel of
-//!   a frame is the target's by its colour.
+//! - `color_histogram`: the colours of the target and of what is around it, which `sparse_bins` stores;
+//!   `foreground_map`: how likely each pixel of a frame is the target's by its colour.
 //! - `bag_matrix` and `point_distance`: the distances of single-vector candidates to all entries (equations 4 to 8 with
 //!   n = 1 for the candidate), under that metric.
 //!
@@ -21,7 +22,9 @@ pub(crate) mod bag;
 pub(crate) mod bag_matrix;
 pub(crate) mod color_histogram;
 pub(crate) mod foreground_map;
+pub(crate) mod history;
 pub(crate) mod mahalanobis;
 pub(crate) mod point_distance;
 pub(crate) mod span;
+pub(crate) mod sparse_bins;
 pub(crate) mod subspace;

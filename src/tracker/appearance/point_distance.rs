@@ -94,7 +94,7 @@ impl PointDistance {
         let coordinates = &mut self.candidate_coordinates;
         coordinates.resize(samples * stride, 0.0);
         let inverse = &self.matrix.inverse;
-        combinations::assign_triangular(simd, coordinates, inverse, of_samples, stride);
+        combinations::assign_combinations(simd, coordinates, inverse, of_samples, stride);
         let of_entries = &mut rest[..self.matrix.subspace_rows() * stride];
         let entries = &self.matrix.background_coordinates;
         combinations::combine(simd, of_entries, -1.0, entries, coordinates, stride);

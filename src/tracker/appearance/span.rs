@@ -9,11 +9,11 @@
 use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::background::Background;
-use crate::tracker::appearance::subspace;
+use crate::tracker::appearance::subspace::{self, Gram};
 use crate::tracker::features::quantized::QuantizedVector;
 use crate::tracker::linalg::combinations;
 use crate::tracker::linalg::gemm;
-use crate::tracker::linalg::jacobi::Spectrum;
+use crate::tracker::linalg::jacobi;
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 
@@ -45,7 +45,6 @@ pub(crate) struct Scratch {
     gram: Vec<f32>,
     /// The factors that bring the templates to unit length.
     scales: Vec<f32>,
-    spectrum: Spectrum,
 }
 
 impl Scratch {
@@ -145,20 +144,23 @@ impl Span {
     }
 
     /// The coefficients, from the Gram matrix of `count` templates and the factors that bring them to unit length.
-    fn combine(&mut self, count: usize, basis_dim: usize, scratch: &mut Scratch) {
+    fn combine(&mut self, count: usize, basis_dim: usize, scratch: &Scratch) {
         let scale = |i: usize| f64::from(scratch.scales[i]);
-        let gram =
-            |i: usize, j: usize| f64::from(scratch.gram[i * count + j]) * scale(i) * scale(j);
+        let mut gram = Gram::zeros();
+        for (i, row) in scratch.gram.chunks_exact(count).enumerate() {
+            for (j, &product) in row.iter().enumerate() {
+                gram[(i, j)] = f64::from(product) * scale(i) * scale(j);
+            }
+        }
         let share = 1.0 / count as f64;
-        let sum = (0..count * count).map(|at| gram(at / count, at % count));
-        self.norm = (sum.sum::<f64>() * share * share).max(0.0);
+        self.norm = (gram.sum() * share * share).max(0.0);
         self.coefficients.clear();
         self.coefficients
             .extend((0..count).map(|i| (share * scale(i)) as f32));
-        scratch.spectrum.solve(count, gram);
-        self.dim = subspace::dominant(scratch.spectrum.values(), basis_dim);
-        for (place, value) in scratch.spectrum.values().take(self.dim).enumerate() {
-            let weight = |i: usize| scratch.spectrum.weight(place, i) / value.sqrt() * scale(i);
+        let (values, vectors) = jacobi::eigenpairs(gram);
+        self.dim = subspace::dominant(values.iter().copied(), basis_dim);
+        for (place, value) in values.iter().take(self.dim).enumerate() {
+            let weight = |i: usize| vectors[(i, place)] / value.sqrt() * scale(i);
             self.coefficients
                 .extend((0..count).map(|i| weight(i) as f32));
         }

@@ -1,13 +1,20 @@
 //! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
 
+use nalgebra::SMatrix;
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::linalg::jacobi::Spectrum;
+use crate::tracker::linalg::jacobi;
 
 /// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
 /// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
 pub const RANK_TOLERANCE: f64 = 1e-5;
+
+/// The most vectors that a subspace is made of: P + 1.
+pub(crate) const MAX_VECTORS: usize = 11;
+
+/// The Gram matrix of up to [`MAX_VECTORS`] vectors, with zeros for those that there are not.
+pub(crate) type Gram = SMatrix<f64, MAX_VECTORS, MAX_VECTORS>;
 
 /// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -19,14 +26,8 @@ pub struct AffineSubspace {
 
 #[pulp::with_simd(fit = Arch::new())]
 #[inline(always)]
-fn fit_simd<S: Simd>(
-    _: S,
-    subspace: &mut AffineSubspace,
-    vectors: &[&[f32]],
-    basis_dim: usize,
-    spectrum: &mut Spectrum,
-) {
-    subspace.make_of(vectors, basis_dim, spectrum);
+fn fit_simd<S: Simd>(_: S, subspace: &mut AffineSubspace, vectors: &[&[f32]], basis_dim: usize) {
+    subspace.make_of(vectors, basis_dim);
 }
 
 impl AffineSubspace {
@@ -35,20 +36,20 @@ impl AffineSubspace {
     /// directions with a singular value above [`RANK_TOLERANCE`] of the largest; none for all-zero vectors.
     ///
     /// # Panics
-    /// If there are no vectors, or their lengths differ.
+    /// If there are no vectors or more than 11, or their lengths differ.
     pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
         let mut subspace = Self::default();
-        subspace.fit(vectors, basis_dim, &mut Spectrum::default());
+        subspace.fit(vectors, basis_dim);
         subspace
     }
 
     /// Becomes the subspace [`of`](Self::of) these vectors, in its present memory.
-    pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
-        fit(self, vectors, basis_dim, spectrum);
+    pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize) {
+        fit(self, vectors, basis_dim);
     }
 
     #[inline(always)]
-    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize, spectrum: &mut Spectrum) {
+    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize) {
         let len = vectors[0].len();
         assert!(
             vectors.iter().all(|vector| vector.len() == len),
@@ -59,14 +60,14 @@ impl AffineSubspace {
         combine(vectors, |_| share, &mut self.mean);
 
         // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
-        spectrum.solve(vectors.len(), |i, j| dot(vectors[i], vectors[j]));
+        let (values, weights) = jacobi::eigenpairs(gram(vectors));
         self.basis.clear();
         self.basis.reserve_exact(len * basis_dim);
-        let dim = dominant(spectrum.values(), basis_dim);
+        let dim = dominant(values.iter().copied(), basis_dim);
         self.basis.resize(len * dim, 0.0);
         let columns = self.basis.chunks_exact_mut(len);
-        for ((place, value), column) in spectrum.values().enumerate().zip(columns) {
-            let weight = |index| spectrum.weight(place, index) / value.sqrt();
+        for ((place, value), column) in values.iter().enumerate().zip(columns) {
+            let weight = |index| weights[(index, place)] / value.sqrt();
             combine(vectors, weight, column);
         }
     }
@@ -103,16 +104,14 @@ pub(crate) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> 
         .count()
 }
 
-/// VᵀV of vectors, in double precision and row order.
+/// VᵀV of vectors, in double precision.
 #[inline(always)]
-pub(crate) fn gram<V: AsRef<[f32]>>(vectors: &[V]) -> Vec<f64> {
-    let count = vectors.len();
-    let mut gram = vec![0.0; count * count];
-    for i in 0..count {
-        for j in i..count {
-            let product = dot(vectors[i].as_ref(), vectors[j].as_ref());
-            gram[i * count + j] = product;
-            gram[j * count + i] = product;
+pub(crate) fn gram(vectors: &[&[f32]]) -> Gram {
+    let mut gram = Gram::zeros();
+    for (i, vector) in vectors.iter().enumerate() {
+        for (j, other) in vectors[..=i].iter().enumerate() {
+            let product = dot(vector, other);
+            (gram[(i, j)], gram[(j, i)]) = (product, product);
         }
     }
     gram
@@ -138,24 +137,19 @@ pub(crate) fn dot(a: &[f32], b: &[f32]) -> f64 {
 
 /// The sum of vectors, each with its weight, into `out`; summed in double precision.
 #[inline(always)]
-pub(crate) fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
+fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
     const BLOCK: usize = 64;
     for (block, out) in out.chunks_mut(BLOCK).enumerate() {
         let mut sums = [0.0; BLOCK];
         let sums = &mut sums[..out.len()];
         for (index, vector) in vectors.iter().enumerate() {
-            accumulate(sums, &vector[block * BLOCK..][..out.len()], weight(index));
+            let weight = weight(index);
+            for (sum, &value) in sums.iter_mut().zip(&vector[block * BLOCK..]) {
+                *sum += weight * f64::from(value);
+            }
         }
         for (out, &sum) in out.iter_mut().zip(sums.iter()) {
             *out = sum as f32;
         }
-    }
-}
-
-/// `sum += weight * vector`.
-#[inline(always)]
-pub(crate) fn accumulate(sum: &mut [f64], vector: &[f32], weight: f64) {
-    for (sum, &value) in sum.iter_mut().zip(vector) {
-        *sum += weight * f64::from(value);
     }
 }

@@ -67,31 +67,25 @@ fn correlate<S: Simd>(
     let weights = discriminant.weights().chunks_exact(row_len);
     let origin = discriminant.origin().chunks_exact(row_len);
     let mut directions = [[simd.splat_f32s(0.0); 2]; ROWS];
-    for (r, of) in weights.clone().zip(origin.clone()).enumerate() {
-        for channel in 0..GRAY {
+    let mut grays = directions;
+    for (r, of) in weights.zip(origin).enumerate() {
+        for channel in 0..CHANNELS {
             let mut lines = [&[][..]; ROWS];
             for (line, row) in lines.iter_mut().zip(rows) {
                 *line = planes.line((first, row + r), channel);
             }
-            add_products(simd, lines, of, channel, &mut directions);
+            let sums = if channel == GRAY {
+                &mut grays
+            } else {
+                &mut directions
+            };
+            add_products(simd, lines, of, channel, sums);
         }
     }
-    let mut grays = [[simd.splat_f32s(0.0); 2]; ROWS];
-    for (r, of) in weights.zip(origin).enumerate() {
-        let mut lines = [&[][..]; ROWS];
-        for (line, row) in lines.iter_mut().zip(rows) {
-            *line = planes.line((first, row + r), GRAY);
-        }
-        add_products(simd, lines, of, GRAY, &mut grays);
-    }
-    let mut products = [Products {
-        directions: directions[0],
-        grays: grays[0],
-    }; ROWS];
-    for (products, (directions, grays)) in products.iter_mut().zip(directions.iter().zip(&grays)) {
-        (products.directions, products.grays) = (*directions, *grays);
-    }
-    products
+    std::array::from_fn(|row| Products {
+        directions: directions[row],
+        grays: grays[row],
+    })
 }
 
 /// Adds the products of a channel of a row of cells, for windows from the beginning of each of `lines` on.

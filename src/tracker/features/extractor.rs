@@ -3,7 +3,6 @@
 //! [`compute_channels`](Extractor::compute_channels) comes first in each frame. It covers a window of the frame;
 //! feature vectors are for areas in that window.
 
-use crate::tracker::features::centering::{Centering, center_all};
 use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::gray::GrayPatches;
 use crate::tracker::features::hog::Hog;
@@ -102,11 +101,10 @@ impl Extractor {
         out: &mut Vec<f32>,
     ) {
         out.resize(particles.len() * params.feature_len(), 0.0);
-        self.describe(frame, particles, bounds, params, out, None);
+        self.describe(frame, particles, bounds, params, out);
     }
 
-    /// Writes the feature vectors of `particles`, of length D each, to `out`, which has room for just these. Then
-    /// centers them, where that is asked for.
+    /// Writes the feature vectors of `particles`, of length D each, to `out`, which has room for just these.
     pub fn describe(
         &mut self,
         frame: &Frame,
@@ -114,28 +112,17 @@ impl Extractor {
         bounds: &StateBounds,
         params: &Params,
         out: &mut [f32],
-        centering: Option<Centering<'_>>,
     ) {
+        let areas = particles
+            .iter()
+            .map(|particle| context_area(particle, bounds, params));
         match params.features {
-            Features::Gray => {
-                self.cut(frame, particles, bounds, params, out);
-                if let Some(mut centering) = centering {
-                    center_all(out, params.feature_len(), &mut centering);
-                }
-            }
+            Features::Gray => self.gray.cut(frame, areas, params, out),
             Features::Gradients => {
-                let downsample = self.downsample;
-                let area =
-                    |particle| context_area(particle, bounds, params).in_pixels_of(downsample);
-                let areas = particles.iter().map(area);
+                let areas = areas.map(|area| area.in_pixels_of(self.downsample));
                 let size = (params.patch_width as usize, params.patch_height as usize);
-                self.hog.describe(
-                    &self.integral,
-                    areas,
-                    (size, params.chroma_weight),
-                    out,
-                    centering,
-                );
+                let size = (size, params.chroma_weight);
+                self.hog.describe(&self.integral, areas, size, out);
             }
         }
     }
@@ -191,33 +178,12 @@ impl Extractor {
         let areas = std::iter::once(area.in_pixels_of(self.downsample));
         let hog = &mut self.grid_hog;
         hog.reserve(max_columns, max_rows);
-        let (size, values) = ((columns, rows), &mut grid.values);
-        hog.describe(
-            &self.integral,
-            areas,
-            (size, params.chroma_weight),
-            values,
-            None,
-        );
+        let size = ((columns, rows), params.chroma_weight);
+        hog.describe(&self.integral, areas, size, &mut grid.values);
         grid.grays.extend(hog.grays());
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
             cell[GRAY] = 0.0;
         }
-    }
-
-    /// Writes the gray patches of `particles`, of length D each, to `out`, whatever the features are.
-    pub fn cut(
-        &mut self,
-        frame: &Frame,
-        particles: &[Particle],
-        bounds: &StateBounds,
-        params: &Params,
-        out: &mut [f32],
-    ) {
-        let areas = particles
-            .iter()
-            .map(|particle| context_area(particle, bounds, params));
-        self.gray.cut(frame, areas, params, out);
     }
 }
 

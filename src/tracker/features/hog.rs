@@ -6,7 +6,6 @@
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::features::centering::{Centering, center};
 use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::hog_cells::HogCells;
 use crate::tracker::features::integral::IntegralChannels;
@@ -15,88 +14,61 @@ use crate::tracker::image::rect::Rect;
 /// Computes the feature vectors of areas; its memory is kept from one frame to the next.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Hog {
-    columns: usize,
-    rows: usize,
-    /// The cells of two areas: one is summed while the other is normalised.
-    cells: [HogCells; 2],
+    /// Columns and rows of cells.
+    size: (usize, usize),
+    cells: HogCells,
 }
 
 impl Hog {
     /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to
-    /// `out`: `columns * rows * CHANNELS` values each. Then centers them, where that is asked for.
+    /// `out`: `columns * rows * CHANNELS` values each.
     pub fn describe(
         &mut self,
         integral: &IntegralChannels,
         areas: impl Iterator<Item = Rect>,
-        ((columns, rows), chroma_weight): ((usize, usize), f64),
+        (size, chroma_weight): ((usize, usize), f64),
         out: &mut [f32],
-        centering: Option<Centering<'_>>,
     ) {
-        self.resize(columns, rows);
-        for cells in &mut self.cells {
-            cells.chroma_weight = chroma_weight as f32;
-        }
-        describe_all(self, integral, areas, out, centering);
+        self.resize(size);
+        self.cells.chroma_weight = chroma_weight as f32;
+        describe_all(self, integral, areas, out);
     }
 
     /// The gray sums of the cells of the area that was described, if it was only one, with the mean gray subtracted.
     pub fn grays(&self) -> impl Iterator<Item = f32> {
-        self.cells[0].cells.iter().map(|cell| cell.0[GRAY])
+        self.cells.cells.iter().map(|cell| cell.0[GRAY])
     }
 
     /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
     pub fn reserve(&mut self, columns: usize, rows: usize) {
-        if self.cells[0].cells.capacity() < columns * rows {
-            self.resize(columns, rows);
+        if self.cells.cells.capacity() < columns * rows {
+            self.resize((columns, rows));
         }
     }
 
-    fn resize(&mut self, columns: usize, rows: usize) {
-        if (self.columns, self.rows) != (columns, rows) {
-            (self.columns, self.rows) = (columns, rows);
-            for cells in &mut self.cells {
-                cells.resize(columns, rows);
-            }
+    fn resize(&mut self, size: (usize, usize)) {
+        if self.size != size {
+            self.size = size;
+            self.cells.resize(size.0, size.1);
         }
     }
 }
 
-/// A pipeline over the areas: one is summed, the one before is normalised, and the one before that is centered. A value
-/// that was just written takes longer to read than to compute; one area later it is in the cache.
 #[pulp::with_simd(describe_all = Arch::new())]
 #[inline(always)]
 fn describe_all_simd<S: Simd, A: Iterator<Item = Rect>>(
     simd: S,
     hog: &mut Hog,
     integral: &IntegralChannels,
-    mut areas: A,
+    areas: A,
     out: &mut [f32],
-    mut centering: Option<Centering<'_>>,
 ) {
-    let size = (hog.columns, hog.rows);
-    let [current, previous] = &mut hog.cells;
-    let (mut current, mut previous) = (current, previous);
-    let mut next = areas.next();
-    if let Some(area) = &next {
-        current.locate(integral, area, size);
+    let (columns, rows) = hog.size;
+    let vectors = out.chunks_exact_mut(columns * rows * CHANNELS);
+    for (area, vector) in areas.zip(vectors) {
+        hog.cells.sum(simd, integral, &area, hog.size);
+        hog.cells.normalize(simd, columns, vector);
     }
-    let mut vectors = out.chunks_exact_mut(size.0 * size.1 * CHANNELS);
-    let (mut to_normalize, mut to_center) = (&mut [][..], &mut [][..]);
-    while let Some(area) = next {
-        next = areas.next();
-        if let Some(area) = &next {
-            previous.locate(integral, area, size);
-        }
-        current.sum(simd, integral, &area, size.0);
-        previous.normalize(simd, size.0, to_normalize);
-        center(simd, &mut centering, to_center);
-        to_center = to_normalize;
-        to_normalize = vectors.next().expect("a vector for each area");
-        (current, previous) = (previous, current);
-    }
-    previous.normalize(simd, size.0, to_normalize);
-    center(simd, &mut centering, to_center);
-    center(simd, &mut centering, to_normalize);
 }
 
 #[cfg(test)]
@@ -166,8 +138,7 @@ mod tests {
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
             integral.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
-            cells.locate(&integral, &area, (4, 4));
-            cells.sum(pulp::Scalar, &integral, &area, 4);
+            cells.sum(pulp::Scalar, &integral, &area, (4, 4));
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
                 let x = area.x + (index % 4) as f64 * width;
@@ -194,7 +165,7 @@ mod tests {
         let mut out = vec![1.0; params.feature_len()];
         let areas = std::iter::once(area);
         let size = (size, params.chroma_weight);
-        Hog::default().describe(&integral, areas, size, &mut out, None);
+        Hog::default().describe(&integral, areas, size, &mut out);
         out
     }
 

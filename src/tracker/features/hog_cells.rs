@@ -64,10 +64,11 @@ impl HogCells {
         self.y_edges.resize(rows + 1);
     }
 
-    /// Finds the edges of the cells of `area`, for [`sum`](Self::sum).
+    /// Sums the cells of `area`, and their energies.
     #[inline(always)]
-    pub fn locate(
+    pub fn sum<S: Simd>(
         &mut self,
+        simd: S,
         integral: &IntegralChannels,
         area: &Rect,
         (columns, rows): (usize, usize),
@@ -76,17 +77,6 @@ impl HogCells {
         let height = (area.height / rows as f64) as f32;
         integral.locate_columns((area.x as f32, width), &mut self.x_edges);
         integral.locate_rows((area.y as f32, height), &mut self.y_edges);
-    }
-
-    /// Sums the cells of the area that was located, and their energies.
-    #[inline(always)]
-    pub fn sum<S: Simd>(
-        &mut self,
-        simd: S,
-        integral: &IntegralChannels,
-        area: &Rect,
-        columns: usize,
-    ) {
         let mut totals = [Lanes::ZERO; 2];
         let mut first = 0;
         while first + STRIP <= columns {
@@ -180,12 +170,9 @@ impl HogCells {
         }
     }
 
-    /// Writes the feature vector of the cells to `out`, or nothing where `out` is empty.
+    /// Writes the feature vector of the cells to `out`.
     #[inline(always)]
     pub fn normalize<S: Simd>(&mut self, simd: S, columns: usize, out: &mut [f32]) {
-        if out.is_empty() {
-            return;
-        }
         let (count, cell_area, grays) = (self.cells.len() as f32, self.cell_area, self.grays);
         let mean = grays.sum / count;
         let variance = (grays.squares / count - mean * mean).max(0.0);

@@ -9,13 +9,12 @@
 //! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind |
 //! | [`gray`] | gray patches |
 //! | [`hog`] | the gradient histograms of many areas |
-//! | [`centering`] | a mean subtracted from vectors |
 //! | [`hog_cells`], [`block_norm`] | the cells of one area, and the normalisation of their directions |
 //! | [`integral`] | the integral image that cells are sums of |
 //! | [`gradient`], [`binning`] | a row of gradients, and its row of the integral image |
 //! | [`sample_coords`] | coordinates in the integral image |
 //! | [`channels`] | the order of the channels |
-//! | [`quantized`] | a vector in 8 bits a value, as the state keeps it |
+//! | [`quantized`] | vectors in 8 or 14 bits a value, as the state keeps them |
 //!
 //! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
 //! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and
@@ -23,7 +22,6 @@
 
 pub(crate) mod binning;
 pub(crate) mod block_norm;
-pub(crate) mod centering;
 pub(crate) mod channels;
 pub(crate) mod extractor;
 pub(crate) mod gradient;

@@ -1,26 +1,53 @@
-//! A feature vector in 8 bits a value, as the state keeps it.
+//! Vectors in 8 or 14 bits a value, as the state keeps them.
 //!
-//! A session keeps more than a hundred vectors, of the bag's subspaces and of the background. Each has a scale of its
-//! own, so a value is off by at most 1/254 of the vector's largest.
+//! A session keeps more than a hundred feature vectors, of the bag's subspaces and of the background. Each has a scale
+//! of its own, so a value is off by at most 1/254 of the vector's largest. Running means need more: a small step must
+//! change them.
 
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 /// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
 const ROUND: f32 = 12_582_912.0;
-/// The largest quantised value.
-const MAX_VALUE: f32 = 127.0;
 
-/// A feature vector: `scale` times 8-bit values.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct QuantizedVector {
-    scale: f32,
-    values: Vec<i8>,
+/// A quantised value.
+pub(crate) trait Level: Copy + Default + Into<f32> {
+    /// The largest one.
+    const MAX: f32;
+    /// The number in the last bits.
+    fn from_bits(bits: u32) -> Self;
 }
+
+impl Level for i8 {
+    const MAX: f32 = 127.0;
+    #[inline(always)]
+    fn from_bits(bits: u32) -> Self {
+        bits as i8
+    }
+}
+
+impl Level for i16 {
+    /// Two bytes at most in a snapshot, whose whole numbers have seven bits a byte.
+    const MAX: f32 = 8191.0;
+    #[inline(always)]
+    fn from_bits(bits: u32) -> Self {
+        bits as i16
+    }
+}
+
+/// A vector: `scale` times whole numbers.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Quantized<T> {
+    scale: f32,
+    values: Vec<T>,
+}
+
+/// A feature vector.
+pub(crate) type QuantizedVector = Quantized<i8>;
 
 #[pulp::with_simd(quantize = Arch::new())]
 #[inline(always)]
-fn quantize_simd<S: Simd>(_: S, vector: &mut QuantizedVector, features: &[f32]) {
+fn quantize_simd<S: Simd, T: Level>(_: S, vector: &mut Quantized<T>, features: &[f32]) {
     // Sixteen maxima, so that the loop vectorises.
     let mut maxima = [0.0_f32; 16];
     let (chunks, rest) = features.as_chunks::<16>();
@@ -31,19 +58,19 @@ fn quantize_simd<S: Simd>(_: S, vector: &mut QuantizedVector, features: &[f32]) 
         }
     }
     let all = maxima.iter().chain(rest);
-    vector.scale = all.fold(0.0_f32, |max, value| max.max(value.abs())) / MAX_VALUE;
+    vector.scale = all.fold(0.0_f32, |max, value| max.max(value.abs())) / T::MAX;
     let inverse = if vector.scale > 0.0 {
         1.0 / vector.scale
     } else {
         0.0
     };
-    vector.values.resize(features.len(), 0);
+    vector.values.resize(features.len(), T::default());
     for (quantized, value) in vector.values.iter_mut().zip(features) {
-        *quantized = (value * inverse + ROUND).to_bits() as i8;
+        *quantized = T::from_bits((value * inverse + ROUND).to_bits());
     }
 }
 
-impl QuantizedVector {
+impl<T: Level> Quantized<T> {
     /// Quantises `features` in place of the vector that was there.
     pub fn set(&mut self, features: &[f32]) {
         quantize(self, features);
@@ -54,7 +81,7 @@ impl QuantizedVector {
     pub fn add_to(&self, target: &mut [f32], factor: f32) {
         let factor = factor * self.scale;
         for (target, &value) in target.iter_mut().zip(&self.values) {
-            *target += factor * f32::from(value);
+            *target += factor * value.into();
         }
     }
 
@@ -67,13 +94,13 @@ impl QuantizedVector {
             return;
         }
         for ((out, &value), mean) in out.iter_mut().zip(&self.values).zip(mean) {
-            *out = self.scale * f32::from(value) - mean;
+            *out = self.scale * value.into() - mean;
         }
     }
 
     /// Whether this is a feature vector of length `len` with no absolute value above `max`.
     pub fn is_valid_for(&self, len: usize, max: f32) -> bool {
-        self.values.len() == len && (0.0..=max / MAX_VALUE).contains(&self.scale)
+        self.values.len() == len && (0.0..=max / T::MAX).contains(&self.scale)
     }
 }
 
@@ -99,6 +126,12 @@ mod tests {
             .map(|v| (v / vector.scale).round() as i8)
             .collect();
         assert_eq!(vector.values, rounded);
+        let mut finer = Quantized::<i16>::default();
+        finer.set(&features);
+        finer.write(&[], &mut back);
+        for (value, back) in features.iter().zip(&back) {
+            assert!((value - back).abs() <= 0.3 / 16_382.0 + 1e-6);
+        }
         vector.set(&[0.0; 3]);
         let mut zeros = vec![0.0; 3];
         vector.add_to(&mut zeros, 1.0);

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use crate::tracker::image::plane::Plane;
-use crate::tracker::image::ycbcr::{self, chroma_size};
+use crate::tracker::image::ycbcr::{self, Order, chroma_size};
 
 /// Why pixels do not make a frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -57,19 +57,28 @@ impl Frame {
     /// # Errors
     /// As [`from_luma`](Self::from_luma).
     pub fn from_rgb(width: u32, height: u32, rgb: &[u8]) -> Result<Self, FrameError> {
-        let size = (width, height);
-        let pixels = rgb.as_chunks::<3>().0;
-        let luma: Vec<u8> = pixels.iter().map(|&pixel| ycbcr::luma(pixel)).collect();
-        let is_whole = rgb.len() as u64 == 3 * u64::from(width) * u64::from(height);
-        let chroma = is_whole.then(|| ycbcr::chroma(size, |i| pixels[i]));
-        match chroma {
-            Some(chroma) => Self::from_reduced(size, size, luma, Some(chroma)),
-            None => Err(FrameError::Size {
-                width,
-                height,
-                pixels: luma.len(),
-            }),
+        Self::from_triples((width, height), rgb, Order::Rgb)
+    }
+
+    /// As [`from_rgb`](Self::from_rgb), of BGR triples, the order of OpenCV.
+    ///
+    /// # Errors
+    /// As [`from_luma`](Self::from_luma).
+    pub fn from_bgr(width: u32, height: u32, bgr: &[u8]) -> Result<Self, FrameError> {
+        Self::from_triples((width, height), bgr, Order::Bgr)
+    }
+
+    fn from_triples(size: (u32, u32), triples: &[u8], order: Order) -> Result<Self, FrameError> {
+        let pixels = triples.as_chunks::<3>().0;
+        if triples.len() as u64 != 3 * u64::from(size.0) * u64::from(size.1) || pixels.is_empty() {
+            return Err(FrameError::Size {
+                width: size.0,
+                height: size.1,
+                pixels: pixels.len(),
+            });
         }
+        let (luma, chroma) = ycbcr::planes(pixels, size, order);
+        Self::from_reduced(size, size, luma, Some(chroma))
     }
 
     /// A frame that was uploaded in the size `source` and reduced to `size`: `luma` of this size and chroma of half of

@@ -19,10 +19,42 @@ pub(crate) fn combine<S: Simd>(
     vectors: &[f32],
     len: usize,
 ) {
-    combine_as::<S, false, false>(simd, targets, factor, coefficients, vectors, len);
+    let (count, terms) = (targets.len() / len, vectors.len() / len);
+    if terms == 0 {
+        return;
+    }
+    let columns = 2 * S::F32_LANES;
+    let whole = len - len % columns;
+    let scale = simd.splat_f32s(factor);
+    for column in (0..whole).step_by(columns) {
+        for first in (0..count).step_by(TILE) {
+            // A tile at the end has the last target more than once.
+            let rows: [&[f32]; TILE] = std::array::from_fn(|p| {
+                &coefficients[(first + p).min(count - 1) * terms..][..terms]
+            });
+            let sums = tile(simd, rows, &vectors[column..], len);
+            for (p, sums) in sums.iter().enumerate().take(count - first) {
+                let target = &mut targets[(first + p) * len + column..][..columns];
+                let (target, _) = S::as_mut_simd_f32s(target);
+                for (target, sum) in target.iter_mut().zip(sums) {
+                    *target = simd.mul_add_e_f32s(*sum, scale, *target);
+                }
+            }
+        }
+    }
+    if whole < len {
+        let rows = coefficients.chunks_exact(terms);
+        for (target, row) in targets.chunks_exact_mut(len).zip(rows) {
+            for (vector, coefficient) in vectors.chunks_exact(len).zip(row) {
+                for (target, value) in target[whole..].iter_mut().zip(&vector[whole..]) {
+                    *target += factor * coefficient * value;
+                }
+            }
+        }
+    }
 }
 
-/// As [`combine`], but replaces what is in `targets`.
+/// As [`combine`] with the factor 1, but replaces what is in `targets`.
 #[inline(always)]
 pub(crate) fn assign_combinations<S: Simd>(
     simd: S,
@@ -31,78 +63,8 @@ pub(crate) fn assign_combinations<S: Simd>(
     vectors: &[f32],
     len: usize,
 ) {
-    combine_as::<S, true, false>(simd, targets, 1.0, coefficients, vectors, len);
-}
-
-/// As [`assign_combinations`] with a lower triangular matrix of coefficients.
-#[inline(always)]
-pub(crate) fn assign_triangular<S: Simd>(
-    simd: S,
-    targets: &mut [f32],
-    coefficients: &[f32],
-    vectors: &[f32],
-    len: usize,
-) {
-    combine_as::<S, true, true>(simd, targets, 1.0, coefficients, vectors, len);
-}
-
-#[inline(always)]
-fn combine_as<S: Simd, const IS_NEW: bool, const IS_LOWER: bool>(
-    simd: S,
-    targets: &mut [f32],
-    factor: f32,
-    coefficients: &[f32],
-    vectors: &[f32],
-    len: usize,
-) {
-    let (count, terms) = (targets.len() / len, vectors.len() / len);
-    if terms == 0 {
-        if IS_NEW {
-            targets.fill(0.0);
-        }
-        return;
-    }
-    let columns = 2 * S::F32_LANES;
-    let whole = len - len % columns;
-    let scale = simd.splat_f32s(factor);
-    for column in (0..whole).step_by(columns) {
-        for first in (0..count).step_by(TILE) {
-            let used = if IS_LOWER {
-                terms.min(first + TILE)
-            } else {
-                terms
-            };
-            // A tile at the end has the last target more than once.
-            let rows: [&[f32]; TILE] = std::array::from_fn(|p| {
-                &coefficients[(first + p).min(count - 1) * terms..][..used]
-            });
-            let sums = tile(simd, rows, &vectors[column..], len);
-            for (p, sums) in sums.iter().enumerate().take(count - first) {
-                let target = &mut targets[(first + p) * len + column..][..columns];
-                let (target, _) = S::as_mut_simd_f32s(target);
-                for (target, sum) in target.iter_mut().zip(sums) {
-                    *target = if IS_NEW {
-                        simd.mul_f32s(*sum, scale)
-                    } else {
-                        simd.mul_add_e_f32s(*sum, scale, *target)
-                    };
-                }
-            }
-        }
-    }
-    if whole < len {
-        let rows = coefficients.chunks_exact(terms);
-        for (target, row) in targets.chunks_exact_mut(len).zip(rows) {
-            if IS_NEW {
-                target[whole..].fill(0.0);
-            }
-            for (vector, coefficient) in vectors.chunks_exact(len).zip(row) {
-                for (target, value) in target[whole..].iter_mut().zip(&vector[whole..]) {
-                    *target += factor * coefficient * value;
-                }
-            }
-        }
-    }
+    targets.fill(0.0);
+    combine(simd, targets, 1.0, coefficients, vectors, len);
 }
 
 /// The combinations with coefficients `rows` of the first two registers of each of `vectors`.
@@ -148,24 +110,12 @@ mod tests {
                     assert!((sums[i * len + d] - given[i * len + d] + 0.5 * sum).abs() < 1e-4);
                 }
             }
-            let mut lower = coefficients.clone();
-            for (at, coefficient) in lower.iter_mut().enumerate() {
-                if at % terms > at / terms {
-                    *coefficient = 0.0;
-                }
-            }
-            for (coefficients, is_lower) in [(&coefficients, false), (&lower, true)] {
-                let mut expected = vec![0.0; count * len];
-                add_combinations(&mut expected, 1.0, coefficients, &vectors, len);
-                let mut found = given.clone();
-                if is_lower {
-                    assign_triangular(pulp::Scalar, &mut found, coefficients, &vectors, len);
-                } else {
-                    assign_combinations(pulp::Scalar, &mut found, coefficients, &vectors, len);
-                }
-                for (expected, found) in expected.iter().zip(&found) {
-                    assert!((expected - found).abs() < 1e-4);
-                }
+            let mut expected = vec![0.0; count * len];
+            add_combinations(&mut expected, 1.0, &coefficients, &vectors, len);
+            let mut found = given.clone();
+            assign_combinations(pulp::Scalar, &mut found, &coefficients, &vectors, len);
+            for (expected, found) in expected.iter().zip(&found) {
+                assert!((expected - found).abs() < 1e-4);
             }
         }
     }

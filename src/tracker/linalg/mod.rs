@@ -8,7 +8,7 @@
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
 //! | `scratch` | nothing: the buffers of the others |
-//! | `exp`, `acos` | e^x and arccos² of many numbers at once, f64 |
+//! | `acos` | arccos² of many numbers at once, f64 |
 //!
 //! In and out: plain slices. A set of n vectors of length D is one slice of n D values, one vector after the other; a
 //! matrix is a slice in row order. Nothing has a unit, and nothing is allocated but by buffers that grow.
@@ -23,7 +23,6 @@
 pub(crate) mod acos;
 pub(crate) mod combinations;
 pub(crate) mod element;
-pub(crate) mod exp;
 pub(crate) mod gemm;
 pub(crate) mod jacobi;
 pub(crate) mod scratch;

@@ -56,13 +56,7 @@ pub(crate) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
 /// Scales a vector to length 1; a vector of zeros stays.
 #[inline(always)]
 pub(crate) fn normalize(vector: &mut [f32]) {
-    normalize_with(dot(vector, vector), vector);
-}
-
-/// As [`normalize`], for a vector whose squared length is known.
-#[inline(always)]
-pub(crate) fn normalize_with(square: f32, vector: &mut [f32]) {
-    let length = square.sqrt();
+    let length = dot(vector, vector).sqrt();
     if length > 1e-9 {
         let scale = 1.0 / length;
         vector.iter_mut().for_each(|value| *value *= scale);

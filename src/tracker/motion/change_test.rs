@@ -219,11 +219,10 @@ mod tests {
         };
         let (mut sums, mut beside) = ([0.0; 5], 0.0);
         // Compared is what is within 60 pixels of a box 30 wide around 52: up to pixel 32.
-        for index in 0..last.len() {
+        for (index, &pixel) in test.image.pixels.iter().enumerate() {
             let (x, y) = (index % test.image.width(), index / test.image.width());
             if (3..32).contains(&x) && within(now, x, y) && !within(was, x, y) {
-                let (a, b) = (test.image.pixels[index], last[index - 3]);
-                let (a, b) = (f64::from(a), f64::from(b));
+                let (a, b) = (f64::from(pixel), f64::from(last[index - 3]));
                 for (sum, value) in sums.iter_mut().zip([a, b, a * a, b * b, a * b]) {
                     *sum += value;
                 }

@@ -15,7 +15,7 @@ use crate::tracker::motion::particles::{Particle, StateBounds};
 pub(crate) const CELL: usize = 4;
 
 /// What is further from the last box than this, in working pixels, is left out.
-const MARGIN: f64 = 320.0;
+const MARGIN: f64 = 160.0;
 /// The most pixels along a side of the small image.
 const MAX_SIDE: usize = 256;
 

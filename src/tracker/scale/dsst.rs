@@ -9,45 +9,25 @@
 //!
 //! with the Fourier transforms along the scale Zᵢ and Fᵢ of feature i of the pyramid that is searched and of the one
 //! that is learned, and G that of the desired response, a Gaussian at the middle.
-//!
-//! The maximum of the response y measures the certainty: 0.4 to 0.8 on a target in full sight, 0.2 and less where it is
-//! covered, turned or missed. There the scale stays, or it would drift within a few frames.
 
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
+use crate::tracker::features::quantized::Quantized;
 use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
+use crate::tracker::scale::maximum::Maximum;
 use crate::tracker::scale::pyramid::{self, FOURIER, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch};
 
 /// λ, against energies of about 1: it only keeps flat pyramids from a division by zero.
 const LAMBDA: f32 = 0.01;
-/// The largest change of the logarithm of the scale in a frame: a maximum further off is mostly a neighbouring object.
-const MAX_CHANGE: f64 = 0.06;
-/// The share of a change that is applied, so that noise averages out.
-const GAIN: f64 = 0.75;
-/// √(width · height) in working pixels of a target whose measured scale counts as much as that of the particles.
-const HALF_RELIANCE: f64 = 16.0;
-/// Maxima of the response of which none of the change is applied, and from which on all of it.
-const MIN_RESPONSE: f64 = 0.3;
-const FULL_RESPONSE: f64 = 0.6;
-
 /// The filter's state: empty while it is off or has not learned yet.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct ScaleFilter {
     /// A: for each frequency the real parts of all features, then the imaginary parts.
-    numerators: Vec<f32>,
+    numerators: Vec<[Quantized<i16>; 2]>,
     /// B, for each frequency.
     energies: Vec<f32>,
-}
-
-/// The maximum of the filter's response.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Maximum {
-    /// The logarithm of the scale there against that of the pyramid's middle.
-    pub change: f64,
-    /// y there.
-    pub response: f64,
 }
 
 impl ScaleFilter {
@@ -98,25 +78,11 @@ impl ScaleFilter {
             0
         };
         let len = pyramid::params(params).feature_len();
-        self.numerators.len() == frequencies * 2 * len
+        let mut rows = self.numerators.as_flattened().iter();
+        self.numerators.len() == frequencies
             && self.energies.len() == frequencies
-            && self.numerators.iter().all(|value| value.abs() <= max)
+            && rows.all(|row| row.is_valid_for(len, max))
             && self.energies.iter().all(|b| (0.0..=max).contains(b))
-    }
-}
-
-/// How much a measurement counts against the scale of the particles, 0 to 1, of a target with `side` = √(width · height)
-/// working pixels: a pyramid of few pixels tells little.
-pub(crate) fn reliance(side: f64) -> f64 {
-    1.0 / (1.0 + (HALF_RELIANCE / side).powi(4))
-}
-
-impl Maximum {
-    /// The change of the logarithm of the scale to apply: bounded, damped, and none where the response is low.
-    pub fn gated_change(&self) -> f64 {
-        let certainty = (self.response - MIN_RESPONSE) / (FULL_RESPONSE - MIN_RESPONSE);
-        let change = self.change.clamp(-MAX_CHANGE, MAX_CHANGE);
-        GAIN * certainty.clamp(0.0, 1.0) * change
     }
 }
 
@@ -130,24 +96,28 @@ fn learn_simd<S: Simd>(simd: S, filter: &mut ScaleFilter, scratch: &mut Scratch,
     } else {
         1.0
     };
-    filter.numerators.resize(FREQUENCIES * 2 * len, 0.0);
+    filter.numerators.resize_with(FREQUENCIES, Default::default);
     filter.energies.resize(FREQUENCIES, 0.0);
-    let numerators = filter.numerators.chunks_exact_mut(2 * len);
-    let spectrum = scratch.spectrum.chunks_exact(2 * len);
-    for (((a, b), f), g) in numerators
-        .zip(&mut filter.energies)
-        .zip(spectrum)
-        .zip(&FOURIER.desired)
-    {
+    let Scratch { spectrum, row, .. } = scratch;
+    let spectrum = spectrum.chunks_exact(2 * len);
+    let state = filter.numerators.iter_mut().zip(&mut filter.energies);
+    for (((a, b), f), g) in state.zip(spectrum).zip(&FOURIER.desired) {
         *b += rate * (vector_ops::dot(f, f) - *b);
-        a.iter_mut().for_each(|value| *value *= 1.0 - rate);
         let (g_real, g_imaginary) = (g.0 as f32 * rate, g.1 as f32 * rate);
         let (f_real, f_imaginary) = f.split_at(len);
-        let (a_real, a_imaginary) = a.split_at_mut(len);
-        vector_ops::add(a_real, g_real, f_real);
-        vector_ops::add(a_real, g_imaginary, f_imaginary);
-        vector_ops::add(a_imaginary, g_real, f_imaginary);
-        vector_ops::add(a_imaginary, -g_imaginary, f_real);
+        let terms = [
+            [(g_real, f_real), (g_imaginary, f_imaginary)],
+            [(g_real, f_imaginary), (-g_imaginary, f_real)],
+        ];
+        for (a, terms) in a.iter_mut().zip(terms) {
+            row.clear();
+            row.resize(len, 0.0);
+            a.add_to(row, 1.0 - rate);
+            for (factor, values) in terms {
+                vector_ops::add(row, factor, values);
+            }
+            a.set(row);
+        }
     }
 }
 
@@ -156,18 +126,20 @@ fn learn_simd<S: Simd>(simd: S, filter: &mut ScaleFilter, scratch: &mut Scratch,
 #[inline(always)]
 fn respond_simd<S: Simd>(simd: S, filter: &ScaleFilter, scratch: &mut Scratch) -> [f64; LEVELS] {
     let len = scratch.transform(simd);
-    let numerators = filter.numerators.chunks_exact(2 * len);
-    let spectrum = scratch.spectrum.chunks_exact(2 * len);
+    let Scratch { spectrum, row, .. } = scratch;
+    row.resize(2 * len, 0.0);
     let mut quotients = [(0.0, 0.0); FREQUENCIES];
-    for (((quotient, a), z), b) in quotients
+    let state = filter.numerators.iter().zip(&filter.energies);
+    for ((quotient, (a, b)), z) in quotients
         .iter_mut()
-        .zip(numerators)
-        .zip(spectrum)
-        .zip(&filter.energies)
+        .zip(state)
+        .zip(spectrum.chunks_exact(2 * len))
     {
-        let (a_real, a_imaginary) = a.split_at(len);
+        let (a_real, a_imaginary) = row.split_at_mut(len);
+        a[0].write(&[], a_real);
+        a[1].write(&[], a_imaginary);
         let (z_real, z_imaginary) = z.split_at(len);
-        let real = vector_ops::dot(a, z);
+        let real = vector_ops::dot(a_real, z_real) + vector_ops::dot(a_imaginary, z_imaginary);
         let imaginary = vector_ops::dot(a_real, z_imaginary) - vector_ops::dot(a_imaginary, z_real);
         let denominator = f64::from(b + LAMBDA);
         *quotient = (
@@ -189,6 +161,7 @@ fn respond_simd<S: Simd>(simd: S, filter: &ScaleFilter, scratch: &mut Scratch) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracker::scale::maximum::{FULL_RESPONSE, MIN_RESPONSE};
     use crate::tracker::scale::pyramid::RESPONSE_STD;
     use std::f64::consts::TAU;
 
@@ -219,7 +192,7 @@ mod tests {
         let filter = learned();
         let mut seen = pyramid(1.0);
         let found = respond(&filter, &mut seen);
-        // The same by the definition, with complex sums over all frequencies.
+        // The same by the definition, with complex sums over the frequencies and their negatives.
         let mut learned = pyramid(0.0);
         learned.transform(pulp::Scalar);
         seen = pyramid(1.0);
@@ -236,7 +209,8 @@ mod tests {
         let gaussian = |level: usize| (-0.5 * ((level as f64 - 8.0) / RESPONSE_STD).powi(2)).exp();
         for (level, found) in found.iter().enumerate() {
             let mut expected = 0.0;
-            for frequency in 0..LEVELS {
+            let kept = |frequency: &usize| (*frequency).min(LEVELS - frequency) < FREQUENCIES;
+            for frequency in (0..LEVELS).filter(kept) {
                 let g = fourier(&gaussian, frequency);
                 let (mut product, mut energy) = ((0.0, 0.0), f64::from(LAMBDA));
                 for i in 0..LEN {

@@ -1,7 +1,7 @@
 //! The scale pyramid: areas around one centre, each a step larger than the one before, and their Fourier transform
 //! along the scale. The areas show the box alone, since its rim shows the background.
 //!
-//! The transform is a product with a matrix of 18 rows: for this length an FFT of each feature (realfft 3.5) takes ten
+//! The transform is a product with a matrix of ten rows: for this length an FFT of each feature (realfft 3.5) takes ten
 //! times as long.
 
 use std::f64::consts::TAU;
@@ -19,8 +19,9 @@ use crate::tracker::params::table::Params;
 pub(crate) const LEVELS: usize = 17;
 pub(crate) const STEP: f64 = 0.03;
 pub(crate) const MIDDLE: usize = LEVELS / 2;
-/// Frequencies of a real signal of that length.
-pub(crate) const FREQUENCIES: usize = LEVELS / 2 + 1;
+/// The lowest frequencies, which make the filter: the others of a real signal of that length add less than a hundredth
+/// to the response, since the desired one has next to nothing of them.
+pub(crate) const FREQUENCIES: usize = 5;
 /// Cells along a side of an area. Fewer describe the inside of a target too coarsely.
 const CELLS: u32 = 8;
 /// Standard deviation of the desired response, in levels.
@@ -35,6 +36,8 @@ pub(crate) struct Scratch {
     /// Their Fourier transform along the scale: for each frequency the real parts of all features, then the
     /// imaginary parts.
     pub spectrum: Vec<f32>,
+    /// A row of the filter.
+    pub row: Vec<f32>,
 }
 
 /// The parameters of a pyramid's features: the box alone, in cells of its own.

@@ -6,8 +6,6 @@
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::linalg::exp;
-
 /// The likelihoods of a frame's particles; keeps its buffers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Likelihoods {
@@ -29,7 +27,7 @@ fn weigh_simd<S: Simd>(
 ) {
     let entries = distances.len() / weights.len();
     likelihoods.normalize(distances, entries, sigma);
-    exp::exp(weights);
+    exponentials(weights);
     likelihoods.sum_rule(entries, pinned, weights);
 }
 
@@ -84,7 +82,7 @@ impl Likelihoods {
             let exponents = row.iter().zip(of_entries.iter());
             values.extend(exponents.map(|(distance, least)| (least - distance) * share));
         }
-        exp::exp(values);
+        exponentials(values);
         let sums = of_entries;
         sums.fill(0.0);
         for row in values.chunks_exact(entries) {
@@ -119,6 +117,10 @@ impl Likelihoods {
             weights.fill(equal);
         }
     }
+}
+
+fn exponentials(values: &mut [f64]) {
+    values.iter_mut().for_each(|value| *value = value.exp());
 }
 
 /// The particle with the greatest weight (equation 12), the first of equals.
