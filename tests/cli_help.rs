@@ -1,4 +1,4 @@
-//! `bagtrack track --help` and `bagtrack eval --help` list the parameters that `--set` takes.
+//! What `--help` says: commands on one screen, and the parameters that `--set` takes.
 
 mod command;
 
@@ -64,4 +64,19 @@ fn the_short_help_stays_short_and_points_to_the_long_one() {
             assert!(!help.contains(row.name), "{command} -h names {}", row.name);
         }
     }
+}
+
+#[test]
+fn the_help_of_the_program_fits_a_screen_and_names_the_commands() {
+    let help = succeeds(&["--help"]);
+    assert!(help.lines().count() <= 24, "{help}");
+    for command in ["serve", "track", "eval", "sample", "health"] {
+        let named = help
+            .lines()
+            .any(|line| line.trim_start().starts_with(command));
+        assert!(named, "{command}: {help}");
+    }
+    assert!(help.contains("bagtrack serve --help"), "{help}");
+    // The settings are where it says, and hold without the command, too.
+    assert!(succeeds(&["serve", "--help"]).contains("--session-idle"));
 }

@@ -54,6 +54,10 @@ pub struct Args {
     /// names.
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
+    /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
+    /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at"])]
+    results: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -97,6 +101,9 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     }
     if let Some(dir) = &args.plots {
         plots::draw(dir, &evaluated)?;
+    }
+    if let Some(dir) = &args.results {
+        eval::results::write(dir, &evaluated[0].runs)?;
     }
     let preset = args.params.preset;
     let mut reports = Vec::new();

@@ -1,6 +1,7 @@
 //! `bagtrack health`: asks a running service whether it is healthy, for health checks in containers without another
 //! client.
 
+use bagtrack::http::{parse_duration, parse_listen};
 use http::Uri;
 use std::error::Error;
 use std::io::{Read, Write};
@@ -17,10 +18,10 @@ pub struct Args {
     #[arg(long, env = "BAGTRACK_URL")]
     url: Option<Uri>,
     /// The address that the service listens on.
-    #[arg(long, env = "BAGTRACK_LISTEN", default_value = "127.0.0.1:8080")]
+    #[arg(long, env = "BAGTRACK_LISTEN", default_value = "127.0.0.1:8080", value_parser = parse_listen)]
     listen: SocketAddr,
     /// How long to wait for it.
-    #[arg(long, default_value = "3s", value_parser = humantime::parse_duration)]
+    #[arg(long, default_value = "3s", value_parser = parse_duration)]
     timeout: Duration,
 }
 

@@ -17,11 +17,13 @@ mod sample;
 mod serve;
 mod signals;
 mod track;
+mod track_frames;
+mod track_writer;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Follows one object through frames: a service, and the same tracker on folders of frames.
+/// Follows one object through frames: a service, and the same tracker on videos and folders of frames.
 #[derive(Debug, Parser)]
 #[command(
     name = "bagtrack",
@@ -38,11 +40,14 @@ pub struct Cli {
     serve: serve::Args,
 }
 
+const AFTER: &str = "Without a command the service runs. It takes the settings of `bagtrack serve --help`, as flags or \
+    as variables\nof the environment, and listens on http://127.0.0.1:8080.";
+
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run the HTTP service (the default).
     Serve(Box<serve::Args>),
-    /// Track through a folder of frames.
+    /// Track through a video or a folder of frames.
     Track(track::Args),
     /// Measure accuracy and speed on annotated sequences.
     Eval(eval::Args),
@@ -50,6 +55,15 @@ enum Command {
     Sample(sample::Args),
     /// Ask a running service whether it is healthy.
     Health(health::Args),
+}
+
+/// Reads the command line. The settings of the service are in the help of `serve` only, so that this one fits a screen.
+pub fn parse() -> Cli {
+    let command = Cli::command()
+        .mut_args(|arg| arg.hide(true))
+        .after_help(AFTER);
+    let matches = command.get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 /// Runs the command.

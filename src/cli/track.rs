@@ -1,19 +1,22 @@
 //! `bagtrack track`.
 
 use super::params::ParamFlags;
-use super::{draw, output, progress};
-use bagtrack::eval::{Sequence, frames};
+use super::progress;
+use super::track_frames::Frames;
+use super::track_writer::Writer;
+use bagtrack::eval::Sequence;
 use bagtrack::ingest::{self, Limits};
 use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
-use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Flags of `track`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/.
-    dir: PathBuf,
+    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/; or a video file,
+    /// for which ffmpeg must be installed.
+    #[arg(value_name = "VIDEO|DIR")]
+    path: PathBuf,
     /// The target in the first frame: x,y,width,height in pixels, 0-based from the top-left corner, as the service
     /// takes it. Without it, the first box of groundtruth_rect.txt in DIR is taken (1-based there).
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rect, allow_hyphen_values = true)]
@@ -26,7 +29,8 @@ pub struct Args {
     /// `otb`: x,y,width,height a line (0-based pixels, unlike files of the benchmark). `json`: an object a line.
     #[arg(long, value_enum, default_value_t = Format::Otb)]
     format: Format,
-    /// Also writes every frame with its box into this new folder: green tracking, orange uncertain, red lost.
+    /// Also writes every frame with its box: green tracking, orange uncertain, red lost. OUT is a new folder, or a new
+    /// video file (.mp4, .webm, .mkv, .mov), for which ffmpeg must be installed.
     #[arg(long, value_name = "OUT")]
     draw: Option<PathBuf>,
 }
@@ -41,7 +45,8 @@ enum Format {
 #[derive(serde::Serialize)]
 struct Line<'a> {
     frame: u64,
-    file: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<&'a str>,
     #[serde(rename = "box")]
     target: Rect,
     score: f32,
@@ -54,37 +59,39 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(seed) = args.seed {
         params.seed = seed;
     }
-    let paths = frames::list(&args.dir)?;
+    let mut frames = Frames::open(&args.path)?;
     let target = match args.target {
         Some(target) => target,
-        None => first_annotated(&args.dir)?,
+        None => first_annotated(&args.path)?,
     };
-    if let Some(folder) = &args.draw {
-        output::new_folder(folder)?;
-    }
-    let bar = progress::bar(paths.len() as u64, "frames");
+    let writer = args
+        .draw
+        .as_deref()
+        .map(|out| Writer::open(out, frames.rate()));
+    let mut writer = writer.transpose()?;
+    let bar = progress::bar_or_count(frames.count(), "frames");
     let mut tracker = None;
-    for path in &paths {
-        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-        let bytes = fs::read(path).map_err(|error| named(&error))?;
-        let estimate =
-            advance(&mut tracker, &bytes, target, &params).map_err(|error| named(&error))?;
-        if let Some(folder) = &args.draw {
-            let drawn = draw::with_box(&bytes, &estimate).map_err(|error| named(&error))?;
-            let stem = Path::new(path.file_name().unwrap_or_default());
-            let file = folder.join(stem.with_extension("jpg"));
-            fs::write(&file, drawn).map_err(|error| format!("{}: {error}", file.display()))?;
+    while let Some(frame) = frames.next()? {
+        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", frame.shown);
+        let estimate = advance(&mut tracker, &frame.bytes, target, &params);
+        let estimate = estimate.map_err(|error| named(&error))?;
+        if let Some(writer) = &mut writer {
+            let written = writer.add(&frame, &estimate);
+            written.map_err(|error| named(&error))?;
         }
-        let written = bar.suspend(|| write_line(args.format, path, &estimate));
+        let written = bar.suspend(|| write_line(args.format, frame.file.as_deref(), &estimate));
         match written {
             // The reader has seen enough: `bagtrack track … | head`.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => break,
             other => other?,
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(())
+    match writer {
+        Some(writer) => writer.finish(),
+        None => Ok(()),
+    }
 }
 
 /// Starts the tracker on the first frame, steps it on every other.
@@ -129,7 +136,7 @@ fn first_annotated(dir: &Path) -> Result<Rect, String> {
     })
 }
 
-fn write_line(format: Format, path: &Path, estimate: &Estimate) -> io::Result<()> {
+fn write_line(format: Format, file: Option<&str>, estimate: &Estimate) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let Rect {
         x,
@@ -142,7 +149,7 @@ fn write_line(format: Format, path: &Path, estimate: &Estimate) -> io::Result<()
         Format::Json => {
             let line = Line {
                 frame: estimate.frame,
-                file: &path.file_name().unwrap_or_default().to_string_lossy(),
+                file,
                 target: estimate.target,
                 score: estimate.score,
                 status: estimate.status,

@@ -5,7 +5,7 @@
 //!
 //! Out: a [`Report`] with the figures as a table or as JSON, among them how good the [score](calibration) is. A
 //! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants. [`plots`] draws them.
-//! [`ScoreReport`] fits the score's coefficients anew.
+//! [`ScoreReport`] fits the score's coefficients anew. [`results`] writes the boxes for other toolkits.
 //!
 //! What can go wrong: with frames and annotations that do not belong together the figures would mean nothing. So a
 //! sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, with a message that
@@ -22,6 +22,7 @@ mod outcome;
 mod playback;
 pub mod plots;
 mod report;
+pub mod results;
 mod run;
 mod score_fit;
 mod score_report;

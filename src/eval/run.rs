@@ -3,7 +3,7 @@
 use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
 use super::sequence_error::SequenceError;
-use crate::tracker::{Evidence, Frame, Params, Status, Tracker, TrackerError};
+use crate::tracker::{Evidence, Frame, Params, Rect, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -53,6 +53,8 @@ pub struct ScoredFrame {
 pub struct SeedRun {
     /// The annotated frames after the first, in order; at least one.
     pub scored: Vec<ScoredFrame>,
+    /// The answer to each frame in 0-based pixels of the uploaded frames; that to the first is the box given.
+    pub boxes: Vec<Rect>,
     /// Mean wall time of one [`Tracker::step`] alone, in milliseconds.
     pub step_ms: f64,
 }
@@ -96,12 +98,14 @@ impl SeedRun {
         let first = sequence.boxes[0].ok_or_else(nothing)?;
         let mut tracker = Tracker::new(&frames[0], first, params).map_err(refuse(0))?;
         let mut scored = Vec::new();
+        let mut boxes = vec![first];
         let mut step_time = Duration::ZERO;
         for (index, frame) in frames.iter().enumerate().skip(1) {
             let start = Instant::now();
             let estimate = tracker.step(frame);
             step_time += start.elapsed();
             let estimate = estimate.map_err(refuse(index))?;
+            boxes.push(estimate.target);
             let Some(annotated) = &sequence.boxes[index] else {
                 continue;
             };
@@ -120,6 +124,7 @@ impl SeedRun {
         let steps = (frames.len() - 1) as f64;
         Ok(Self {
             scored,
+            boxes,
             step_ms: step_time.as_secs_f64() * 1000.0 / steps,
         })
     }

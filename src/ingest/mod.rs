@@ -42,6 +42,8 @@ mod sniff;
 mod stored_image;
 #[cfg(feature = "turbo")]
 mod turbo;
+#[cfg(feature = "service")]
+pub mod video;
 mod vp8l;
 mod webp_chunks;
 

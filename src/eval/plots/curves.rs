@@ -139,6 +139,7 @@ mod tests {
             evidence: None,
         };
         SeedRun {
+            boxes: Vec::new(),
             scored: errors.iter().enumerate().map(frame).collect(),
             step_ms: 0.0,
         }

@@ -125,6 +125,7 @@ mod tests {
     #[test]
     fn the_spread_is_over_the_seeds_frame_by_frame() {
         let run = |errors: [f64; 2]| SeedRun {
+            boxes: Vec::new(),
             scored: [(3, errors[0]), (8, errors[1])]
                 .map(|(index, center_error)| ScoredFrame {
                     index,

@@ -1,0 +1,15 @@
+//! Frames with the tracker's answers drawn on them, for people to look at.
+//!
+//! In: an uploaded file, decoded as strictly as for tracking, and the answers to it. Out: a PNG or JPEG file. The box
+//! is green while tracking, orange while uncertain, red when lost, with the score beside it; particles are dots, the
+//! likelier the less transparent.
+//!
+//! What can go wrong: the file cannot be decoded. A large one is drawn smaller, since a picture takes three bytes a
+//! pixel, and its file as many.
+
+mod label;
+mod marks;
+mod picture;
+
+pub use marks::{Drawn, draw};
+pub use picture::Picture;

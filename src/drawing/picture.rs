@@ -1,0 +1,93 @@
+//! A decoded frame in colour.
+
+use crate::ingest::{self, IngestError, Limits};
+use crate::tracker::{Frame, FrameFormat, ycbcr};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ImageFormat, ImageResult, RgbImage};
+use std::io::Cursor;
+
+const JPEG_QUALITY: u8 = 92;
+
+/// A decoded frame in colour.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    pub(super) image: RgbImage,
+    /// Pixels of the picture for each pixel of the uploaded frame, across and down.
+    pub(super) scale: (f64, f64),
+}
+
+impl Picture {
+    /// The picture of a file, upright; with a longer side of more than `max_side` pixels it is reduced to that.
+    ///
+    /// # Errors
+    /// See [`IngestError`].
+    pub fn decode(bytes: &[u8], limits: &Limits, max_side: u32) -> Result<Self, IngestError> {
+        let format = |(width, height): (u32, u32)| {
+            let longer = width.max(height);
+            let scale = f64::from(max_side.min(longer)) / f64::from(longer);
+            let reduced = |side: u32| ((f64::from(side) * scale).round() as u32).clamp(1, side);
+            FrameFormat {
+                size: (reduced(width), reduced(height)),
+                has_color: true,
+            }
+        };
+        Ok(Self::of(ingest::decode_to(bytes, limits, &format)?))
+    }
+
+    fn of(frame: Frame) -> Self {
+        let (width, height) = (frame.width(), frame.height());
+        let source = frame.source_size();
+        let has_color = frame.has_color();
+        let chroma_width = ycbcr::chroma_size((width, height)).0;
+        let [luma, cb, cr] = frame.into_planes();
+        let at = |plane: &[u8], x: u32, y: u32, width: u32| plane[(y * width + x) as usize];
+        let image = RgbImage::from_fn(width, height, |x, y| {
+            let gray = at(&luma, x, y, width);
+            if !has_color {
+                return image::Rgb([gray; 3]);
+            }
+            let chroma = |plane| f32::from(at(plane, x / 2, y / 2, chroma_width)) - 128.0;
+            let (gray, blue, red) = (f32::from(gray), chroma(&cb), chroma(&cr));
+            // Full-range BT.601.
+            let color = [
+                gray + 1.402 * red,
+                gray - 0.344_136 * blue - 0.714_136 * red,
+                gray + 1.772 * blue,
+            ];
+            image::Rgb(color.map(|value| value.round().clamp(0.0, 255.0) as u8))
+        });
+        Self {
+            image,
+            scale: (
+                f64::from(width) / f64::from(source.0),
+                f64::from(height) / f64::from(source.1),
+            ),
+        }
+    }
+
+    /// Bytes that its pixels take.
+    pub fn bytes(&self) -> usize {
+        self.image.as_raw().len()
+    }
+
+    /// As a PNG file.
+    ///
+    /// # Errors
+    /// The picture cannot be encoded.
+    pub fn png(&self) -> ImageResult<Vec<u8>> {
+        let mut bytes = Cursor::new(Vec::new());
+        self.image.write_to(&mut bytes, ImageFormat::Png)?;
+        Ok(bytes.into_inner())
+    }
+
+    /// As a JPEG file.
+    ///
+    /// # Errors
+    /// The picture has more than 65,535 pixels on a side.
+    pub fn jpeg(&self) -> ImageResult<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+        self.image.write_with_encoder(encoder)?;
+        Ok(bytes)
+    }
+}

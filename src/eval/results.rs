@@ -1,0 +1,51 @@
+//! The answers of runs as text files, as the toolkits of OTB and pysot read them.
+//!
+//! A file for each sequence, named after it: `x,y,width,height` a line for each frame, the first one included. Boxes
+//! are 1-based, as in the sequence's own file. With several seeds each has a folder, `seed-0` and so on: these are the
+//! trackers to the toolkits.
+
+use super::run::SequenceRuns;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A file of results cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {reason}", path.display())]
+pub struct ResultsError {
+    path: PathBuf,
+    reason: String,
+}
+
+/// Writes the answers of all seeds on these sequences into `dir`, over files of these names.
+///
+/// # Errors
+/// A folder or file cannot be written, or two sequences have one name.
+pub fn write(dir: &Path, sequences: &[SequenceRuns]) -> Result<(), ResultsError> {
+    let refuse = |path: &Path, reason: String| ResultsError {
+        path: path.to_owned(),
+        reason,
+    };
+    for (index, runs) in sequences.iter().enumerate() {
+        if sequences[..index].iter().any(|it| it.name == runs.name) {
+            let reason = format!("two sequences are called {}", runs.name);
+            return Err(refuse(dir, reason));
+        }
+        for (seed, run) in runs.seeds.iter().enumerate() {
+            let folder = match runs.seeds.len() {
+                1 => dir.to_owned(),
+                _ => dir.join(format!("seed-{seed}")),
+            };
+            fs::create_dir_all(&folder).map_err(|error| refuse(&folder, error.to_string()))?;
+            let file = folder.join(format!("{}.txt", runs.name));
+            let lines = run.boxes.iter().fold(String::new(), |mut text, it| {
+                let (x, y) = (it.x + 1.0, it.y + 1.0);
+                let written = writeln!(text, "{x:.3},{y:.3},{:.3},{:.3}", it.width, it.height);
+                written.expect("a string takes any text");
+                text
+            });
+            fs::write(&file, lines).map_err(|error| refuse(&file, error.to_string()))?;
+        }
+    }
+    Ok(())
+}

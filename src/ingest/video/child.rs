@@ -1,0 +1,61 @@
+//! The decoder's process, and what it may take.
+
+use super::error::VideoError;
+use std::ffi::OsStr;
+use std::process::{Child, Command, Stdio};
+
+/// Most bytes of addresses: no decoder needs nearly as many for a video within the limits of frames.
+#[cfg(target_os = "linux")]
+const MAX_MEMORY: u64 = 2 << 30;
+/// Most processor time in seconds.
+#[cfg(target_os = "linux")]
+const MAX_CPU: u64 = 300;
+/// Most bytes of a file that it writes: what it keeps of its input, to go back in it.
+#[cfg(target_os = "linux")]
+const MAX_FILE: u64 = 1 << 30;
+#[cfg(target_os = "linux")]
+const MAX_FILES: u64 = 64;
+
+/// Starts the program with pipes. It gets nothing of the environment, which may have secrets, but the path.
+pub(super) fn start<A: AsRef<OsStr>>(
+    program: &str,
+    arguments: impl IntoIterator<Item = A>,
+) -> Result<Child, VideoError> {
+    let mut command = Command::new(program);
+    command.args(arguments).env_clear();
+    if let Some(path) = std::env::var_os("PATH") {
+        command.env("PATH", path);
+    }
+    let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let child = pipes.stderr(Stdio::piped()).spawn();
+    let child = child.map_err(|source| VideoError::NoProgram {
+        program: program.to_owned(),
+        source,
+    })?;
+    limit(&child);
+    Ok(child)
+}
+
+/// Sets the limits. Where that fails the program has ended already.
+#[cfg(target_os = "linux")]
+fn limit(child: &Child) {
+    use rustix::process::{Pid, Resource, Rlimit, prlimit};
+    let pid = Pid::from_child(child);
+    for (resource, most) in [
+        (Resource::As, MAX_MEMORY),
+        (Resource::Cpu, MAX_CPU),
+        (Resource::Fsize, MAX_FILE),
+        (Resource::Nofile, MAX_FILES),
+        (Resource::Core, 0),
+    ] {
+        let limit = Rlimit {
+            current: Some(most),
+            maximum: Some(most),
+        };
+        let _ = prlimit(Some(pid), resource, limit);
+    }
+}
+
+/// Elsewhere a process cannot be limited from outside.
+#[cfg(not(target_os = "linux"))]
+fn limit(_child: &Child) {}

@@ -1,0 +1,20 @@
+//! Videos to pictures, by an installed `ffmpeg`.
+//!
+//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality, which then go the way
+//! of uploaded frames.
+//!
+//! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads one
+//! pipe and writes another, knows no other protocol and few formats, and its memory, processor time and files are
+//! limited (on Linux). It ends when its pictures are no longer wanted.
+//!
+//! What can go wrong: there is no `ffmpeg`, or it cannot decode the video; what it says then is told.
+
+mod child;
+mod decoder;
+mod error;
+mod parts;
+mod sniff;
+
+pub use decoder::{Stop, VideoDecoder, VideoLimits};
+pub use error::VideoError;
+pub use sniff::{VideoFormat, video_format};
