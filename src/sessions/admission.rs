@@ -6,7 +6,7 @@
 //! has ended, and never more threads work than there are workers.
 
 use super::fair_queue::{FairQueue, Turn};
-use super::lanes::{Lane, Length};
+use super::lanes::{Lane, Length, Pace};
 use super::workers::Workers;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -64,17 +64,17 @@ impl QueuePermit {
 pub struct Admission {
     queue: Arc<Semaphore>,
     workers: FairQueue,
-    threads: Arc<Workers>,
+    threads: Arc<[Workers; 2]>,
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, at most `workers` of them at work.
+    /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work.
     pub fn new(queue: usize, workers: usize) -> Self {
         Self {
             queue: Arc::new(Semaphore::new(queue)),
             workers: FairQueue::new(workers),
             // As many again may wait between two frames.
-            threads: Arc::new(Workers::new(2 * workers)),
+            threads: Arc::new(Pace::ALL.map(|pace| Workers::new(2 * workers, pace.niceness()))),
         }
     }
 
@@ -114,10 +114,12 @@ impl Admission {
         F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
         let turn = self.workers.acquire(queue.lane, queue.length).await;
+        let threads = &self.threads[turn.pace() as usize];
         let mut permits = (queue, turn);
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
-        self.threads.start(Box::new(move || {
+        threads.start(Box::new(move || {
+            permits.1.begin();
             // A panic drops `work`, so no half-changed value is read.
             let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut permits.1))));
             drop(permits);
@@ -135,9 +137,9 @@ impl Admission {
         self.queue.available_permits()
     }
 
-    /// Workers that are free.
-    pub fn free_workers(&self) -> usize {
-        self.workers.free()
+    /// Workers that have work.
+    pub fn busy_workers(&self) -> usize {
+        self.workers.running()
     }
 }
 
@@ -181,10 +183,10 @@ mod tests {
             .unwrap();
         request.abort();
         assert!(request.await.unwrap_err().is_cancelled());
-        assert_eq!((admission.queue_places(), admission.free_workers()), (0, 0));
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (0, 1));
         finish.send(()).unwrap();
         drop(admission.workers.acquire(Lane(0), Length::Short).await);
-        assert_eq!(admission.free_workers(), 1);
+        assert_eq!(admission.busy_workers(), 0);
     }
 
     #[tokio::test]
@@ -196,7 +198,7 @@ mod tests {
             let there = admission.run(queue, |_| std::thread::current().id());
             assert_ne!(there.await.unwrap(), here);
         }
-        assert_eq!((admission.queue_places(), admission.free_workers()), (9, 2));
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (9, 0));
     }
 
     #[tokio::test]
@@ -209,6 +211,6 @@ mod tests {
             panicked,
             Err(WorkLost::Panicked("a test panics".to_owned()))
         );
-        assert_eq!((admission.queue_places(), admission.free_workers()), (1, 1));
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (1, 0));
     }
 }

@@ -3,6 +3,12 @@
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
+/// Work that takes more processor time without a break makes its lane a slow one. It is some ten times what a frame of a
+/// camera takes, and half of the time between two of them.
+const SLOW: Duration = Duration::from_millis(15);
+/// By how much the memory of the slowest work fades with each other work. A client that hides its slow work among quick
+/// work needs a dozen requests of that for each.
+const FADING: f64 = 0.9;
 /// Lanes above which those without work and without debt are forgotten.
 const MAX_IDLE_LANES: usize = 1024;
 
@@ -13,12 +19,15 @@ pub struct Lane(pub u64);
 /// All lanes. `G` is what gives a request its worker.
 #[derive(Debug)]
 pub(super) struct Lanes<G> {
-    pub(super) free: usize,
+    /// Workers of each pace.
+    workers: usize,
+    /// Those at work, by their pace.
+    running: [usize; 2],
     /// Requests with several frames that have begun and not ended, and how many may.
     pub(super) long: usize,
     max_long: usize,
-    /// Time used by the lane that was served last, when it was served.
-    pub(super) now: Duration,
+    /// Time used by the lane of each pace that was served last, when it was served.
+    now: [Duration; 2],
     pub(super) lanes: HashMap<Lane, Waiting<G>>,
 }
 
@@ -28,6 +37,16 @@ pub(super) struct Waiting<G> {
     pub(super) used: Duration,
     pub(super) running: usize,
     pub(super) requests: VecDeque<(Length, G)>,
+    /// The longest time that a worker was held lately.
+    slowest: Duration,
+}
+
+/// Which workers a lane has. Quick work has workers of its own, so it never waits until slow work is done; the threads of
+/// slow work have a lower priority. (Size-interval task assignment, with the past as the guess of the size.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pace {
+    Quick,
+    Slow,
 }
 
 /// How much work a request is.
@@ -41,48 +60,118 @@ pub(super) enum Length {
     Begun,
 }
 
+impl Pace {
+    pub(super) const ALL: [Self; 2] = [Self::Quick, Self::Slow];
+
+    /// By how much lower the priority of its threads is: slow work gets a tenth of a core that quick work wants too.
+    pub(super) fn niceness(self) -> i32 {
+        match self {
+            Self::Quick => 0,
+            Self::Slow => 10,
+        }
+    }
+}
+
 impl<G> Lanes<G> {
-    /// For so many workers, and as many requests with several frames that have begun.
+    /// For so many workers of each pace, and as many requests with several frames that have begun.
     pub(super) fn new(workers: usize) -> Self {
         Self {
-            free: workers,
+            workers,
+            running: [0; 2],
             long: 0,
             max_long: workers,
-            now: Duration::ZERO,
+            now: [Duration::ZERO; 2],
             lanes: HashMap::new(),
         }
     }
 
-    pub(super) fn may_begin(&self, length: Length) -> bool {
-        length != Length::Long || self.long < self.max_long
+    /// Requests at work.
+    pub(super) fn running(&self) -> usize {
+        self.running.iter().sum()
+    }
+
+    /// The lane, to which a request comes. One that was empty starts at the time of the lane served last.
+    pub(super) fn enter(&mut self, lane: Lane) -> &mut Waiting<G> {
+        let waiting = self.lanes.entry(lane).or_default();
+        if waiting.requests.is_empty() && waiting.running == 0 {
+            let now = self.now[waiting.pace() as usize];
+            waiting.used = waiting.used.max(now);
+        }
+        waiting
+    }
+
+    /// Whether a request of a lane may have a worker.
+    pub(super) fn may_begin(&self, waiting: &Waiting<G>, length: Length) -> bool {
+        let has_worker = self.running[waiting.pace() as usize] < self.workers;
+        has_worker && (length != Length::Long || self.long < self.max_long)
     }
 
     /// Whether the first request of a lane may have a worker.
     pub(super) fn is_next(&self, waiting: &Waiting<G>) -> bool {
         let first = waiting.requests.front();
-        first.is_some_and(|(length, _)| self.may_begin(*length))
+        first.is_some_and(|(length, _)| self.may_begin(waiting, *length))
     }
 
-    pub(super) fn next(&mut self) -> Option<(Lane, Length, G)> {
+    /// Whether a waiting lane has a better claim than `claim` to a worker that is given up now.
+    pub(super) fn has_better(&mut self, pace: Pace, claim: (usize, Duration)) -> bool {
+        self.running[pace as usize] -= 1;
+        let mut waiting = self.lanes.values().filter(|w| self.is_next(w));
+        let has_better = waiting.any(|w| (w.running, w.used) < claim);
+        self.running[pace as usize] += 1;
+        has_better
+    }
+
+    pub(super) fn next(&mut self) -> Option<(Lane, Length, Pace, G)> {
         let waiting = self.lanes.iter().filter(|(_, w)| self.is_next(w));
         let lane = *waiting.min_by_key(|(_, w)| (w.running, w.used))?.0;
         let (length, give) = self.lanes.get_mut(&lane)?.requests.pop_front()?;
-        self.serve(lane, length);
-        Some((lane, length, give))
+        let pace = self.serve(lane, length);
+        Some((lane, length, pace, give))
     }
 
-    pub(super) fn serve(&mut self, lane: Lane, length: Length) {
+    /// Takes a worker for a lane.
+    pub(super) fn serve(&mut self, lane: Lane, length: Length) -> Pace {
         self.long += usize::from(length == Length::Long);
         let waiting = self.lanes.entry(lane).or_default();
+        let pace = waiting.pace();
         waiting.running += 1;
-        self.now = self.now.max(waiting.used);
+        self.running[pace as usize] += 1;
+        let now = &mut self.now[pace as usize];
+        *now = waiting.used.max(*now);
+        pace
+    }
+
+    /// Takes the worker back that a lane had for this time.
+    pub(super) fn release(&mut self, lane: Lane, pace: Pace, time: Duration) {
+        self.running[pace as usize] -= 1;
+        let waiting = self.lanes.entry(lane).or_default();
+        waiting.running -= 1;
+        waiting.used += time;
+        if !time.is_zero() {
+            let before = waiting.pace();
+            waiting.slowest = time.max(waiting.slowest.mul_f64(FADING));
+            if waiting.pace() != before {
+                // Lanes of another pace have other times.
+                waiting.used = self.now[waiting.pace() as usize];
+            }
+        }
     }
 
     pub(super) fn forget_idle_lanes(&mut self) {
         if self.lanes.len() > MAX_IDLE_LANES {
             let now = self.now;
+            let owes = |w: &Waiting<G>| w.used > now[w.pace() as usize];
             self.lanes
-                .retain(|_, w| w.running > 0 || !w.requests.is_empty() || w.used > now);
+                .retain(|_, w| w.running > 0 || !w.requests.is_empty() || owes(w));
+        }
+    }
+}
+
+impl<G> Waiting<G> {
+    fn pace(&self) -> Pace {
+        match self.slowest > SLOW {
+            true => Pace::Slow,
+            false => Pace::Quick,
         }
     }
 }
@@ -93,6 +182,26 @@ impl<G> Default for Waiting<G> {
             used: Duration::ZERO,
             running: 0,
             requests: VecDeque::new(),
+            slowest: Duration::ZERO,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lane_is_slow_after_slow_work_and_quick_again_after_much_quick_work() {
+        let mut lanes = Lanes::<()>::new(1);
+        let mut work = |millis| {
+            let pace = lanes.serve(Lane(1), Length::Short);
+            lanes.release(Lane(1), pace, Duration::from_millis(millis));
+            pace
+        };
+        assert_eq!(work(50), Pace::Quick);
+        // Some quick work hides nothing.
+        assert!((0..10).all(|_| work(1) == Pace::Slow));
+        assert!((0..20).any(|_| work(1) == Pace::Quick));
     }
 }

@@ -1,6 +1,6 @@
 //! The live sessions: a map of them, and what keeps them apart.
 //!
-//! In: a [`SessionState`], which is a tracker and the answers to its last request. Out: a [`Session`] in the
+//! In: a [`SessionState`], which is a tracker for each target and the answers to the last request. Out: a [`Session`] in the
 //! [`Registry`], found by its id.
 //!
 //! A request for a session takes these steps: [`Registry::find`] finds it for its owner, [`Session::enter`] takes one of
@@ -21,17 +21,26 @@
 mod admission;
 mod byte_budget;
 mod clock;
+mod cpu_time;
 mod expired;
 mod fair_queue;
+mod insertion;
 mod lanes;
+mod lease;
 mod mac;
+mod new_session;
+mod opening;
 mod owner;
+mod per_target;
 mod registry;
 mod replay;
 mod session;
+mod session_permit;
 mod short_id;
 mod snapshot;
 mod state;
+mod store;
+mod targets;
 mod work_limit;
 mod workers;
 
@@ -39,13 +48,23 @@ pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
 pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
 pub use fair_queue::Turn;
+pub use insertion::InsertError;
 pub use lanes::Lane;
+pub use lease::Lease;
 pub use mac::{MAC_BYTES, MacKeys};
+pub use new_session::NewSession;
+pub use opening::Opening;
 pub use owner::Owner;
+pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
-pub use replay::{Answered, Fingerprint, ReplayDecision, ReplayError};
-pub use session::{Lease, LockedSession, Session, SessionBusy, SessionClosed, SessionPermit};
+pub use replay::{Fingerprint, ReplayDecision, ReplayError};
+pub use session::Session;
+pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
 pub use short_id::short_id;
 pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
 pub use state::{SessionState, StepError};
+pub use store::{AddressError, Record, Reply, Store, StoreAddress, StoreAway, Version};
+pub use targets::{
+    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+};
 pub use work_limit::{Stopped, WorkLimit, WorkMeter};

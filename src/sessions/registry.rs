@@ -1,12 +1,11 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
-use super::admission::Held;
 use super::byte_budget::ByteBudget;
 use super::clock::Clock;
 use super::expired::ExpiredIds;
+use super::lease::Lease;
 use super::owner::Owner;
-use super::session::{Lease, Session};
-use super::state::SessionState;
+use super::session::Session;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
@@ -32,13 +31,15 @@ pub enum NoSession {
 #[derive(Debug)]
 pub struct Registry {
     sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
-    max_sessions: usize,
+    pub(super) max_sessions: usize,
+    /// Whether sessions go where there is no room: a store has them.
+    pub(super) evicts: bool,
     /// Locked for a moment only, and never together with the map.
     expired: Mutex<ExpiredIds>,
-    max_requests: usize,
-    lease: Lease,
-    clock: Clock,
-    memory: ByteBudget,
+    pub(super) max_requests: usize,
+    pub(super) lease: Lease,
+    pub(super) clock: Clock,
+    pub(super) memory: ByteBudget,
 }
 
 impl Registry {
@@ -49,6 +50,7 @@ impl Registry {
             sessions: Mutex::default(),
             expired: Mutex::default(),
             max_sessions,
+            evicts: false,
             max_requests,
             lease,
             clock,
@@ -62,6 +64,12 @@ impl Registry {
         self
     }
 
+    /// Sessions that are not in use go where there is no room. A store has them.
+    pub fn with_eviction(mut self) -> Self {
+        self.evicts = true;
+        self
+    }
+
     /// Whether there is room for one more session, after the expired ones have gone.
     ///
     /// # Errors
@@ -70,34 +78,16 @@ impl Registry {
         if self.len() >= self.max_sessions {
             self.sweep();
         }
-        if self.len() >= self.max_sessions {
+        if self.len() >= self.max_sessions && !self.evicts {
             return Err(TooManySessions(self.max_sessions));
         }
         Ok(())
     }
 
-    /// Adds a session of this owner under a new id. It keeps `held` until it is freed.
-    ///
-    /// # Errors
-    /// There is no room, or no memory for a state with its parameters.
-    pub fn insert(
-        &self,
-        state: SessionState,
-        owner: Owner,
-        held: Held,
-    ) -> Result<Arc<Session>, TooManySessions> {
-        self.check_room()?;
-        let memory = self.memory.hold(state.tracker().params().session_bytes());
-        let memory = memory.ok_or(TooManySessions(self.max_sessions))?;
-        let held: Held = Box::new((held, memory));
-        let clock = self.clock.clone();
-        let session = Session::new(state, owner, held, self.max_requests, self.lease, clock);
-        let mut sessions = self.map();
-        if sessions.len() >= self.max_sessions {
-            return Err(TooManySessions(self.max_sessions));
-        }
-        sessions.insert(session.id(), session.clone());
-        Ok(session)
+    /// The live session of this id, whoever it belongs to.
+    pub fn live(&self, id: Uuid) -> Option<Arc<Session>> {
+        let session = self.map().get(&id).cloned();
+        session.filter(|session| !self.has_ended(session))
     }
 
     /// The live session of this id and owner. This does not count as use.
@@ -125,10 +115,7 @@ impl Registry {
 
     /// Whether the session of this id lives, whoever it belongs to.
     pub fn is_live(&self, id: Uuid) -> bool {
-        let sessions = self.map();
-        sessions
-            .get(&id)
-            .is_some_and(|session| !self.has_ended(session))
+        self.live(id).is_some()
     }
 
     /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
@@ -152,6 +139,11 @@ impl Registry {
         ended.len()
     }
 
+    /// All sessions in the map.
+    pub fn all(&self) -> Vec<Arc<Session>> {
+        self.map().values().cloned().collect()
+    }
+
     /// Number of sessions in the map, those included that have expired since the last sweep.
     pub fn len(&self) -> usize {
         self.map().len()
@@ -167,7 +159,7 @@ impl Registry {
         self.clock.wall(session.expires())
     }
 
-    fn has_ended(&self, session: &Session) -> bool {
+    pub(super) fn has_ended(&self, session: &Session) -> bool {
         let expired = self.clock.now() >= session.expires();
         session.is_closed() || (expired && !session.is_busy())
     }
@@ -186,7 +178,7 @@ impl Registry {
         self.expired.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
+    pub(super) fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
         // Nothing panics while it is held; were it so, the map itself would still be whole.
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -195,8 +187,10 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::{Admission, Fingerprint, Lane, Turn};
-    use crate::tracker::{Frame, Preset, Rect, Tracker};
+    use crate::sessions::{
+        Admission, Fingerprint, Lane, NewSession, PerTarget, SessionState, Turn,
+    };
+    use crate::tracker::{Frame, Preset, Rect};
     use std::sync::mpsc;
     use std::time::Duration;
 
@@ -206,7 +200,7 @@ mod tests {
         idle: IDLE,
     };
 
-    fn state() -> SessionState {
+    fn insert(registry: &Registry) -> Arc<Session> {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
         let frame = Frame::from_luma(64, 48, luma).unwrap();
         let target = Rect {
@@ -215,17 +209,25 @@ mod tests {
             width: 20.0,
             height: 16.0,
         };
-        let tracker = Tracker::new(&frame, target, Preset::Paper.params()).unwrap();
-        SessionState::new(tracker, Fingerprint::of(b"first"), target)
+        let (print, params) = (Fingerprint::of(b"first"), Preset::Paper.params());
+        let state = SessionState::start(&frame, print, &PerTarget::One(target), &params).unwrap();
+        let new = NewSession {
+            id: Uuid::new_v4(),
+            opening: registry.opening([0; 32], &state),
+            owner: Owner::default(),
+            version: None,
+            lives: registry.first_lease(),
+            state,
+            held: Box::new(()),
+        };
+        registry.insert(new).unwrap()
     }
 
     /// A session in a new registry, which notes whether the map's lock was free when the session was freed.
     fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
         let clock = Clock::default();
         let registry = Arc::new(Registry::new(9, 9, LEASE, clock.clone()));
-        let session = registry
-            .insert(state(), Owner::default(), Box::new(()))
-            .unwrap();
+        let session = insert(&registry);
         let (freed, was_free) = mpsc::channel();
         let map = registry.clone();
         let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
@@ -256,9 +258,7 @@ mod tests {
     #[tokio::test]
     async fn a_session_whose_work_panicked_has_ended() {
         let registry = Registry::new(9, 9, LEASE, Clock::default());
-        let session = registry
-            .insert(state(), Owner::default(), Box::new(()))
-            .unwrap();
+        let session = insert(&registry);
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
         let admission = Admission::new(9, 1);

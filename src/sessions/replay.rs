@@ -4,6 +4,8 @@
 //! request again: the same bytes under the same number get the stored answer. The answers to the last request are kept,
 //! so a request with several frames can be repeated too.
 
+use super::per_target::PerTarget;
+use super::targets::{Correction, Estimates};
 use crate::tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 
@@ -20,14 +22,42 @@ impl Fingerprint {
 }
 
 /// A frame that was answered.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Answered {
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Answered {
     /// Digest of the frame's bytes.
-    pub fingerprint: Fingerprint,
-    /// The box that the client gave with it: set for the first frame and for corrections.
-    pub given: Option<Rect>,
+    pub(super) fingerprint: Fingerprint,
+    /// What was answered for each target.
+    pub(super) targets: PerTarget<TargetAnswer>,
+}
+
+/// What was answered for a target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct TargetAnswer {
+    /// The box that the client gave with the frame: set for the first frame and for corrections.
+    pub(super) given: Option<Rect>,
     /// The answer.
-    pub estimate: Estimate,
+    pub(super) estimate: Estimate,
+}
+
+impl Answered {
+    /// The answer.
+    pub(super) fn estimates(&self) -> Estimates {
+        self.targets.map(|target| target.estimate)
+    }
+
+    /// The frame's number.
+    pub(super) fn frame(&self) -> u64 {
+        self.targets.first().estimate.frame
+    }
+
+    /// Whether it answers these bytes, with this correction.
+    fn is_of(&self, posted: Fingerprint, given: Option<Correction>) -> bool {
+        let is_given = |correction: Correction| {
+            let target = self.targets.as_slice().get(correction.target);
+            target.is_some_and(|target| target.given == Some(correction.to))
+        };
+        self.fingerprint == posted && given.is_none_or(is_given)
+    }
 }
 
 /// What to do with a request.
@@ -36,7 +66,7 @@ pub enum ReplayDecision {
     /// It holds the next frame: process it.
     Process,
     /// It was answered before: these are the answers.
-    Replay(Vec<Estimate>),
+    Replay(Vec<Estimates>),
 }
 
 /// The frame number does not fit.
@@ -72,12 +102,12 @@ pub(super) fn decide(
     recent: &[Answered],
     number: Option<u64>,
     posted: &[Fingerprint],
-    given: Option<Rect>,
+    given: Option<Correction>,
 ) -> Result<ReplayDecision, ReplayError> {
     let last = recent
         .last()
         .expect("a session has answered its first frame");
-    let expected = last.estimate.frame + 1;
+    let expected = last.frame() + 1;
     let got = match number {
         None => return Ok(ReplayDecision::Process),
         Some(number) if number == expected => return Ok(ReplayDecision::Process),
@@ -87,15 +117,31 @@ pub(super) fn decide(
         return Err(ReplayError::OutOfOrder { got, expected });
     }
     let stored = &recent[recent.len() - posted.len()..];
-    let same = stored.iter().zip(posted).all(|(stored, posted)| {
-        stored.fingerprint == *posted && (given.is_none() || stored.given == given)
-    });
-    if same {
+    let mut pairs = stored.iter().zip(posted);
+    if pairs.all(|(stored, posted)| stored.is_of(*posted, given)) {
         Ok(ReplayDecision::Replay(
-            stored.iter().map(|answered| answered.estimate).collect(),
+            stored.iter().map(Answered::estimates).collect(),
         ))
     } else {
         Err(ReplayError::Differs { got, expected })
+    }
+}
+
+/// The answer to frame `number` with this digest among those that are stored.
+///
+/// # Errors
+/// See [`ReplayError`].
+pub(super) fn stored(
+    recent: &[Answered],
+    number: u64,
+    posted: Fingerprint,
+) -> Result<&Answered, ReplayError> {
+    let expected = recent.last().map_or(0, |last| last.frame() + 1);
+    let got = number;
+    match recent.iter().find(|stored| stored.frame() == number) {
+        Some(stored) if stored.is_of(posted, None) => Ok(stored),
+        Some(_) => Err(ReplayError::Differs { got, expected }),
+        None => Err(ReplayError::OutOfOrder { got, expected }),
     }
 }
 
@@ -111,15 +157,18 @@ mod tests {
             width: 5.0,
             height: 5.0,
         };
+        let estimate = Estimate {
+            frame,
+            target,
+            score: 0.5,
+            status: Status::Tracking,
+        };
         Answered {
             fingerprint: Fingerprint::of(bytes),
-            given: None,
-            estimate: Estimate {
-                frame,
-                target,
-                score: 0.5,
-                status: Status::Tracking,
-            },
+            targets: PerTarget::One(TargetAnswer {
+                given: None,
+                estimate,
+            }),
         }
     }
 
@@ -144,7 +193,7 @@ mod tests {
         let frames = |decision| -> Vec<u64> {
             match decision {
                 Ok(ReplayDecision::Replay(answers)) => {
-                    answers.iter().map(|a: &Estimate| a.frame).collect()
+                    answers.iter().map(|answer| answer.first().frame).collect()
                 }
                 other => panic!("{other:?}"),
             }
@@ -184,22 +233,24 @@ mod tests {
     }
 
     #[test]
-    fn a_correction_is_replayed_only_with_the_same_box() {
+    fn a_correction_is_replayed_only_with_the_same_box_of_the_same_target() {
         let mut corrected = answered(7, b"c");
-        corrected.given = Some(corrected.estimate.target);
-        let same = decide(&[corrected], Some(7), &prints(&[b"c"]), corrected.given);
-        assert!(matches!(same, Ok(ReplayDecision::Replay(_))));
-        let moved = Rect {
-            x: 1.5,
-            ..corrected.estimate.target
+        let [target] = corrected.targets.as_mut_slice() else {
+            unreachable!("it has one target")
         };
-        let other = decide(&[corrected], Some(7), &prints(&[b"c"]), Some(moved));
-        assert_eq!(
-            other,
-            Err(ReplayError::Differs {
-                got: 7,
-                expected: 8
-            })
-        );
+        let to = target.estimate.target;
+        target.given = Some(to);
+        let recent = [corrected];
+        let decided = |target, to| {
+            let given = Some(Correction { target, to });
+            decide(&recent, Some(7), &prints(&[b"c"]), given)
+        };
+        assert!(matches!(decided(0, to), Ok(ReplayDecision::Replay(_))));
+        let differs = Err(ReplayError::Differs {
+            got: 7,
+            expected: 8,
+        });
+        assert_eq!(decided(0, Rect { x: 1.5, ..to }), differs);
+        assert_eq!(decided(1, to), differs);
     }
 }

@@ -1,12 +1,16 @@
 //! A session as bytes: the tracker's snapshot and the answers to the last request.
 //!
-//! Layout: [`MAGIC`], one version byte, the postcard encoding of [`Content`], and the code of all of these under a key
-//! of the service ([`MacKeys`]). Snapshots come from clients, so nothing in them is read before the code is checked. A
-//! service may accept unsigned ones, so all in them is bounded and checked nevertheless: of the stored answers only as
-//! many are kept as a request may have, and the tracker validates its own part.
+//! Layout: [`MAGIC`], one version byte, the content, and the code of all of these under a key of the service
+//! ([`MacKeys`]). The content is, in postcard's encoding: the trackers' snapshots, then the list of stored answers,
+//! each a digest and what was answered for each target. Where the session was opened with a list of boxes, the version
+//! is another one, and the number of targets comes first. Snapshots come from clients, so nothing in them is read
+//! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
+//! of the stored answers only as many are kept as a request may have, and the tracker validates its own part.
 
 use super::mac::{MAC_BYTES, MacKeys};
-use super::replay::Answered;
+use super::per_target::{MAX_TARGETS, PerTarget};
+use super::replay::{Answered, Fingerprint, TargetAnswer};
+use super::targets::Targets;
 use crate::tracker::{Tracker, TrackerError};
 use postcard::take_from_bytes;
 use serde::Serialize;
@@ -17,7 +21,10 @@ use std::collections::VecDeque;
 pub const MAGIC: &[u8] = b"\x89bagtrack\r\n";
 /// What keys for snapshots are derived for.
 pub const KEY_CONTEXT: &str = "bagtrack 2026-11 session snapshot";
+/// Of a session that was opened with a box.
 const VERSION: u8 = 2;
+/// Of a session that was opened with a list of boxes.
+const LIST_VERSION: u8 = 3;
 
 /// Why bytes are not a session.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,7 +36,7 @@ pub enum SnapshotError {
     #[error("it was changed, or signed by a service with other keys (BAGTRACK_SNAPSHOT_KEYS)")]
     NotAuthentic,
     /// Written by another version of the program.
-    #[error("it has format version {0}, and this service reads version {VERSION}")]
+    #[error("it has format version {0}, and this service reads {VERSION} and {LIST_VERSION}")]
     Version(u8),
     /// The tracker does not accept its part.
     #[error(transparent)]
@@ -39,28 +46,15 @@ pub enum SnapshotError {
 /// What a snapshot holds.
 #[derive(Debug)]
 pub(super) struct SessionSnapshot {
-    pub(super) tracker: Tracker,
+    pub(super) targets: Targets,
     /// The answers to the last request, oldest first; at least one.
     pub(super) recent: Vec<Answered>,
 }
 
-#[derive(Serialize)]
-struct Content<'a> {
-    tracker: &'a [u8],
-    recent: &'a [Answered],
-}
-
 impl SessionSnapshot {
-    /// The bytes of a session.
-    pub(super) fn encode(tracker: &Tracker, recent: &[Answered], keys: &MacKeys) -> Vec<u8> {
-        let content = Content {
-            tracker: &tracker.snapshot(),
-            recent,
-        };
-        let mut bytes = MAGIC.to_vec();
-        bytes.push(VERSION);
-        let mut bytes =
-            postcard::to_extend(&content, bytes).expect("plain data is always encodable");
+    /// The bytes of a session, with its code.
+    pub(super) fn encode(targets: &Targets, recent: &[Answered], keys: &MacKeys) -> Vec<u8> {
+        let mut bytes = Self::write(targets, recent);
         let code = keys.sign(&bytes);
         bytes.extend_from_slice(&code);
         bytes
@@ -75,38 +69,114 @@ impl SessionSnapshot {
         keys: &MacKeys,
         max_recent: usize,
     ) -> Result<Self, SnapshotError> {
-        let body = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::Damaged)?;
-        let (&version, body) = body.split_first().ok_or(SnapshotError::Damaged)?;
-        if version != VERSION {
-            return Err(SnapshotError::Version(version));
-        }
-        let (content, code) = body
+        check_version(bytes)?;
+        let (content, code) = bytes
             .split_last_chunk::<MAC_BYTES>()
             .ok_or(SnapshotError::Damaged)?;
-        if !keys.verify(&bytes[..bytes.len() - MAC_BYTES], code) {
+        if !keys.verify(content, code) {
             return Err(SnapshotError::NotAuthentic);
         }
-        let (tracker, rest) = take::<&[u8]>(content)?;
-        let recent = recent(rest, max_recent)?;
-        let tracker = Tracker::restore(tracker)?;
-        let last = recent.last().ok_or(SnapshotError::Damaged)?;
-        if last.estimate != tracker.estimate() {
-            return Err(SnapshotError::Damaged);
+        Self::read(content, max_recent)
+    }
+
+    /// The bytes of a session, without a code.
+    pub(super) fn write(targets: &Targets, recent: &[Answered]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        let trackers = targets.trackers();
+        match trackers {
+            PerTarget::One(_) => bytes.push(VERSION),
+            PerTarget::List(list) => {
+                bytes.push(LIST_VERSION);
+                bytes = extend(bytes, &list.len());
+            }
         }
-        Ok(Self { tracker, recent })
+        for tracker in trackers.as_slice() {
+            bytes = extend(bytes, &&tracker.snapshot()[..]);
+        }
+        bytes = extend(bytes, &recent.len());
+        for Answered {
+            fingerprint,
+            targets,
+        } in recent
+        {
+            bytes = extend(bytes, fingerprint);
+            bytes = targets.as_slice().iter().fold(bytes, extend);
+        }
+        bytes
+    }
+
+    /// The session of bytes without a code.
+    pub(super) fn read(bytes: &[u8], max_recent: usize) -> Result<Self, SnapshotError> {
+        let (version, mut rest) = check_version(bytes)?;
+        let mut count = None;
+        if version == LIST_VERSION {
+            let number;
+            (number, rest) = take::<usize>(rest)?;
+            if !(1..=MAX_TARGETS).contains(&number) {
+                return Err(SnapshotError::Damaged);
+            }
+            count = Some(number);
+        }
+        let trackers = per_target(count, || {
+            let tracker;
+            (tracker, rest) = take::<&[u8]>(rest)?;
+            Ok(Tracker::restore(tracker)?)
+        })?;
+        let targets = Targets::restored(trackers).ok_or(SnapshotError::Damaged)?;
+        let recent = recent(rest, count, max_recent)?;
+        let last = recent.last().ok_or(SnapshotError::Damaged)?;
+        match last.estimates() == targets.estimates() {
+            true => Ok(Self { targets, recent }),
+            false => Err(SnapshotError::Damaged),
+        }
     }
 }
 
+/// The version, and what follows it.
+fn check_version(bytes: &[u8]) -> Result<(u8, &[u8]), SnapshotError> {
+    let body = bytes.strip_prefix(MAGIC).ok_or(SnapshotError::Damaged)?;
+    let (&version, body) = body.split_first().ok_or(SnapshotError::Damaged)?;
+    match version {
+        VERSION | LIST_VERSION => Ok((version, body)),
+        _ => Err(SnapshotError::Version(version)),
+    }
+}
+
+/// One of what `next` gives, or a list of `count`.
+fn per_target<T>(
+    count: Option<usize>,
+    mut next: impl FnMut() -> Result<T, SnapshotError>,
+) -> Result<PerTarget<T>, SnapshotError> {
+    Ok(match count {
+        None => PerTarget::One(next()?),
+        Some(count) => PerTarget::List((0..count).map(|_| next()).collect::<Result<_, _>>()?),
+    })
+}
+
 /// The last `max` stored answers of a list that takes all of `bytes`. Only those are ever held.
-fn recent(bytes: &[u8], max: usize) -> Result<Vec<Answered>, SnapshotError> {
+fn recent(
+    bytes: &[u8],
+    targets: Option<usize>,
+    max: usize,
+) -> Result<Vec<Answered>, SnapshotError> {
     let (count, mut rest) = take::<usize>(bytes)?;
     let mut recent: VecDeque<Answered> = VecDeque::new();
     for _ in 0..count {
-        let answered;
-        (answered, rest) = take::<Answered>(rest)?;
-        if let Some(before) = recent.back()
-            && before.estimate.frame.checked_add(1) != Some(answered.estimate.frame)
-        {
+        let fingerprint;
+        (fingerprint, rest) = take::<Fingerprint>(rest)?;
+        let targets = per_target(targets, || {
+            let target;
+            (target, rest) = take::<TargetAnswer>(rest)?;
+            Ok(target)
+        })?;
+        let answered = Answered {
+            fingerprint,
+            targets,
+        };
+        let frame = answered.frame();
+        let of_frame = |target: &TargetAnswer| target.estimate.frame == frame;
+        let follows = |before: &Answered| before.frame().checked_add(1) == Some(frame);
+        if !answered.targets.as_slice().iter().all(of_frame) || !recent.back().is_none_or(follows) {
             return Err(SnapshotError::Damaged);
         }
         if recent.len() >= max {
@@ -118,6 +188,10 @@ fn recent(bytes: &[u8], max: usize) -> Result<Vec<Answered>, SnapshotError> {
         [] => Ok(recent.into()),
         _ => Err(SnapshotError::Damaged),
     }
+}
+
+fn extend<T: Serialize>(bytes: Vec<u8>, value: &T) -> Vec<u8> {
+    postcard::to_extend(value, bytes).expect("plain data is always encodable")
 }
 
 fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SnapshotError> {

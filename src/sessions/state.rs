@@ -1,15 +1,16 @@
-//! What work on a session changes: the tracker, and the answers that a repeated request gets again.
+//! What work on a session changes: the trackers, and the answers that a repeated request gets again.
 
 use super::mac::MacKeys;
-use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError};
+use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, TargetAnswer};
 use super::snapshot::{SessionSnapshot, SnapshotError};
+use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
 use super::work_limit::{Stopped, WorkMeter};
-use crate::tracker::{BagEntry, Estimate, Frame, Rect, Seen, Tracker, TrackerError};
+use crate::tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
 
 /// The part of a session that changes from frame to frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct SessionState {
-    tracker: Tracker,
+    targets: Targets,
     /// The last answers, oldest first: those to the last request, and more where that asked for it.
     recent: Vec<Answered>,
 }
@@ -31,17 +32,28 @@ pub enum StepError {
 }
 
 impl SessionState {
-    /// A session that starts with `tracker`, which was made from the frame with this digest and from the box `given`.
-    pub fn new(tracker: Tracker, fingerprint: Fingerprint, given: Rect) -> Self {
-        let first = Answered {
+    /// A session that starts with `boxes` in `frame`, whose file has this digest.
+    ///
+    /// # Errors
+    /// See [`StartError`].
+    pub fn start(
+        frame: &Frame,
+        fingerprint: Fingerprint,
+        boxes: &Boxes,
+        params: &Params,
+    ) -> Result<Self, StartError> {
+        let targets = Targets::start(frame, boxes, params)?;
+        let estimates = targets.estimates();
+        let first = boxes.try_map(|target, given| {
+            let estimate = estimates.as_slice()[target];
+            let given = Some(*given);
+            Ok(TargetAnswer { given, estimate })
+        })?;
+        let recent = vec![Answered {
             fingerprint,
-            given: Some(given),
-            estimate: tracker.estimate(),
-        };
-        Self {
-            tracker,
-            recent: vec![first],
-        }
+            targets: first,
+        }];
+        Ok(Self { targets, recent })
     }
 
     /// The session that a snapshot holds, with at most `max_recent` stored answers.
@@ -53,24 +65,69 @@ impl SessionState {
         keys: &MacKeys,
         max_recent: usize,
     ) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { tracker, recent } =
+        let SessionSnapshot { targets, recent } =
             SessionSnapshot::decode(snapshot, keys, max_recent)?;
-        Ok(Self { tracker, recent })
+        Ok(Self { targets, recent })
     }
 
     /// The session as bytes, signed.
     pub fn snapshot(&self, keys: &MacKeys) -> Vec<u8> {
-        SessionSnapshot::encode(&self.tracker, &self.recent, keys)
+        SessionSnapshot::encode(&self.targets, &self.recent, keys)
     }
 
-    /// The bag, for people to look at.
-    pub fn bag(&self) -> Vec<BagEntry> {
-        self.tracker.bag()
+    /// The session that [`Self::stored`] wrote.
+    ///
+    /// # Errors
+    /// See [`SnapshotError`].
+    pub fn from_stored(bytes: &[u8], max_recent: usize) -> Result<Self, SnapshotError> {
+        let SessionSnapshot { targets, recent } = SessionSnapshot::read(bytes, max_recent)?;
+        Ok(Self { targets, recent })
     }
 
-    /// The tracker.
-    pub(super) fn tracker(&self) -> &Tracker {
-        &self.tracker
+    /// The session as bytes for the store, which are not signed.
+    pub fn stored(&self) -> Vec<u8> {
+        SessionSnapshot::write(&self.targets, &self.recent)
+    }
+
+    /// The bag of a target, for people to look at; none if there is no such target.
+    pub fn bag(&self, target: usize) -> Option<Vec<BagEntry>> {
+        let tracker = self.targets.trackers().as_slice().get(target)?;
+        Some(tracker.bag())
+    }
+
+    /// The last answer.
+    pub fn latest(&self) -> Estimates {
+        self.targets.estimates()
+    }
+
+    /// The number of the last frame.
+    pub fn latest_frame(&self) -> u64 {
+        self.targets.trackers().first().estimate().frame
+    }
+
+    /// How many targets there are.
+    pub fn target_count(&self) -> usize {
+        self.targets.trackers().as_slice().len()
+    }
+
+    /// Width and height of the frames as uploaded.
+    pub fn source_size(&self) -> (u32, u32) {
+        self.targets.trackers().first().source_size()
+    }
+
+    /// The parameters, with the seed of the first target.
+    pub fn params(&self) -> &Params {
+        self.targets.trackers().first().params()
+    }
+
+    /// How frames are decoded.
+    pub fn frame_format(&self) -> FrameFormat {
+        self.targets.frame_format()
+    }
+
+    /// Bytes that the session keeps at most.
+    pub fn session_bytes(&self) -> usize {
+        self.targets.session_bytes()
     }
 
     /// Whether a request is to be processed or was answered before. `number` is what the client calls its (first)
@@ -84,19 +141,31 @@ impl SessionState {
         &self,
         number: Option<u64>,
         posted: &[Fingerprint],
-        given: Option<Rect>,
+        given: Option<Correction>,
     ) -> Result<ReplayDecision, ReplayError> {
         replay::decide(&self.recent, number, posted, given)
     }
 
     /// The stored answers from frame `number` on, oldest first; none where one of them is not stored any more. All have
     /// been answered from the next frame on.
-    pub fn answers_from(&self, number: u64) -> Option<Vec<Estimate>> {
-        let next = self.tracker.estimate().frame + 1;
+    pub fn answers_from(&self, number: u64) -> Option<Vec<Estimates>> {
+        let next = self.latest_frame() + 1;
         let count = usize::try_from(next.checked_sub(number)?).ok()?;
         let first = self.recent.len().checked_sub(count)?;
         let stored = &self.recent[first..];
-        Some(stored.iter().map(|answered| answered.estimate).collect())
+        Some(stored.iter().map(Answered::estimates).collect())
+    }
+
+    /// The stored answer to frame `number`, which has this digest and was answered.
+    ///
+    /// # Errors
+    /// It is no longer stored, or was the answer to another frame.
+    pub fn stored_answer(
+        &self,
+        number: u64,
+        posted: Fingerprint,
+    ) -> Result<Estimates, ReplayError> {
+        replay::stored(&self.recent, number, posted).map(Answered::estimates)
     }
 
     /// Stores new answers, and of those before them as many as make `kept` together.
@@ -106,71 +175,59 @@ impl SessionState {
         self.recent.extend(answered);
     }
 
-    /// Tracks through `frames` in order: all of them, or none. Before each, `meter` says whether to go on. The answers
-    /// are stored, and at least the last `kept`. `seen` becomes what the tracker saw in the last frame.
+    /// Tracks through `frames` in order: all of them, or none. In the first one the user may correct a target, which
+    /// there must be. Between frames and targets `meter` says whether to go on. The answers are stored, and at least the
+    /// last `kept`. `seen` becomes what the trackers saw in the last frame.
     ///
     /// # Errors
-    /// The tracker refused a frame, or the work was stopped. The session is unchanged.
-    pub fn step(
+    /// The tracker refused a frame or the box, or the work was stopped. The session is unchanged.
+    pub fn advance(
         &mut self,
         frames: &[(Fingerprint, Frame)],
+        correction: Option<Correction>,
         meter: &mut WorkMeter,
         kept: usize,
-        mut seen: Option<&mut Seen>,
-    ) -> Result<Vec<Estimate>, StepError> {
-        // A refused frame leaves the tracker unchanged; only an earlier one of the same request can have moved it.
-        let before = (frames.len() > 1).then(|| self.tracker.clone());
+        mut seen: Option<&mut Vec<Seen>>,
+    ) -> Result<Vec<Estimates>, StepError> {
+        // A refused frame leaves a tracker unchanged; only an earlier frame of the same request, or the tracker of
+        // another target, can have moved.
+        let moves = frames.len() * self.target_count();
+        let before = (moves > 1).then(|| self.targets.clone());
         let mut answered = Vec::with_capacity(frames.len());
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {
-            let going_on = meter.check().map_err(StepError::Stopped);
-            let refused = |error| StepError::Refused { index, error };
-            let mut step = || match seen.as_deref_mut() {
-                Some(seen) => {
-                    let (estimate, saw) = self.tracker.step_seeing(frame)?;
-                    *seen = saw;
-                    Ok(estimate)
+            let correction = correction.filter(|_| index == 0);
+            let seen = seen.as_deref_mut();
+            let advanced = self.targets.advance(frame, correction, meter, seen);
+            if let Err(error) = advanced {
+                if let Some(before) = before {
+                    self.targets = before;
                 }
-                None => self.tracker.step(frame),
-            };
-            match going_on.and_then(|()| step().map_err(refused)) {
-                Ok(estimate) => answered.push(Answered {
-                    fingerprint: *fingerprint,
-                    given: None,
-                    estimate,
-                }),
-                Err(error) => {
-                    if let Some(before) = before {
-                        self.tracker = before;
-                    }
-                    return Err(error);
-                }
+                return Err(match error {
+                    TargetsError::Refused(error) => StepError::Refused { index, error },
+                    TargetsError::Stopped(stopped) => StepError::Stopped(stopped),
+                });
             }
+            answered.push(self.answered(*fingerprint, correction));
         }
-        let estimates = answered.iter().map(|answered| answered.estimate).collect();
+        let estimates = answered.iter().map(Answered::estimates).collect();
         if !answered.is_empty() {
             self.store(answered, kept);
         }
         Ok(estimates)
     }
 
-    /// Takes the next frame with its box given by the user. The answer is stored, and at least the last `kept`.
-    ///
-    /// # Errors
-    /// The tracker refused the frame or the box. The session is unchanged.
-    pub fn retarget(
-        &mut self,
-        fingerprint: Fingerprint,
-        frame: &Frame,
-        given: Rect,
-        kept: usize,
-    ) -> Result<Estimate, TrackerError> {
-        let estimate = self.tracker.retarget(frame, given)?;
-        let answered = Answered {
+    /// The answer to the frame with this digest, which was the last.
+    fn answered(&self, fingerprint: Fingerprint, correction: Option<Correction>) -> Answered {
+        let mut targets = self.latest().map(|estimate| TargetAnswer {
+            given: None,
+            estimate: *estimate,
+        });
+        if let Some(Correction { target, to }) = correction {
+            targets.as_mut_slice()[target].given = Some(to);
+        }
+        Answered {
             fingerprint,
-            given: Some(given),
-            estimate,
-        };
-        self.store(vec![answered], kept);
-        Ok(estimate)
+            targets,
+        }
     }
 }

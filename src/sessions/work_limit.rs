@@ -3,6 +3,7 @@
 //! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
 //! it also lets other clients' requests go first.
 
+use super::cpu_time::thread_cpu_time;
 use super::fair_queue::Turn;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -97,24 +98,6 @@ impl WorkMeter<'_> {
         }
         Ok(())
     }
-}
-
-/// Processor time of this thread since some fixed moment.
-#[cfg(unix)]
-fn thread_cpu_time() -> Duration {
-    use rustix::time::{ClockId, clock_gettime};
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
-    let nanoseconds = u32::try_from(time.tv_nsec).unwrap_or(0);
-    Duration::new(seconds, nanoseconds)
-}
-
-/// Elsewhere the time of day stands in for it.
-#[cfg(not(unix))]
-fn thread_cpu_time() -> Duration {
-    use std::sync::OnceLock;
-    static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed()
 }
 
 #[cfg(test)]

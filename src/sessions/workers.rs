@@ -16,6 +16,8 @@ pub(super) struct Workers(Arc<Shared>);
 struct Shared {
     state: Mutex<State>,
     max_threads: usize,
+    /// By how much lower their priority is than that of the process.
+    niceness: i32,
 }
 
 #[derive(Default)]
@@ -28,10 +30,13 @@ struct State {
 }
 
 impl Workers {
-    /// At most `max_threads` threads; none is started yet.
-    pub(super) fn new(max_threads: usize) -> Self {
-        let state = Mutex::default();
-        Self(Arc::new(Shared { state, max_threads }))
+    /// At most `max_threads` threads, whose priority is lower by `niceness`; none is started yet.
+    pub(super) fn new(max_threads: usize, niceness: i32) -> Self {
+        Self(Arc::new(Shared {
+            state: Mutex::default(),
+            max_threads,
+            niceness,
+        }))
     }
 
     /// Runs `job` on a thread: at once if one is idle or can be started, else after the jobs that wait already. Drops
@@ -76,6 +81,7 @@ impl fmt::Debug for Workers {
 impl Shared {
     /// The main loop of a thread.
     fn serve(&self) {
+        lower_priority(self.niceness);
         let slot = Arc::new(ParkingSlot::default());
         while let Some(job) = self.next(&slot) {
             job();
@@ -101,6 +107,19 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+/// Lowers the priority of this thread. Elsewhere than in Linux it would be that of the process.
+#[cfg(target_os = "linux")]
+fn lower_priority(niceness: i32) {
+    if niceness > 0
+        && let Err(error) = rustix::process::nice(niceness)
+    {
+        tracing::warn!(%error, "slow work has the priority of quick work");
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn lower_priority(_: i32) {}
 
 /// Where one idle thread waits for a job, or for None, which tells it to end.
 #[derive(Default)]
@@ -138,7 +157,7 @@ mod tests {
 
     #[test]
     fn jobs_share_the_threads_and_all_are_done() {
-        let workers = Workers::new(2);
+        let workers = Workers::new(2, 0);
         let (done, finished) = mpsc::channel();
         for index in 0..50 {
             let done = done.clone();
@@ -155,7 +174,7 @@ mod tests {
 
     #[test]
     fn what_waits_is_done_after_the_pool_was_dropped_and_then_the_threads_end() {
-        let workers = Workers::new(1);
+        let workers = Workers::new(1, 0);
         let shared = Arc::downgrade(&workers.0);
         let (go, wait) = mpsc::channel::<()>();
         let (done, finished) = mpsc::channel();

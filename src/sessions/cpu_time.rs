@@ -1,0 +1,22 @@
+//! The processor time of a thread.
+
+use std::time::Duration;
+
+/// Processor time of this thread since some fixed moment.
+#[cfg(unix)]
+pub(super) fn thread_cpu_time() -> Duration {
+    use rustix::time::{ClockId, clock_gettime};
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    let nanoseconds = u32::try_from(time.tv_nsec).unwrap_or(0);
+    Duration::new(seconds, nanoseconds)
+}
+
+/// Elsewhere the time of day stands in for it.
+#[cfg(not(unix))]
+pub(super) fn thread_cpu_time() -> Duration {
+    use std::sync::OnceLock;
+    use std::time::Instant;
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed()
+}

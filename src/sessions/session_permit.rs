@@ -1,0 +1,170 @@
+//! Being at a session, and having its state to oneself.
+//!
+//! A request first takes one of a few permits ([`Session::enter`]), then the lock ([`SessionPermit::lock`]), and moves
+//! the [`LockedSession`] into the work on a worker thread. The lock is fair: requests are served in the order in which
+//! they asked for it.
+
+use super::session::Session;
+use super::state::SessionState;
+use super::store::Version;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+use tokio::sync::{OwnedMutexGuard, OwnedSemaphorePermit};
+use tokio::time::timeout;
+
+/// How many frames a numbered one may be ahead of its turn.
+const MAX_EARLY: u64 = 16;
+
+/// All permits of the session are taken; try again later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("too many requests wait for the session")]
+pub struct SessionBusy;
+
+/// The session was ended while the request waited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the session has ended")]
+pub struct SessionClosed;
+
+impl Session {
+    /// Takes a permit of the session, for frames. That alone does not keep the session alive for longer.
+    ///
+    /// # Errors
+    /// All permits are taken.
+    pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+        let mut permit = self.visit()?;
+        permit.has_frames = true;
+        permit.overlaps = self.frame_requests.fetch_add(1, Ordering::AcqRel) > 0;
+        Ok(permit)
+    }
+
+    /// Takes a permit of the session, to look at it.
+    ///
+    /// # Errors
+    /// All permits are taken.
+    pub fn visit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+        let permit = self.permits.clone().try_acquire_owned();
+        let permit = permit.map_err(|_| SessionBusy)?;
+        Ok(SessionPermit {
+            session: self.clone(),
+            has_frames: false,
+            overlaps: false,
+            permit: Arc::new(permit),
+        })
+    }
+}
+
+/// A permit to be at a session, which does not expire meanwhile. Given back when it is dropped.
+#[derive(Debug)]
+pub struct SessionPermit {
+    session: Arc<Session>,
+    has_frames: bool,
+    overlaps: bool,
+    permit: Arc<OwnedSemaphorePermit>,
+}
+
+impl SessionPermit {
+    /// The session.
+    pub fn session(&self) -> &Arc<Session> {
+        &self.session
+    }
+
+    /// The same place, to look at the session before its turn.
+    pub fn visitor(&self) -> Self {
+        Self {
+            session: self.session.clone(),
+            has_frames: false,
+            overlaps: false,
+            permit: self.permit.clone(),
+        }
+    }
+
+    /// Whether another request with frames was at the session when this one came.
+    pub fn overlaps(&self) -> bool {
+        self.overlaps
+    }
+
+    /// Whether frame `number` comes a little before its turn and may wait here. The last free place of the session is
+    /// left to the frame whose turn it is.
+    pub fn is_early(&self, number: u64) -> bool {
+        let early = number.saturating_sub(self.session.latest_frame() + 1);
+        (1..=MAX_EARLY).contains(&early) && self.session.permits.available_permits() > 0
+    }
+
+    /// Waits for the turn of frame `number` where it comes a little early, at most so long.
+    pub async fn wait_for_turn(&self, number: u64, patience: Duration) {
+        if !self.is_early(number) {
+            return;
+        }
+        let mut latest = self.session.latest.subscribe();
+        let turn = latest.wait_for(|latest| latest.first().frame + 1 >= number);
+        // Whoever came too early is told so by its number.
+        let _ = timeout(patience, turn).await;
+    }
+
+    /// Waits for the session, in order of arrival.
+    ///
+    /// # Errors
+    /// The session was ended in the meantime.
+    pub async fn lock(self) -> Result<LockedSession, SessionClosed> {
+        let state = self.session.state.clone().lock_owned().await;
+        if self.session.is_closed() {
+            return Err(SessionClosed);
+        }
+        Ok(LockedSession {
+            state,
+            permit: self,
+        })
+    }
+}
+
+impl Drop for SessionPermit {
+    fn drop(&mut self) {
+        if self.has_frames {
+            self.session.frame_requests.fetch_sub(1, Ordering::AcqRel);
+        }
+    }
+}
+
+/// A session whose state belongs to one request.
+#[derive(Debug)]
+pub struct LockedSession {
+    state: OwnedMutexGuard<SessionState>,
+    permit: SessionPermit,
+}
+
+impl LockedSession {
+    /// The session.
+    pub fn session(&self) -> &Arc<Session> {
+        self.permit.session()
+    }
+
+    /// The state.
+    pub fn state(&mut self) -> &mut SessionState {
+        &mut self.state
+    }
+
+    /// Goes on with this state, which goes on from this version of the record in the store.
+    pub fn replace(&mut self, state: SessionState, version: Option<Version>) {
+        *self.state = state;
+        self.session().set_version(version);
+    }
+
+    /// The next generation of the record in the store has begun here.
+    pub fn fenced(&self) {
+        let version = self.session().version();
+        self.session().set_version(version.map(Version::fenced));
+    }
+}
+
+impl Drop for LockedSession {
+    fn drop(&mut self) {
+        let session = self.permit.session();
+        if std::thread::panicking() {
+            // A tracker that panicked half-way through a frame is in no defined state.
+            session.close();
+            return;
+        }
+        session.latest.send_replace(self.state.latest());
+    }
+}

@@ -1,0 +1,102 @@
+//! Where the store is.
+
+use redis::cluster::ClusterClient;
+use redis::{Client, ErrorKind};
+use std::time::Duration;
+
+/// The text is no address of a store.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct AddressError(String);
+
+/// The address of a store. It may hold a password, so its debug output shows nothing.
+#[derive(Clone)]
+pub struct StoreAddress(pub(super) Kind);
+
+#[derive(Clone)]
+pub(super) enum Kind {
+    /// One server.
+    Server(Box<Client>),
+    /// Nodes of a cluster, from which the others are found.
+    Cluster(Box<ClusterClient>),
+}
+
+impl StoreAddress {
+    /// Reads `redis://[user:password@]host[:port][/database]`, with `rediss` for TLS, `valkey` and `valkeys` in their
+    /// place, `unix:///path`, or `redis-cluster://…` and its like, with more nodes as `host:port` after commas. Calls
+    /// to a cluster take at most `timeout`.
+    ///
+    /// # Errors
+    /// The text is none of these. It is not repeated, since it may hold a password.
+    pub fn parse(text: &str, timeout: Duration) -> Result<Self, AddressError> {
+        let failed = |error: redis::RedisError| {
+            let reason = match error.kind() {
+                ErrorKind::InvalidClientConfig => error.detail().unwrap_or("").to_owned(),
+                kind => format!("{kind:?}"),
+            };
+            AddressError(format!("no address of a store: {reason}"))
+        };
+        let Some((scheme, rest)) = text.split_once("-cluster://") else {
+            let client = Client::open(text).map_err(failed)?;
+            return Ok(Self(Kind::Server(Box::new(client))));
+        };
+        let (login, nodes) = match rest.rsplit_once('@') {
+            Some((login, nodes)) => (format!("{login}@"), nodes),
+            None => (String::new(), rest),
+        };
+        let nodes = nodes.trim_end_matches('/').split(',');
+        let nodes = nodes.map(|node| format!("{scheme}://{login}{node}"));
+        let cluster = ClusterClient::builder(nodes)
+            .connection_timeout(timeout)
+            .response_timeout(timeout)
+            .retries(1)
+            .build();
+        Ok(Self(Kind::Cluster(Box::new(cluster.map_err(failed)?))))
+    }
+}
+
+impl std::fmt::Debug for StoreAddress {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("StoreAddress")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_of_servers_and_clusters_are_taken_and_passwords_are_not_shown() {
+        let parse = |text| StoreAddress::parse(text, Duration::from_secs(1));
+        for text in [
+            "redis://localhost",
+            "valkey://:secret@10.0.0.1:7000/3",
+            "unix:///run/redis.sock",
+        ] {
+            assert!(
+                matches!(parse(text), Ok(StoreAddress(Kind::Server(_)))),
+                "{text}"
+            );
+        }
+        for text in [
+            "redis-cluster://:secret@a:7000,b:7001",
+            "valkey-cluster://a.example.org",
+        ] {
+            assert!(
+                matches!(parse(text), Ok(StoreAddress(Kind::Cluster(_)))),
+                "{text}"
+            );
+        }
+        let with_tls = parse("rediss://user:secret@example.org");
+        assert_eq!(with_tls.is_ok(), cfg!(feature = "tls"));
+        for text in [
+            "localhost:6379",
+            "http://localhost",
+            "redis://:secret@a:port",
+            "",
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(!error.contains("secret"), "{error}");
+        }
+    }
+}
