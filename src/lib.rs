@@ -69,6 +69,8 @@
 //!
 //! Data goes one way, `http -> ingest -> sessions -> tracker`, and the answer comes back the same way.
 
+#[cfg(feature = "service")]
+pub mod drawing;
 #[cfg(feature = "eval")]
 pub mod eval;
 #[cfg(feature = "service")]

@@ -1,6 +1,7 @@
 //! Answers as they are sent.
 
 use super::target_box::TargetBox;
+use crate::sessions::{Estimates, PerTarget};
 use crate::tracker::{Estimate, Status};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -34,6 +35,18 @@ pub struct Answer {
     /// Which frame this answers; the first frame of a session is 0.
     #[schema(example = 1)]
     frame: u64,
+    /// Where the target is; of several targets the first.
+    #[serde(flatten)]
+    first: TargetView,
+    /// In a session that was opened with `boxes`: its targets, in the order of the boxes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, min_items = 1, max_items = 16)]
+    targets: Option<Vec<TargetView>>,
+}
+
+/// Where a target is.
+#[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
+pub struct TargetView {
     /// Where the target is.
     r#box: TargetBox,
     /// The chance that the box overlaps the target by half or more.
@@ -43,41 +56,54 @@ pub struct Answer {
     status: AnswerStatus,
 }
 
-impl From<Estimate> for Answer {
-    fn from(estimate: Estimate) -> Self {
+impl From<&Estimate> for TargetView {
+    fn from(estimate: &Estimate) -> Self {
         Self {
-            frame: estimate.frame,
-            r#box: estimate.target.into(),
-            score: estimate.score,
+            r#box: TargetBox::answered(estimate.target),
+            score: rounded(estimate.score),
             status: estimate.status.into(),
         }
     }
 }
 
-/// The answers to several frames, in the order of the frames.
-#[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
-pub struct Answers {
-    /// One answer for each frame.
-    answers: Vec<Answer>,
+impl From<&Estimates> for Answer {
+    fn from(estimates: &Estimates) -> Self {
+        let first = estimates.first();
+        Self {
+            frame: first.frame,
+            first: first.into(),
+            targets: match estimates {
+                PerTarget::One(_) => None,
+                PerTarget::List(list) => Some(list.iter().map(TargetView::from).collect()),
+            },
+        }
+    }
 }
 
-/// One answer for one frame; a list of answers for several.
-#[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
-#[serde(untagged)]
-pub enum FrameAnswers {
-    /// The answer to the only frame.
-    One(Answer),
-    /// The answers to several frames.
-    Several(Answers),
+/// A score as it is answered: to a thousandth.
+fn rounded(score: f32) -> f32 {
+    ((f64::from(score) * 1000.0).round() / 1000.0) as f32
 }
 
-impl From<&[Estimate]> for FrameAnswers {
-    fn from(estimates: &[Estimate]) -> Self {
-        match *estimates {
-            [one] => Self::One(one.into()),
-            _ => Self::Several(Answers {
-                answers: estimates.iter().copied().map(Answer::from).collect(),
-            }),
+/// The answer to the last frame of a request, and where it had several, to each of them.
+#[derive(Debug, Clone, PartialEq, Serialize, utoipa::ToSchema)]
+pub struct FrameAnswers {
+    /// The answer to the last frame.
+    #[serde(flatten)]
+    last: Answer,
+    /// Where several frames were sent: one answer for each, in the order of the frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, min_items = 2)]
+    answers: Option<Vec<Answer>>,
+}
+
+impl From<&[Estimates]> for FrameAnswers {
+    /// From the answers to all frames of a request, which has at least one.
+    fn from(estimates: &[Estimates]) -> Self {
+        let all = || estimates.iter().map(Answer::from).collect();
+        Self {
+            last: (&estimates[estimates.len() - 1]).into(),
+            answers: (estimates.len() > 1).then(all),
         }
     }
 }

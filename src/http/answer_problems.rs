@@ -1,5 +1,6 @@
 //! Writes the document of a problem that a handler or a layer answered with, and its line in the log.
 
+use super::base_path::client_path;
 use super::problems::document::respond;
 use super::problems::problem::Problem;
 use super::request_id;
@@ -18,7 +19,7 @@ pub async fn answer_problems(
     request: Request,
     next: Next,
 ) -> Response {
-    let (path, id) = (request.uri().path().to_owned(), request_id::of(&request));
+    let (path, id) = (client_path(&request), request_id::of(&request));
     let mut response = next.run(request).await;
     let Some(problem) = response.extensions_mut().remove::<Problem>() else {
         return response;

@@ -1,10 +1,13 @@
-//! The routes that are in the OpenAPI document, and the document itself, which is generated from their handlers.
+//! The routes that are in the OpenAPI document, and what the document says of the service as a whole.
 
 use super::metrics::page as metrics_page;
 use super::problems::document::ProblemDocument;
 use super::state::AppState;
 use super::stream::handshake;
-use super::{bag_picture, create, frames, health, session, snapshot, target, token};
+use super::{
+    bag_picture, create, create_named, cvat, frames, health, session, snapshot, target, token,
+    track,
+};
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
@@ -23,10 +26,13 @@ use utoipa_axum::routes;
             Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
             to hosts that are not allowed `host-not-allowed` (421).\n\n\
             Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \
-            While the service is about to end, all answers have the header `Draining: true`."
+            While the service is about to end, all answers have the header `Draining: true`.",
+        contact(name = "The authors of bagtrack")
     ),
+    servers((url = "/", description = "The service that this document comes from")),
     tags(
         (name = "sessions", description = "Open a session, send frames, end it"),
+        (name = "integrations", description = "The calls of annotation tools"),
         (name = "service", description = "The service itself")
     ),
     components(schemas(ProblemDocument)),
@@ -52,12 +58,14 @@ impl utoipa::Modify for Bearer {
 pub fn sessions() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(create::create))
-        .routes(routes!(session::get, session::delete))
+        .routes(routes!(session::get, session::delete, create_named::put))
         .routes(routes!(frames::post))
         .routes(routes!(target::put))
         .routes(routes!(snapshot::get))
         .routes(routes!(bag_picture::get))
         .routes(routes!(token::create))
+        .routes(routes!(track::post))
+        .routes(routes!(cvat::post))
         .routes(routes!(handshake::open))
 }
 
@@ -73,8 +81,8 @@ pub fn probes() -> OpenApiRouter<AppState> {
         .routes(routes!(health::ready))
 }
 
-/// The OpenAPI document.
-pub fn document() -> utoipa::openapi::OpenApi {
+/// What the handlers say; the document has more.
+pub fn handlers() -> utoipa::openapi::OpenApi {
     OpenApiRouter::with_openapi(Api::openapi())
         .merge(sessions())
         .merge(metrics())

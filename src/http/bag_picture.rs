@@ -1,17 +1,17 @@
 //! `GET /sessions/{id}/bag.png`: the bag as a contact sheet.
 
 use super::client::Client;
+use super::newest;
 use super::openapi::problem_responses::{self, operation_problems};
+use super::openapi::request_bodies::BinaryBody;
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use super::upload::texts::refuse_query;
-use super::work;
-use crate::sessions::{LockedSession, WorkMeter};
+use crate::sessions::LockedSession;
 use crate::tracker::{BagEntry, VectorView};
 use axum::Extension;
-use axum::extract::State;
+use axum::extract::{Query, State};
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -23,6 +23,16 @@ use std::sync::Arc;
 const TILE: u32 = 64;
 const GAP: u32 = 4;
 const GROUND: Rgb<u8> = Rgb([24, 25, 28]);
+
+/// The settings of the picture.
+#[derive(Debug, Default, serde::Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct BagSettings {
+    /// Whose bag, counted from 0, in a session that was opened with `boxes`.
+    #[param(required = false, nullable = false, default = 0)]
+    target: Option<usize>,
+}
 
 operation_problems!(
     Problems,
@@ -44,10 +54,10 @@ operation_problems!(
 /// gradients. In a basis, positive values are bright and negative ones dark.
 #[utoipa::path(
     get, path = "/sessions/{id}/bag.png", tag = "sessions", operation_id = "getBagPicture",
-    params(("id" = Uuid, Path, description = "The session's id")),
+    params(("id" = Uuid, Path, description = "The session's id"), BagSettings),
     responses(
         (
-            status = 200, description = "The picture", body = Vec<u8>, content_type = "image/png"
+            status = 200, description = "The picture", body = BinaryBody, content_type = "image/png"
         ),
         Problems
     )
@@ -58,14 +68,19 @@ pub async fn get(
     uri: Uri,
     Extension(client): Extension<Client>,
 ) -> Result<Response, Problem> {
-    refuse_query(&uri)?;
-    let session = path.find(&state)?;
+    let Query(settings) = Query::<BagSettings>::try_from_uri(&uri)
+        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
+    let session = path.find(&state).await?;
+    let (target, count) = (settings.target.unwrap_or(0), session.target_count());
     state.admission.check_place()?;
-    let client = state.clients.account(&client).request()?;
-    let queue = state.admission.enter(client.lane(), Box::new(client))?;
+    let request = state.clients.account(&client).request()?;
+    let queue = state.admission.enter(request.lane(), Box::new(request))?;
     let permit = session.visit()?;
-    let draw = |locked: &mut LockedSession, _: &mut WorkMeter| draw(&locked.state().bag());
-    let bytes = work::on_session(&state, permit, queue, draw).await?;
+    let draw = move |locked: &mut LockedSession| {
+        let bag = locked.state().bag(target);
+        draw(&bag.ok_or_else(|| Problem::which_target(count))?)
+    };
+    let bytes = newest::look(&state, permit, queue, &client, draw).await?;
     Ok(([(CONTENT_TYPE, "image/png")], bytes).into_response())
 }
 

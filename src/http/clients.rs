@@ -148,6 +148,11 @@ impl Account {
         }
     }
 
+    /// In whose turn the client's work is done.
+    pub fn lane(&self) -> Lane {
+        self.lane
+    }
+
     /// Takes a place for a request in flight.
     ///
     /// # Errors
@@ -177,12 +182,13 @@ impl Account {
         }
     }
 
-    /// Takes a place for a session.
+    /// Takes the places of a session with so many targets: as many as sessions with one target would.
     ///
     /// # Errors
     /// The client has as many as it may.
-    pub fn session(self: &Arc<Self>) -> Result<Held, Problem> {
-        let permit = self.sessions.clone().try_acquire_owned();
+    pub fn sessions(self: &Arc<Self>, targets: usize) -> Result<Held, Problem> {
+        let places = u32::try_from(targets).unwrap_or(u32::MAX);
+        let permit = self.sessions.clone().try_acquire_many_owned(places);
         let permit = permit.map_err(|_| self.too_many_sessions())?;
         Ok(Box::new((self.clone(), permit)))
     }
@@ -213,21 +219,31 @@ impl RequestPermit {
     /// # Errors
     /// The client has sent too many lately.
     pub fn count_frames(&self, frames: usize) -> Result<(), Problem> {
+        self.account.count_frames(frames)
+    }
+}
+
+impl Account {
+    /// Counts frames of the client.
+    ///
+    /// # Errors
+    /// It has sent too many lately.
+    pub fn count_frames(&self, frames: usize) -> Result<(), Problem> {
         let frames = u32::try_from(frames).ok().and_then(NonZeroU32::new);
-        let (Some(limiter), Some(frames)) = (&self.account.frames, frames) else {
+        let (Some(limiter), Some(frames)) = (&self.frames, frames) else {
             return Ok(());
         };
         match limiter.check_n(frames) {
             Ok(Ok(state)) => {
                 let left = state.remaining_burst_capacity();
-                self.account.frames_left.store(left, Ordering::Relaxed);
+                self.frames_left.store(left, Ordering::Relaxed);
                 Ok(())
             }
             Ok(Err(not_yet)) => {
                 let wait = not_yet.wait_time_from(DefaultClock::default().now());
-                let rate = self.account.quotas.frames.map_or(0, |(rate, _)| rate.get());
+                let rate = self.quotas.frames.map_or(0, |(rate, _)| rate.get());
                 let rate = usize::try_from(rate).unwrap_or(usize::MAX);
-                self.account.frames_left.store(0, Ordering::Relaxed);
+                self.frames_left.store(0, Ordering::Relaxed);
                 Err(Problem::quota_exceeded("frames a second", rate).retry_after(wait))
             }
             // A request has no more frames than fit at once.

@@ -3,11 +3,16 @@
 
 use super::advance::RequestLimits;
 use super::auth::config::AccessConfig;
+use super::base_path::BasePath;
 use super::limits_config::LimitsConfig;
+use super::store_config::StoreConfig;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
+
+#[cfg(feature = "cli")]
+use super::flag_values::{parse_duration, parse_listen};
 
 #[cfg(feature = "cli")]
 use super::limits_config::shown;
@@ -15,12 +20,14 @@ use super::limits_config::shown;
 /// What a session with usual parameters is charged at most.
 const USUAL_SESSION_BYTES: usize = 512 << 10;
 
-/// The settings of the service. Durations are written like `10m`, `30s`, `500ms`.
+/// The settings of the service. Durations are written like `10m`, `30s`, `500ms`; a number alone is seconds.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Config {
-    /// Address to listen on; port 0 picks a free one.
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen))]
+    /// Address to listen on, or a host's name with a port; port 0 picks a free one.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen, value_parser = parse_listen
+    ))]
     pub listen: SocketAddr,
     /// Frames decoded and tracked at the same time [default: the number of cores].
     #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_WORKERS"))]
@@ -44,14 +51,14 @@ pub struct Config {
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SESSION_IDLE",
         default_value = shown(Config::default().session_idle),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub session_idle: Duration,
     /// A new session expires when its first frame does not come for this long.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SESSION_FIRST",
         default_value = shown(Config::default().session_first),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub session_first: Duration,
     /// Most bytes of a request body.
@@ -109,25 +116,31 @@ pub struct Config {
         arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')
     )]
     pub cors_origins: Vec<String>,
+    /// The path of the service on a host that it shares with others, like `/tracker`.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_BASE_PATH", value_name = "PATH",
+        default_value_t = Config::default().base_path
+    ))]
+    pub base_path: BasePath,
     /// Time for a client to send its request head; a connection that is idle for longer is closed too.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_HEADER_TIMEOUT",
         default_value = shown(Config::default().header_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub header_timeout: Duration,
     /// Time for a client to send its request body.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_BODY_TIMEOUT",
         default_value = shown(Config::default().body_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub body_timeout: Duration,
     /// Time for a request to wait for its session and a worker and to be worked on.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_WORK_TIMEOUT",
         default_value = shown(Config::default().work_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub work_timeout: Duration,
     /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
@@ -135,19 +148,22 @@ pub struct Config {
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SHUTDOWN_DELAY",
         default_value = shown(Config::default().shutdown_delay),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub shutdown_delay: Duration,
     /// Time for open requests to end on shutdown.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_SHUTDOWN_TIMEOUT",
         default_value = shown(Config::default().shutdown_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub shutdown_timeout: Duration,
     /// What one request and one client may take.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub limits: LimitsConfig,
+    /// The store that replicas share.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub store: StoreConfig,
     /// Who may use the service.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub access: AccessConfig,
@@ -174,12 +190,14 @@ impl Default for Config {
             max_frame_memory: limits.max_memory,
             max_connections: 4096,
             cors_origins: Vec::new(),
+            base_path: BasePath::default(),
             header_timeout: Duration::from_secs(30),
             body_timeout: Duration::from_secs(30),
             work_timeout: Duration::from_secs(30),
             shutdown_delay: Duration::from_secs(5),
             shutdown_timeout: Duration::from_secs(20),
             limits: LimitsConfig::default(),
+            store: StoreConfig::default(),
             access: AccessConfig::default(),
         }
     }

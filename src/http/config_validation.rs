@@ -105,6 +105,7 @@ impl Config {
         match checks
             .into_iter()
             .chain(limits)
+            .chain(self.store.checks(&moment))
             .find(|(_, holds, _)| !holds)
         {
             None => Ok(()),

@@ -1,6 +1,7 @@
 //! Which pages of other origins may call.
 
 use super::draining::DRAINING;
+use super::drawn::ANSWER;
 use super::idempotency::IDEMPOTENCY_KEY;
 use super::request_id::REQUEST_ID;
 use super::trace_context::TRACEPARENT;
@@ -39,6 +40,9 @@ pub fn cors(origins: &[String]) -> CorsLayer {
             TRACEPARENT,
             DRAINING,
             name("replayed"),
+            name("checkpoint"),
+            name("durable"),
+            ANSWER,
         ])
         .max_age(MAX_AGE)
 }

@@ -1,20 +1,21 @@
 //! `POST /sessions`: a first frame and a box, or a snapshot, open a session.
 
-use super::create_request::{CreateRequest, CreateSettings, check_room};
-use super::idempotency::StoredAnswer;
-use super::openapi::param_limits;
+use super::create_request::{CreateRequest, CreateSettings};
+use super::open_once::open_once;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use super::opening::{CreatedSession, Opened, open};
+use super::openapi::{example_frames, param_limits};
+use super::opening::CreatedSession;
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
-use tokio::time::timeout;
 
-type CreateForm = FormBody<CreateSettings>;
-type CreateJson = JsonBody<CreateSettings>;
+/// The form of a request to open a session.
+pub type CreateForm = FormBody<CreateSettings>;
+/// The JSON of a request to open a session.
+pub type CreateJson = JsonBody<CreateSettings>;
 
 operation_problems!(
     Problems,
@@ -29,6 +30,7 @@ operation_problems!(
         Kind::IdempotencyKeyReused,
         Kind::TooManySessions,
         Kind::NotReady,
+        Kind::StoreUnavailable,
     ]
 );
 
@@ -49,11 +51,12 @@ operation_problems!(
         description = "The first frame in one of three forms, or a snapshot.",
         content(
             (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
             (CreateForm = "multipart/form-data"),
             (
                 CreateJson = "application/json",
                 example = json!({
-                    "frame": "/9j/4AAQSkZJRg…",
+                    "frame": example_frames::first(),
                     "box": {"x": 10, "y": 20, "width": 30, "height": 40},
                     "seed": 7
                 })
@@ -67,14 +70,6 @@ operation_problems!(
             headers(
                 ("Location" = String, description = "The session's path"),
                 ("Replayed" = bool, description = "`true` where this answer was given before")
-            ),
-            links(
-                ("getSession" = (operation_id = "getSession", parameters(("id" = "$response.body#/id")))),
-                ("postFrames" = (operation_id = "postFrames", parameters(("id" = "$response.body#/id")))),
-                ("putTarget" = (operation_id = "putTarget", parameters(("id" = "$response.body#/id")))),
-                ("getSnapshot" = (operation_id = "getSnapshot", parameters(("id" = "$response.body#/id")))),
-                ("createToken" = (operation_id = "createToken", parameters(("id" = "$response.body#/id")))),
-                ("deleteSession" = (operation_id = "deleteSession", parameters(("id" = "$response.body#/id"))))
             )
         ),
         Problems
@@ -84,28 +79,5 @@ pub async fn create(
     State(state): State<AppState>,
     request: CreateRequest,
 ) -> Result<Response, Problem> {
-    let Some(key) = request.key.clone() else {
-        return Ok(open(&state, request).await?.response(false));
-    };
-    let digest = request.digest();
-    let is_live = |id| state.registry.is_live(id);
-    let entry = state.opened.entry(request.caller.owner(), key, is_live);
-    // Another request with this key may be about to open the session.
-    let locked = timeout(state.config.work_timeout, entry.lock_owned());
-    let mut stored = locked.await.map_err(|_| Problem::work_timeout())?;
-    let earlier = stored.as_ref();
-    if let Some(answer) = earlier.filter(|answer| is_live(answer.session)) {
-        return match answer.request == digest {
-            true => Ok(Opened::from(answer).response(true)),
-            false => Err(Problem::idempotency_key_reused()),
-        };
-    }
-    check_room(&state)?;
-    let opened = open(&state, request).await?;
-    *stored = Some(StoredAnswer {
-        request: digest,
-        session: opened.id,
-        body: opened.body.clone(),
-    });
-    Ok(opened.response(false))
+    open_once(&state, request).await
 }

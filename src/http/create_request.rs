@@ -1,20 +1,26 @@
 //! A request to open a session, as it is read.
 
 use super::auth::caller::Caller;
+use super::client::Client;
 use super::clients::Account;
-use super::idempotency;
+use super::idempotency::{self, OpeningName};
+use super::openapi::params_schema::ParametersText;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::target_box::{BoxInput, BoxText, TargetBox};
+use super::target_boxes::{BoxesInput, BoxesText, TargetBoxes};
 use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
 use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use super::upload::switch::Switch;
 use super::upload::texts::Texts;
 use super::upload::uploaded::Upload;
 use crate::sessions::{Fingerprint, QueuePermit};
-use axum::extract::{FromRequest, FromRequestParts, Request};
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::request::Parts;
 use serde::Deserialize;
 use std::sync::Arc;
+use uuid::Uuid;
 
 /// The settings of a new session.
 #[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
@@ -26,17 +32,28 @@ pub struct CreateSettings {
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
     #[schema(value_type = BoxInput, inline, required = false)]
     pub r#box: Option<TargetBox>,
+    /// In place of `box`, the boxes of several targets, at most 16: `x,y,width,height;x,y,width,height`, or a JSON
+    /// array of boxes. Then answers have an array `targets`, in this order.
+    #[param(value_type = BoxesText, inline, required = false)]
+    #[schema(value_type = BoxesInput, inline, required = false)]
+    pub boxes: Option<TargetBoxes>,
     /// `robust` (the default) or `paper`.
     #[param(nullable = false)]
     pub preset: Option<PresetName>,
-    /// Seed of all random draws, which counts before that of `params`; a random one when left out.
+    /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
     #[param(value_type = NumberText, inline, required = false)]
     #[schema(value_type = NumberInput, inline, required = false)]
     pub seed: Option<WholeNumber>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
-    #[param(value_type = String, format = "json", required = false, example = "{\"seed\": 7}")]
+    #[serde(rename = "parameters")]
+    #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
     pub params: Option<ParamOverrides>,
+    /// Whether the answer names the tracker's parameters.
+    #[param(value_type = bool, required = false, default = false)]
+    #[schema(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    pub verbose: Switch,
 }
 
 impl Settings for CreateSettings {
@@ -49,8 +66,10 @@ impl Settings for CreateSettings {
 pub struct CreateRequest {
     /// Who opens it.
     pub caller: Caller,
-    /// The idempotency key.
-    pub key: Option<String>,
+    /// Where it comes from.
+    pub client: Client,
+    /// What the client calls the session, where it gives it a name.
+    pub name: Option<OpeningName>,
     /// What the client has in use.
     pub account: Arc<Account>,
     /// The place in the queue.
@@ -68,20 +87,31 @@ impl FromRequest<AppState> for CreateRequest {
         let caller = Caller::from_request_parts(&mut parts, state).await?;
         caller.require_key()?;
         let key = idempotency::key_of(&parts.headers)?;
+        let name = match (id_of_path(&mut parts).await?, key) {
+            (Some(_), Some(_)) => {
+                let detail = "The id in the path stands for the `Idempotency-Key`; leave that out.";
+                return Err(Problem::malformed(detail));
+            }
+            (Some(id), None) => Some(OpeningName::Id(id)),
+            (None, Some(key)) => Some(OpeningName::Key(caller.owner().clone(), key)),
+            (None, None) => None,
+        };
         // A request that comes again may have its answer already.
-        if key.is_none() {
+        if name.is_none() {
             check_room(state)?;
         }
-        let client = admit(state, &parts)?;
-        let account = client.account().clone();
-        if key.is_none() {
+        let client = Client::of(&parts);
+        let admitted = admit(state, &parts)?;
+        let account = admitted.account().clone();
+        if name.is_none() {
             account.check_session()?;
         }
         let request = Request::from_parts(parts, body);
-        let (upload, queue) = Upload::read(state, client, texts, request).await?;
+        let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
         Ok(Self {
             caller,
-            key,
+            client,
+            name,
             account,
             queue,
             upload,
@@ -90,12 +120,22 @@ impl FromRequest<AppState> for CreateRequest {
 }
 
 impl CreateRequest {
-    /// A digest of the frame and the settings, whichever form they came in. It is compared with others of this process
+    /// A digest of the frame and the settings, whichever form they came in. It is compared with others of this version
     /// only.
-    pub fn digest(&self) -> blake3::Hash {
+    pub fn digest(&self) -> [u8; 32] {
         let (file, upload) = (Fingerprint::of(&self.upload.files[0]), &self.upload);
-        let text = format!("{file:?} {:?} {}", upload.settings, upload.is_snapshot);
-        blake3::hash(text.as_bytes())
+        let CreateSettings {
+            r#box,
+            boxes,
+            preset,
+            seed,
+            params,
+            // Another request for the same session.
+            verbose: _,
+        } = &upload.settings;
+        let settings = (r#box, boxes, preset, seed, params);
+        let text = format!("{file:?} {settings:?} {}", upload.is_snapshot);
+        *blake3::hash(text.as_bytes()).as_bytes()
     }
 }
 
@@ -108,4 +148,15 @@ pub fn check_room(state: &AppState) -> Result<(), Problem> {
         return Err(Problem::not_ready());
     }
     Ok(state.registry.check_room()?)
+}
+
+/// The id that the client made, where the path has one.
+async fn id_of_path(parts: &mut Parts) -> Result<Option<Uuid>, Problem> {
+    match Option::<Path<String>>::from_request_parts(parts, &()).await {
+        Ok(None) => Ok(None),
+        Ok(Some(Path(id))) if id.parse::<Uuid>().is_ok() => Ok(id.parse().ok()),
+        _ => Err(Problem::malformed(
+            "The id in the path must be a UUID, like 67e55044-10b1-426f-9247-bb680e5fe0c8.",
+        )),
+    }
 }

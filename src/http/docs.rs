@@ -1,6 +1,7 @@
 //! `/openapi.json`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
-use super::api;
+use super::base_path::BasePath;
+use super::openapi::document;
 use super::problems::problem::Problem;
 use super::security_headers::DOCS_POLICY;
 use axum::body::Bytes;
@@ -12,18 +13,22 @@ use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 use utoipa_swagger_ui::Config;
 
-static DOCUMENT: LazyLock<Bytes> = LazyLock::new(|| {
-    let document = api::document().to_pretty_json();
-    document.expect("the document is plain JSON").into()
-});
-
 // The default validator is on another host.
 static SWAGGER: LazyLock<Arc<Config<'static>>> =
-    LazyLock::new(|| Arc::new(Config::new(["/openapi.json"]).validator_url("none")));
+    LazyLock::new(|| Arc::new(Config::new(["../openapi.json"]).validator_url("none")));
 
-/// `/openapi.json`.
-pub async fn document() -> Response {
-    ([(CONTENT_TYPE, "application/json")], DOCUMENT.clone()).into_response()
+/// `/openapi.json` of a service below this path.
+pub fn document(base: &BasePath) -> Bytes {
+    let document = match base.as_str() {
+        "" => document::document(),
+        path => document::document_at(path),
+    };
+    (document + "\n").into()
+}
+
+/// `/openapi.json`, as it was made at the start.
+pub async fn served(document: Bytes) -> Response {
+    ([(CONTENT_TYPE, "application/json")], document).into_response()
 }
 
 /// `/docs`: the files of Swagger UI are relative to `/docs/`.

@@ -1,24 +1,47 @@
 //! In which order the requests of a session are taken that come over several connections.
 //!
-//! Numbers tell the order: a frame that comes a little early waits for those before it. Without numbers nothing tells
-//! it, so a request is refused that comes while another one is at the session.
+//! Numbers tell the order: a frame that comes a little early waits for those before it. With a store they may come to
+//! other replicas, so it asks the store where the session stands. Without numbers nothing tells the order, so a request
+//! is refused that comes while another one is at the session.
 
+use super::client::Client;
+use super::newest;
 use super::problems::problem::Problem;
+use super::state::AppState;
 use crate::sessions::SessionPermit;
 use std::time::Duration;
+use tokio::time::Instant;
 
 /// How long an early frame waits for its turn.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// How often the store is asked meanwhile.
+const ASKS_STORE: Duration = Duration::from_millis(20);
 
 /// Waits for the turn of a request whose (first) frame has this number.
 ///
 /// # Errors
-/// It has no number, and another request with frames was at the session when it came.
-pub async fn wait_for_turn(permit: &SessionPermit, number: Option<u64>) -> Result<(), Problem> {
-    match number {
-        Some(number) => permit.wait_for_turn(number, PATIENCE).await,
-        None if permit.overlaps() => return Err(Problem::not_in_order()),
-        None => {}
+/// It has no number, and another request with frames was at the session when it came; or the session has ended, or the
+/// store gives no answer.
+pub async fn wait_for_turn(
+    state: &AppState,
+    permit: &SessionPermit,
+    client: &Client,
+    number: Option<u64>,
+) -> Result<(), Problem> {
+    let Some(number) = number else {
+        return match permit.overlaps() {
+            true => Err(Problem::not_in_order()),
+            false => Ok(()),
+        };
+    };
+    if state.store.is_none() {
+        permit.wait_for_turn(number, PATIENCE).await;
+        return Ok(());
+    }
+    let deadline = Instant::now() + PATIENCE;
+    while permit.is_early(number) && Instant::now() < deadline {
+        newest::catch_up(state, permit, client).await?;
+        permit.wait_for_turn(number, ASKS_STORE).await;
     }
     Ok(())
 }

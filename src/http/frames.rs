@@ -1,18 +1,23 @@
 //! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
 
-use super::advance::{Answered, NextFrames};
+use super::accept::AnswerForm;
+use super::advance::NextFrames;
+use super::advance_session::advance_session;
 use super::answer::{FrameAnswers, replayed_header};
+use super::drawn::answer_drawn;
 use super::frame_order::wait_for_turn;
+use super::json::Json;
+use super::lines::{FrameSource, LineWork};
+use super::openapi::example_frames;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use super::upload::session_request::{SessionRequest, renew_if_busy};
+use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
-use super::work;
-use crate::sessions::WorkMeter;
-use axum::Json;
+use super::upload::switch::Switch;
+use super::video_frames::VideoFrames;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -26,10 +31,17 @@ pub struct FramesSettings {
     #[param(value_type = NumberText, inline, required = false)]
     #[schema(value_type = NumberInput, inline, required = false)]
     frame: Option<WholeNumber>,
+    /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
+    /// has the answer as JSON.
+    #[serde(default)]
+    #[param(value_type = bool, required = false, default = false)]
+    #[schema(value_type = bool, required = false, default = false)]
+    draw: Switch,
 }
 
 impl Settings for FramesSettings {
     const FRAMES: FrameCount = FrameCount::Several;
+    const TAKES_VIDEO: bool = true;
     const SCHEMA_PREFIX: &'static str = "Frames";
 }
 
@@ -52,12 +64,17 @@ operation_problems!(
 
 /// Send the next frame, or several
 ///
-/// One frame gets one answer; several, in order, get `{"answers": [...]}`. All frames of a request are decoded
-/// before the first is tracked: if one is bad, none is taken.
+/// The answer is that to the last frame. Where several were sent, in order, `answers` has one for each of them. All
+/// frames of a request are decoded before the first is tracked: if one is bad, none is taken. In a session that was
+/// opened with `boxes` an answer has an array `targets`, in the order of the boxes, and its own box is the first's.
 ///
 /// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
 /// number is processed, one that comes a little early waits for its turn, and the last request's numbers with the same
 /// bytes get the stored answers again, with the header `Replayed: true`.
+///
+/// With `Accept: application/x-ndjson` each frame is answered by a line of JSON as soon as it is tracked. Frames before
+/// one that is refused count then; its problem document is the last line. So is a video answered, where the service has
+/// an `ffmpeg`. With `Accept: image/png` or `draw` the answer is the frame with boxes, scores and particles drawn on it.
 ///
 /// `curl --data-binary @next.jpg http://localhost:8080/sessions/$ID/frames`
 #[utoipa::path(
@@ -70,15 +87,24 @@ operation_problems!(
         description = "The frame in one of three forms; the second and third take several.",
         content(
             (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
+            (BinaryBody = "video/mp4"), (BinaryBody = "video/webm"), (BinaryBody = "image/gif"),
+            (BinaryBody = "video/x-motion-jpeg"),
             (FramesForm = "multipart/form-data"),
-            (FramesJson = "application/json", example = json!({"frame": "/9j/4AAQSkZJRg…"})),
+            (FramesJson = "application/json", example = json!({"frame": example_frames::next()})),
         )
     ),
     responses(
         (
-            status = 200, description = "Where the target is", body = FrameAnswers,
+            status = 200, description = "Where the target is",
+            content(
+                (FrameAnswers = "application/json"), (String = "application/x-ndjson"), (BinaryBody = "image/png")
+            ),
             headers(
                 ("Replayed" = bool, description = "`true` where these answers were given before"),
+                ("Answer" = String, description = "With a picture: the answer as JSON"),
+                ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
+                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -89,26 +115,55 @@ pub async fn post(
     State(state): State<AppState>,
     request: SessionRequest<FramesSettings>,
 ) -> Result<Response, Problem> {
-    let next = NextFrames {
-        number: request.upload.settings.frame.map(|number| number.0),
-        files: request.upload.files,
-        correction: None,
-        kept: 0,
-        sees: false,
+    let SessionRequest {
+        client,
+        form,
+        path,
+        request_id,
+        permit,
+        queue,
+        upload,
+    } = request;
+    let number = upload.settings.frame.map(|number| number.0);
+    let form = match upload.settings.draw.0 {
+        true => AnswerForm::Picture,
+        false => form,
     };
-    wait_for_turn(&request.permit, next.number).await?;
-    let queue = request.queue.for_frames(next.files.len());
-    let limits = state.config.request_limits();
-    let metrics = state.metrics.tracking.clone();
-    let advance =
-        move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
-    let session = request.permit.session().clone();
-    let answered = work::on_session(&state, request.permit, queue, advance).await;
-    let Answered {
-        estimates,
-        replayed,
-        ..
-    } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
-    let answers = Json(FrameAnswers::from(&estimates[..])).into_response();
-    Ok(replayed_header(replayed, answers))
+    wait_for_turn(&state, &permit, &client, number).await?;
+    let (mut files, targets) = (upload.files, permit.session().target_count());
+    let frames = match (upload.video, form) {
+        (Some(_), AnswerForm::Picture) => {
+            let detail = "A drawn answer is one picture; leave out `draw` for a video.";
+            return Err(Problem::malformed(detail));
+        }
+        (Some(format), _) => {
+            let video = files.swap_remove(0);
+            FrameSource::Video(VideoFrames::decode(&state, video, format).await?)
+        }
+        (None, AnswerForm::Lines) => FrameSource::Files(files.into_iter()),
+        (None, AnswerForm::Picture) => {
+            let next = NextFrames::posted(number, files, None);
+            let queue = queue.for_frames(targets);
+            return answer_drawn(&state, permit, queue, &client, next).await;
+        }
+        (None, AnswerForm::Json) => {
+            let queue = queue.for_frames(files.len() * targets);
+            let next = NextFrames::posted(number, files, None);
+            let answered = advance_session(&state, permit, queue, &client, next).await?;
+            let answers = Json(FrameAnswers::from(&answered.estimates[..])).into_response();
+            let response = replayed_header(answered.replayed, answers);
+            return Ok(answered.durability.write(response));
+        }
+    };
+    let work = LineWork {
+        queue: queue.for_frames(targets),
+        state,
+        permit,
+        client,
+        frames,
+        number,
+        path,
+        request_id,
+    };
+    work.answer().await
 }

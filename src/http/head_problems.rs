@@ -1,6 +1,7 @@
 //! Problem documents for what ends before any handler sees it: heads that hyper cannot read, and connections over a
 //! share.
 
+use super::json;
 use super::problems::document::{MEDIA_TYPE, ProblemDocument};
 use super::problems::problem::Problem;
 use uuid::Uuid;
@@ -31,7 +32,7 @@ pub fn document_for(answer: &[u8]) -> Option<Vec<u8>> {
 pub fn answer_of(problem: &Problem) -> Vec<u8> {
     let id = Uuid::new_v4().to_string();
     let document = ProblemDocument::new(problem, "/".to_owned(), id.clone());
-    let body = serde_json::to_vec(&document).unwrap_or_default();
+    let body = json::line(&document).unwrap_or_default();
     let retry = problem.retry_seconds();
     let retry = retry.map_or(String::new(), |seconds| {
         format!("retry-after: {seconds}\r\n")

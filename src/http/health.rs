@@ -1,10 +1,11 @@
 //! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
+use super::json::Json;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use axum::Json;
+use crate::sessions::StoreAway;
 use axum::extract::State;
 use serde::Serialize;
 
@@ -23,6 +24,8 @@ operation_problems!(LiveProblems, problem_responses::ALWAYS);
 operation_problems!(ReadyProblems, problem_responses::ALWAYS, &[Kind::NotReady]);
 
 /// Whether the process runs
+///
+/// Answers as long as the process can answer at all. A supervisor may end it when this does not come.
 #[utoipa::path(
     get, path = "/healthz", tag = "service", operation_id = "getHealth", security(()),
     responses((status = 200, description = "It runs", body = Health), LiveProblems)
@@ -33,8 +36,8 @@ pub async fn live() -> Json<Health> {
 
 /// Whether the service wants requests
 ///
-/// A load balancer should send none while this answers 503: the service was asked to end, or its queue is full. A queue
-/// that was full counts as full until half of it is free.
+/// A load balancer should send none while this answers 503: the service was asked to end, its queue is full, or the store
+/// of its sessions gives no answer. A queue that was full counts as full until half of it is free.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health), ReadyProblems)
@@ -44,6 +47,12 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
         return Err(Problem::not_ready());
     }
     let (free, all) = (state.admission.queue_places(), state.config.queue);
+    if let Some(store) = &state.store
+        && !store.best_effort
+        && !store.calls.is_up()
+    {
+        return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));
+    }
     match state.saturation.update(free, all) {
         true => Err(Problem::saturated()),
         false => Ok(OK),

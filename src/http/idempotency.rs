@@ -1,11 +1,11 @@
-//! `Idempotency-Key`: a request to open a session that is sent again gets the stored answer, and opens no second one.
+//! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
+//! `Idempotency-Key`, or an id that its client made.
 //!
-//! An answer is kept as long as its session lives, so there are never more of them than sessions. Requests with one key
+//! A name is kept as long as its session lives, so there are never more of them than sessions. Requests with one name
 //! are served one after the other. Problems are not stored: the request can be sent again after them.
 
 use super::problems::problem::Problem;
 use crate::sessions::Owner;
-use axum::body::Bytes;
 use axum::http::HeaderMap;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -36,29 +36,27 @@ pub fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     }
 }
 
-/// The answer to a request that opened a session.
-#[derive(Debug)]
-pub struct StoredAnswer {
-    /// The digest of the request.
-    pub request: blake3::Hash,
-    /// The session.
-    pub session: Uuid,
-    /// The body of the answer.
-    pub body: Bytes,
+/// What a client calls a session before it is open.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum OpeningName {
+    /// An idempotency key. Each owner has keys of its own.
+    Key(Owner, String),
+    /// The session's id, which the client has made.
+    Id(Uuid),
 }
 
-/// The answer of one key, once there is one. Whoever holds the lock is about to make it.
-pub type Entry = Arc<AsyncMutex<Option<StoredAnswer>>>;
+/// The session that a request of one name opened, once there is one. Whoever holds the lock is about to open it.
+pub type Entry = Arc<AsyncMutex<Option<Uuid>>>;
 
-/// The stored answers by their keys. Each owner has keys of its own.
+/// The sessions by the names under which they were opened.
 #[derive(Debug)]
 pub struct IdempotencyStore {
-    entries: Mutex<HashMap<(Owner, String), Entry>>,
+    entries: Mutex<HashMap<OpeningName, Entry>>,
     max_entries: usize,
 }
 
 impl IdempotencyStore {
-    /// No answers yet. `max_entries` is more than the sessions and the requests inside together: requests that were
+    /// No sessions yet. `max_entries` is more than the sessions and the requests inside together: requests that were
     /// refused leave entries, which go when there are so many.
     pub fn new(max_entries: usize) -> Self {
         let entries = Mutex::default();
@@ -68,25 +66,25 @@ impl IdempotencyStore {
         }
     }
 
-    /// The entry of a key: the one that is there, or a new one.
-    pub fn entry(&self, owner: &Owner, key: String, is_live: impl Fn(Uuid) -> bool) -> Entry {
+    /// The entry of a name: the one that is there, or a new one.
+    pub fn entry(&self, name: OpeningName, is_live: impl Fn(Uuid) -> bool) -> Entry {
         if self.map().len() >= self.max_entries {
             self.prune(is_live);
         }
-        self.map().entry((owner.clone(), key)).or_default().clone()
+        self.map().entry(name).or_default().clone()
     }
 
-    /// Drops the answers whose sessions have ended.
+    /// Drops the entries whose sessions have ended.
     pub fn prune(&self, is_live: impl Fn(Uuid) -> bool) {
         self.map().retain(|_, entry| {
             // A request that holds the entry or waits for it holds a clone.
             let in_use = Arc::strong_count(entry) > 1;
             let stored = entry.try_lock();
-            in_use || stored.is_ok_and(|stored| stored.as_ref().is_some_and(|a| is_live(a.session)))
+            in_use || stored.is_ok_and(|stored| stored.is_some_and(&is_live))
         });
     }
 
-    fn map(&self) -> MutexGuard<'_, HashMap<(Owner, String), Entry>> {
+    fn map(&self) -> MutexGuard<'_, HashMap<OpeningName, Entry>> {
         // Nothing panics while it is held.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -98,20 +96,16 @@ mod tests {
 
     #[tokio::test]
     async fn answers_go_with_their_sessions_and_entries_in_use_stay() {
-        let (store, owner) = (IdempotencyStore::new(4), Owner::default());
+        let store = IdempotencyStore::new(4);
+        let name = |key: &str| OpeningName::Key(Owner::default(), key.to_owned());
         let live = |id| id == Uuid::from_u128(1);
         for (key, session) in [("a", 1), ("b", 2)] {
-            let entry = store.entry(&owner, key.to_owned(), live);
-            *entry.lock().await = Some(StoredAnswer {
-                request: blake3::hash(b""),
-                session: Uuid::from_u128(session),
-                body: Bytes::new(),
-            });
+            *store.entry(name(key), live).lock().await = Some(Uuid::from_u128(session));
         }
-        drop(store.entry(&owner, "refused".to_owned(), live));
-        let used = store.entry(&owner, "used".to_owned(), live);
+        drop(store.entry(name("refused"), live));
+        let used = store.entry(name("used"), live);
         assert_eq!(store.map().len(), 4);
-        drop(store.entry(&owner, "one more".to_owned(), live));
+        drop(store.entry(name("one more"), live));
         let left = store.map().len();
         assert_eq!(
             left, 3,

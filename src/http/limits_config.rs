@@ -3,6 +3,9 @@
 use ipnet::IpNet;
 use std::time::Duration;
 
+#[cfg(feature = "cli")]
+use super::flag_values::parse_duration;
+
 /// What one request, one connection and one client may take.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -17,7 +20,7 @@ pub struct LimitsConfig {
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_MAX_REQUEST_CPU",
         default_value = shown(LimitsConfig::default().max_request_cpu),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub max_request_cpu: Duration,
     /// Least bytes a second of a request body, after its first `body-grace`.
@@ -30,30 +33,42 @@ pub struct LimitsConfig {
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_BODY_GRACE",
         default_value = shown(LimitsConfig::default().body_grace),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub body_grace: Duration,
     /// A connection whose client takes no byte of an answer for this long is closed.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_WRITE_TIMEOUT",
         default_value = shown(LimitsConfig::default().write_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub write_timeout: Duration,
     /// Time for the answer to a client that has closed its side of the connection; then it counts as gone.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_HALF_CLOSE_TIMEOUT",
         default_value = shown(LimitsConfig::default().half_close_timeout),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub half_close_timeout: Duration,
     /// A stream is pinged this often; one whose client is not heard of in that time is closed.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_PING_INTERVAL",
         default_value = shown(LimitsConfig::default().ping_interval),
-        value_parser = humantime::parse_duration
+        value_parser = parse_duration
     ))]
     pub ping_interval: Duration,
+    /// Most frames of a video.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MAX_VIDEO_FRAMES",
+        default_value_t = LimitsConfig::default().max_video_frames
+    ))]
+    pub max_video_frames: usize,
+    /// The program that decodes videos: its name or path. `off` refuses videos.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_FFMPEG",
+        default_value_t = LimitsConfig::default().ffmpeg
+    ))]
+    pub ffmpeg: String,
     /// Most connections of one address, trusted proxies excepted [default: a quarter of `max-connections`].
     #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS"))]
     pub client_connections: Option<usize>,
@@ -109,6 +124,8 @@ impl Default for LimitsConfig {
             write_timeout: Duration::from_secs(30),
             half_close_timeout: Duration::from_secs(5),
             ping_interval: Duration::from_secs(20),
+            max_video_frames: 3600,
+            ffmpeg: "ffmpeg".to_owned(),
             client_connections: None,
             client_sessions: None,
             max_session_bytes: None,
@@ -127,7 +144,7 @@ impl LimitsConfig {
         &self,
         moment: &std::ops::RangeInclusive<Duration>,
         body: usize,
-    ) -> [(&'static str, bool, &'static str); 12] {
+    ) -> [(&'static str, bool, &'static str); 13] {
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let share = |share: Option<usize>| share.is_none_or(|share| share >= 1);
@@ -138,6 +155,7 @@ impl LimitsConfig {
                 moment.contains(&self.max_request_cpu),
                 duration,
             ),
+            ("max-video-frames", self.max_video_frames >= 1, positive),
             ("min-body-rate", self.min_body_rate >= 1, positive),
             ("body-grace", moment.contains(&self.body_grace), duration),
             (

@@ -1,6 +1,7 @@
 //! How much memory the service takes at most, by its settings.
 
 use super::config::Config;
+use crate::sessions::MAX_LIST_BYTES;
 use crate::tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write.
@@ -40,8 +41,10 @@ impl MemoryBound {
             + WORKER;
         Self {
             uploads: count(config.max_upload_bytes),
-            // As many threads as workers may wait between two frames.
-            work: count(config.worker_count()) * (worker + WORKER + 2 * images),
+            // There are quick and slow workers, and as many threads may wait between two frames. Each has a copy of its
+            // session's targets.
+            work: count(config.worker_count())
+                * (2 * (worker + WORKER) + 3 * (images + count(MAX_LIST_BYTES))),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * (2 * count(MAX_BUFFER_BYTES) + CONNECTION),
         }
@@ -71,7 +74,7 @@ mod tests {
         };
         let before = total(&config());
         assert_eq!(with(&|c| c.max_upload_bytes += 1 << 20), before + (1 << 20));
-        assert_eq!(with(&|c| c.max_frame_memory += 1 << 20), before + (2 << 20));
+        assert_eq!(with(&|c| c.max_frame_memory += 1 << 20), before + (4 << 20));
         assert!(with(&|c| c.workers = Some(3)) > before);
         assert!(with(&|c| c.max_sessions += 1) > before);
         assert!(with(&|c| c.max_connections += 1) > before);

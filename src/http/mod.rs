@@ -20,13 +20,16 @@
 //! # }
 //! ```
 
+mod accept;
 mod activity;
 mod advance;
+mod advance_session;
 mod answer;
 mod answer_problems;
 mod api;
 mod auth;
 mod bag_picture;
+mod base_path;
 mod client;
 mod clients;
 mod config;
@@ -36,12 +39,19 @@ mod connection_io;
 mod connections;
 mod cors;
 mod create;
+mod create_named;
 mod create_request;
+mod cvat;
 mod docs;
 mod drain;
 mod draining;
+mod drawn;
+mod durability;
 #[cfg(feature = "otel")]
 mod exported_span;
+mod first_frame;
+#[cfg(feature = "cli")]
+mod flag_values;
 mod forwarded;
 mod frame_order;
 mod frames;
@@ -50,9 +60,13 @@ mod health;
 mod host;
 mod idempotency;
 mod identify;
+mod json;
 mod limits_config;
+mod lines;
 mod memory_bound;
 mod metrics;
+mod newest;
+mod open_once;
 mod openapi;
 mod opening;
 mod page;
@@ -69,23 +83,32 @@ mod session;
 mod session_path;
 mod snapshot;
 mod state;
+mod store_config;
+mod stored;
 mod stream;
 mod target;
 mod target_box;
+mod target_boxes;
 mod token;
 mod trace_context;
+mod track;
 mod upload;
+mod video_frames;
 mod work;
 
-pub use api::document as openapi_document;
 pub use auth::access::AccessError;
 pub use auth::config::{AccessConfig, Secret};
 pub use auth::keys::{ApiKeys, KeysError};
+pub use base_path::{BasePath, BasePathError};
 pub use client::Client;
 pub use config::Config;
 pub use config_validation::ConfigError;
+#[cfg(feature = "cli")]
+pub use flag_values::{parse_duration, parse_listen};
 pub use limits_config::LimitsConfig;
 pub use memory_bound::MemoryBound;
+pub use openapi::document::document as openapi_document;
 pub use problems::kind::Kind as ProblemKind;
 pub use server::{Application, BindError, Shutdown};
 pub use snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;
+pub use store_config::{StoreConfig, StoreMode};

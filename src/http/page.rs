@@ -2,15 +2,16 @@
 //!
 //! Browsers ask again each time, and get 304 as long as the program is the same.
 
+use super::base_path::client_path;
 use super::problems::problem::Problem;
 use super::security_headers::PAGE_POLICY;
-use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, Request};
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, IF_NONE_MATCH,
 };
 use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
@@ -29,12 +30,22 @@ macro_rules! file {
     };
 }
 
+/// A file of the JavaScript client, which the page uses.
+macro_rules! client_file {
+    ($name:literal) => {
+        (
+            $name,
+            SCRIPT,
+            include_str!(concat!("../../clients/", $name)),
+        )
+    };
+}
+
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 12] = [
+const FILES: [File; 16] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
-    file!("api.js", SCRIPT),
     file!("box.js", SCRIPT),
     file!("chart.js", SCRIPT),
     file!("clip.js", SCRIPT),
@@ -42,16 +53,25 @@ const FILES: [File; 12] = [
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
     file!("stage.js", SCRIPT),
-    file!("stream.js", SCRIPT),
     file!("video.js", SCRIPT),
+    client_file!("js/bagtrack.js"),
+    client_file!("js/client.js"),
+    client_file!("js/problem.js"),
+    client_file!("js/session.js"),
+    client_file!("js/stream.js"),
+    client_file!("js/transport.js"),
 ];
 
-/// `/`.
-pub async fn index(headers: HeaderMap) -> Response {
-    respond(INDEX, &headers)
+/// `/`. Its links are relative, so a base path needs its slash.
+pub async fn index(request: Request) -> Response {
+    let path = client_path(&request);
+    match path.ends_with('/') {
+        true => respond(INDEX, request.headers()),
+        false => Redirect::permanent("/").into_response(),
+    }
 }
 
-/// `/page/{file}`.
+/// `/page/{*file}`.
 pub async fn asset(
     path: Result<Path<String>, PathRejection>,
     headers: HeaderMap,

@@ -4,6 +4,7 @@ use super::answer_problems::{answer_problems, panic_response};
 use super::api;
 use super::auth::layer::{authenticate, authenticate_metrics};
 use super::auth::origin::check_origin;
+use super::base_path::mount;
 use super::cors::cors;
 use super::drain::drain_refused;
 use super::draining::mark_draining;
@@ -32,7 +33,7 @@ use tower_http::timeout::RequestBodyDeadlineLayer;
 /// The whole service. `extra` routes are served beside its own and pass through the same layers.
 pub fn router(state: AppState, extra: Router) -> Router {
     let config = &state.config;
-    routes(&state)
+    let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
         .fallback(async || Problem::route_not_found())
@@ -58,7 +59,8 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), count_request))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
-        .layer(middleware::map_request(remove_unusable_id))
+        .layer(middleware::map_request(remove_unusable_id));
+    mount(&state.config.base_path, routes)
 }
 
 /// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and
@@ -68,18 +70,19 @@ fn routes(state: &AppState) -> Router<AppState> {
     let with_metrics_key = middleware::from_fn_with_state(state.clone(), authenticate_metrics);
     let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
+    let document = docs::document(&state.config.base_path);
     let (sessions, _) = api::sessions().split_for_parts();
     let (metrics, _) = api::metrics().split_for_parts();
     let (probes, _) = api::probes().split_for_parts();
     let pages = Router::new()
         .route("/", get(page::index))
-        .route("/page/{file}", get(page::asset));
+        .route("/page/{*file}", get(page::asset));
     #[cfg(feature = "eval")]
     let pages = pages
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));
     pages
-        .route("/openapi.json", get(docs::document))
+        .route("/openapi.json", get(move || docs::served(document.clone())))
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))

@@ -2,9 +2,9 @@
 //!
 //! Each frame is drawn once, one at a time, and kept: what the clips cost is bounded however often they are asked for.
 
+use super::json::Json;
 use super::problems::problem::Problem;
 use crate::sample::{Clip, Format, Scene, Settings};
-use axum::Json;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;

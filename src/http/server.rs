@@ -18,6 +18,8 @@ use super::memory_bound::MAX_BUFFER_BYTES;
 use super::problems::problem::Problem;
 use super::router::router;
 use super::state::AppState;
+use super::store_config::SharedStore;
+use super::stored;
 use crate::sessions::Clock;
 use axum::body::Body;
 use axum::{Extension, Router};
@@ -98,9 +100,10 @@ impl Application {
         let address = config.listen;
         let access = Access::load(&config.access, address)?;
         let listener = TcpListener::bind(address).await;
+        let store = SharedStore::connect(&config.store).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
-            state: AppState::new(config, access, clock),
+            state: AppState::new(config, access, clock, store),
             extra: Router::new(),
         })
     }
@@ -154,6 +157,10 @@ impl Application {
                 how = shutdown => {
                     tracing::info!("shutting down");
                     state.drain();
+                    tokio::spawn({
+                        let state = state.clone();
+                        async move { stored::flush(&state).await }
+                    });
                     // New connections are still served: a load balancer asks for /readyz on them.
                     if how.into() == Shutdown::Gradual {
                         let _ = timeout(config.shutdown_delay, accepting).await;
@@ -167,6 +174,7 @@ impl Application {
         // Each connection, and each stream that took one over, holds a receiver.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
+        stored::flush(&state).await;
         ended.is_ok()
     }
 }

@@ -1,15 +1,16 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
 use super::answer::{Answer, ImageSize};
+use super::json::Json;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
+use super::stored;
 use super::upload::overrides::ParamOverrides;
 use super::upload::texts::refuse_query;
 use crate::tracker::Params;
-use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, Uri};
 use serde::Serialize;
@@ -27,7 +28,8 @@ pub struct SessionView {
     answer: Answer,
     /// The size that all frames of the session have.
     image: ImageSize,
-    /// The tracker's parameters.
+    /// The tracker's parameters; with `boxes` the seed is that of the first target.
+    #[serde(rename = "parameters")]
     #[schema(value_type = ParamOverrides)]
     params: Params,
     /// When the session ends if no frame comes (RFC 3339); this request does not move it on.
@@ -56,12 +58,12 @@ pub async fn get(
     uri: Uri,
 ) -> Result<Json<SessionView>, Problem> {
     refuse_query(&uri)?;
-    let session = path.find(&state)?;
+    let session = path.find_newest(&state).await?;
     let latest = session.latest();
     Ok(Json(SessionView {
         id: session.id(),
-        frames: latest.frame + 1,
-        answer: latest.into(),
+        frames: latest.first().frame + 1,
+        answer: (&latest).into(),
         image: session.source_size().into(),
         params: session.params().clone(),
         expires_at: state.expires_at(&session),
@@ -82,8 +84,8 @@ pub async fn delete(
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     refuse_query(&uri)?;
-    let session = path.find(&state)?;
-    match state.registry.remove(session.id()) {
+    let session = path.find(&state).await?;
+    match stored::remove(&state, &session).await? {
         true => {
             tracing::info!(session = session.short_id(), "deleted");
             Ok(StatusCode::NO_CONTENT)

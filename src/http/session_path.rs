@@ -1,8 +1,11 @@
 //! The `{id}` of a session's path.
 
 use super::auth::caller::Caller;
+use super::client::Client;
+use super::newest;
 use super::problems::problem::Problem;
 use super::state::AppState;
+use super::stored;
 use crate::sessions::Session;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
@@ -13,6 +16,7 @@ use std::sync::Arc;
 pub struct SessionPath {
     id: String,
     caller: Caller,
+    client: Client,
 }
 
 impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
@@ -22,19 +26,27 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
         // Bytes that are not UTF-8 are the id of no session.
         let caller = Caller::from_request_parts(parts, state).await?;
         let path = Path::<String>::from_request_parts(parts, state).await;
-        path.map(|Path(id)| Self { id, caller })
+        let client = Client::of(parts);
+        path.map(|Path(id)| Self { id, caller, client })
             .map_err(|_| Problem::session_not_found())
     }
 }
 
 impl SessionPath {
     /// The caller's live session of this id. Text that is not an id is the id of no session.
-    pub fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
+    pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
         match self.id.parse() {
             Ok(id) if self.caller.may_use(id) => {
-                Ok(state.registry.find(id, self.caller.owner())?)
+                stored::find(state, id, self.caller.owner(), &self.client).await
             }
             _ => Err(Problem::session_not_found()),
         }
+    }
+
+    /// The same, with its last answer up to the store's.
+    pub async fn find_newest(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
+        let session = self.find(state).await?;
+        newest::refresh(state, &session, &self.client).await?;
+        Ok(session)
     }
 }

@@ -1,6 +1,7 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
 use super::client::Client;
+use super::newest;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::BinaryBody;
 use super::problems::kind::Kind;
@@ -8,8 +9,7 @@ use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
 use super::upload::texts::refuse_query;
-use super::work;
-use crate::sessions::{ByteCharge, LockedSession, WorkMeter};
+use crate::sessions::{ByteCharge, LockedSession};
 use axum::Extension;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::State;
@@ -63,23 +63,27 @@ pub async fn get(
     Extension(client): Extension<Client>,
 ) -> Result<Response, Problem> {
     refuse_query(&uri)?;
-    let session = path.find(&state)?;
+    let session = path.find(&state).await?;
     state.admission.check_place()?;
-    let client = state.clients.account(&client).request()?;
+    let asks = client;
+    let client = state.clients.account(&asks).request()?;
     let mut charge = ByteCharge::new(&state.uploads, client.bytes());
     let queue = state.admission.enter(client.lane(), Box::new(client))?;
     let permit = session.visit()?;
     let keys = state.access.snapshots.clone();
-    let take =
-        move |locked: &mut LockedSession, _: &mut WorkMeter| Ok(locked.state().snapshot(&keys));
-    let bytes = work::on_session(&state, permit, queue, take).await?;
+    let take = move |locked: &mut LockedSession| Ok(locked.state().snapshot(&keys));
+    let bytes = newest::look(&state, permit, queue, &asks, take).await?;
     // The bytes stay in memory until the client has taken them.
     charge.grow(bytes.len())?;
-    let body = ChargedBody {
+    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], charged(bytes, charge)).into_response())
+}
+
+/// A body with the memory that it is charged to.
+pub fn charged(bytes: Vec<u8>, charge: ByteCharge) -> Body {
+    Body::new(ChargedBody {
         bytes: Full::from(bytes),
         _charge: charge,
-    };
-    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], Body::new(body)).into_response())
+    })
 }
 
 /// An answer with the memory that it is charged to.

@@ -6,11 +6,13 @@ use super::config::Config;
 use super::idempotency::IdempotencyStore;
 use super::metrics::registry::Metrics;
 use super::saturation::Saturation;
+use super::store_config::SharedStore;
 use super::stream::open_streams::OpenStreams;
 use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
+use tokio::sync::Semaphore;
 
 /// What all handlers share; clones are the same state.
 #[derive(Debug, Clone)]
@@ -23,6 +25,8 @@ pub struct Shared {
     pub config: Config,
     /// The live sessions.
     pub registry: Registry,
+    /// The store that replicas share.
+    pub store: Option<SharedStore>,
     /// Which requests may work.
     pub admission: Admission,
     /// The memory of all uploads together.
@@ -37,6 +41,8 @@ pub struct Shared {
     pub opened: IdempotencyStore,
     /// The open streams.
     pub streams: OpenStreams,
+    /// Places for the processes that decode videos.
+    pub videos: Arc<Semaphore>,
     /// Whether `/readyz` has found the queue full.
     pub saturation: Saturation,
     clock: Clock,
@@ -53,19 +59,20 @@ impl std::ops::Deref for AppState {
 
 impl AppState {
     /// The state of a service with these settings, keys and this clock.
-    pub fn new(config: Config, access: Access, clock: Clock) -> Self {
+    pub fn new(config: Config, access: Access, clock: Clock, store: Option<SharedStore>) -> Self {
         let lease = Lease {
             first: config.session_first,
             idle: config.session_idle,
         };
+        let (most, requests) = (config.max_sessions, config.session_queue);
+        let registry = Registry::new(most, requests, lease, clock.clone());
+        let registry = registry.with_memory(config.session_bytes());
         Self(Arc::new(Shared {
-            registry: Registry::new(
-                config.max_sessions,
-                config.session_queue,
-                lease,
-                clock.clone(),
-            )
-            .with_memory(config.session_bytes()),
+            registry: match store {
+                Some(_) => registry.with_eviction(),
+                None => registry,
+            },
+            store,
             admission: Admission::new(config.queue, config.worker_count()),
             uploads: ByteBudget::new(config.max_upload_bytes),
             clients: Clients::new(&config),
@@ -73,6 +80,7 @@ impl AppState {
             metrics: Metrics::new(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             streams: OpenStreams::default(),
+            videos: Arc::new(Semaphore::new(config.worker_count())),
             saturation: Saturation::default(),
             clock,
             draining: AtomicBool::new(false),

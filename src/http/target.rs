@@ -1,19 +1,19 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
-use super::advance::{Answered, NextFrames};
+use super::advance::{Answered, GivenBox, NextFrames};
+use super::advance_session::advance_session;
 use super::answer::{Answer, replayed_header};
 use super::frame_order::wait_for_turn;
+use super::json::Json;
+use super::openapi::example_frames;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::target_box::{BoxInput, BoxText, TargetBox};
-use super::upload::session_request::{SessionRequest, renew_if_busy};
+use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
-use super::work;
-use crate::sessions::WorkMeter;
-use axum::Json;
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -32,6 +32,10 @@ pub struct TargetSettings {
     #[param(value_type = NumberText, inline, required = false)]
     #[schema(value_type = NumberInput, inline, required = false)]
     frame: Option<WholeNumber>,
+    /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    target: Option<WholeNumber>,
 }
 
 impl Settings for TargetSettings {
@@ -74,11 +78,12 @@ operation_problems!(
         description = "The frame in one of three forms.",
         content(
             (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
             (TargetForm = "multipart/form-data"),
             (
                 TargetJson = "application/json",
                 example = json!({
-                    "frame": "/9j/4AAQSkZJRg…",
+                    "frame": example_frames::next(),
                     "box": {"x": 12, "y": 22, "width": 30, "height": 40}
                 })
             ),
@@ -89,6 +94,8 @@ operation_problems!(
             status = 200, description = "The correction is taken", body = Answer,
             headers(
                 ("Replayed" = bool, description = "`true` where this answer was given before"),
+                ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
+                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -100,26 +107,19 @@ pub async fn put(
     request: SessionRequest<TargetSettings>,
 ) -> Result<Response, Problem> {
     let settings = request.upload.settings;
-    let target = settings.r#box.ok_or_else(Problem::missing_box)?;
-    let next = NextFrames {
-        number: settings.frame.map(|number| number.0),
-        files: request.upload.files,
-        correction: Some(target.into()),
-        kept: 0,
-        sees: false,
-    };
-    wait_for_turn(&request.permit, next.number).await?;
-    let limits = state.config.request_limits();
-    let metrics = state.metrics.tracking.clone();
-    let correct =
-        move |locked: &mut _, meter: &mut WorkMeter| next.advance(locked, &limits, meter, &metrics);
-    let session = request.permit.session().clone();
-    let answered = work::on_session(&state, request.permit, request.queue, correct).await;
+    let to = settings.r#box.ok_or_else(Problem::missing_box)?;
+    let target = settings.target.map(|number| number.as_index());
+    let number = settings.frame.map(|number| number.0);
+    let next = NextFrames::posted(number, request.upload.files, Some(GivenBox { target, to }));
+    let targets = request.permit.session().target_count();
+    let queue = request.queue.for_frames(targets);
+    wait_for_turn(&state, &request.permit, &request.client, number).await?;
     let Answered {
         estimates,
         replayed,
+        durability,
         ..
-    } = answered.inspect_err(|problem| renew_if_busy(&session, problem))?;
-    let answer = Json(Answer::from(estimates[0])).into_response();
-    Ok(replayed_header(replayed, answer))
+    } = advance_session(&state, request.permit, queue, &request.client, next).await?;
+    let answer = Json(Answer::from(&estimates[0])).into_response();
+    Ok(durability.write(replayed_header(replayed, answer)))
 }

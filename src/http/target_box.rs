@@ -28,7 +28,7 @@ pub struct TargetBox {
 }
 
 /// A number in `x,y,width,height`; the last two are above 0.
-const NUMBER: &str = r"(?:[0-9]{1,5}(?:\.[0-9]{1,4})?)";
+pub(super) const NUMBER: &str = r"(?:[0-9]{1,5}(?:\.[0-9]{1,4})?)";
 
 /// What a text has to be to be taken as a box. A JSON object or array in a text is taken, too.
 fn text_schema() -> ObjectBuilder {
@@ -62,19 +62,37 @@ impl ToSchema for BoxInput {
     }
 }
 
+/// The forms of a box in JSON.
+pub(super) fn box_forms() -> AnyOfBuilder {
+    let number = ObjectBuilder::new().schema_type(Type::Number);
+    let four = ArrayBuilder::new()
+        .items(number)
+        .min_items(Some(4))
+        .max_items(Some(4));
+    AnyOfBuilder::new()
+        .item(Ref::from_schema_name(TargetBox::name()))
+        .item(four)
+        .item(text_schema())
+}
+
 impl PartialSchema for BoxInput {
     fn schema() -> RefOr<Schema> {
-        let number = ObjectBuilder::new().schema_type(Type::Number);
-        let four = ArrayBuilder::new()
-            .items(number)
-            .min_items(Some(4))
-            .max_items(Some(4));
-        let forms = AnyOfBuilder::new()
-            .item(Ref::from_schema_name(TargetBox::name()))
-            .item(four)
-            .item(text_schema())
-            .item(ObjectBuilder::new().schema_type(Type::Null));
-        forms.into()
+        let null = ObjectBuilder::new().schema_type(Type::Null);
+        box_forms().item(null).into()
+    }
+}
+
+impl TargetBox {
+    /// As it is answered: to a hundredth of a pixel. No digit after that means anything.
+    pub fn answered(rect: Rect) -> Self {
+        // A negative zero becomes a positive one.
+        let round = |value: f64| (value * 100.0).round() / 100.0 + 0.0;
+        Self {
+            x: round(rect.x),
+            y: round(rect.y),
+            width: round(rect.width),
+            height: round(rect.height),
+        }
     }
 }
 

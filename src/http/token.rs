@@ -2,12 +2,12 @@
 
 use super::auth::caller::Caller;
 use super::auth::token::SessionToken;
+use super::json::Json;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
 use super::state::AppState;
-use axum::Json;
 use axum::extract::{Query, State};
 use axum::http::Uri;
 use serde::{Deserialize, Serialize};
@@ -69,7 +69,7 @@ pub async fn create(
 ) -> Result<Json<TokenView>, Problem> {
     let seconds = seconds(&uri)?;
     caller.require_key()?;
-    let session = path.find(&state)?;
+    let session = path.find(&state).await?;
     let expires = state.now() + Duration::from_secs(seconds.into());
     let token = state.access.tokens.sign(&SessionToken {
         session: session.id(),

@@ -26,7 +26,7 @@ fn halves(sheet: &RgbImage) -> [f64; 2] {
 async fn the_sheet_has_a_row_for_each_subspace_and_shows_the_target() {
     let app = TestApplication::start().await;
     let params = r#"{"patch_width": 16, "patch_height": 16, "update_every": 2, "basis_dim": 2}"#;
-    let query = [("box", BOX), ("preset", "paper"), ("params", params)];
+    let query = [("box", BOX), ("preset", "paper"), ("parameters", params)];
     let created = app.create(pictures::png(0), &query).await;
     let created = expect(created, StatusCode::CREATED).await;
     let id = created["id"].as_str().unwrap();

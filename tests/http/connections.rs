@@ -109,7 +109,7 @@ async fn a_path_or_method_that_is_not_there_is_a_problem() {
     expect_problem(app.get("/sessions/%FF").await, "session-not-found").await;
     for (method, path, allowed) in [
         (Method::GET, "/sessions", "POST"),
-        (Method::PATCH, "/sessions/a", "GET,HEAD,DELETE"),
+        (Method::PATCH, "/sessions/a", "GET,HEAD,DELETE,PUT"),
         (Method::POST, "/openapi.json", "GET,HEAD"),
     ] {
         let response = app.request(method, path, &[]).send().await.unwrap();

@@ -9,7 +9,10 @@ use reqwest::StatusCode;
 async fn a_session_from_its_first_frame_to_its_end() {
     let app = TestApplication::start().await;
     let response = app
-        .create(pictures::png(0), &[("box", BOX), ("seed", "7")])
+        .create(
+            pictures::png(0),
+            &[("box", BOX), ("seed", "7"), ("verbose", "true")],
+        )
         .await;
     let location = response.headers()["location"].to_str().unwrap().to_owned();
     let created = expect(response, StatusCode::CREATED).await;
@@ -20,7 +23,7 @@ async fn a_session_from_its_first_frame_to_its_end() {
     assert_eq!(created["box"], first_box);
     let size = serde_json::json!({"width": pictures::WIDTH, "height": pictures::HEIGHT});
     assert_eq!(created["image"], size);
-    assert_eq!(created["params"]["seed"], 7);
+    assert_eq!(created["parameters"]["seed"], 7);
     humantime::parse_rfc3339(created["expires_at"].as_str().unwrap()).unwrap();
 
     let first = expect(app.post_frame(id, pictures::png(1)).await, StatusCode::OK).await;
@@ -32,7 +35,7 @@ async fn a_session_from_its_first_frame_to_its_end() {
     assert_eq!(view["id"], id);
     assert_eq!(view["frames"], 2);
     assert_eq!(view["answer"], first);
-    assert_eq!(view["params"], created["params"]);
+    assert_eq!(view["parameters"], created["parameters"]);
 
     let query = [("box", "24,17,16,12")];
     let response = app.put_target(id, pictures::png(2), &query).await;
@@ -80,9 +83,10 @@ async fn the_same_seed_gives_the_same_boxes_and_a_random_seed_is_told() {
         assert_eq!(a.unwrap(), b.unwrap());
     }
     let seed = async || {
-        let response = app.create(pictures::png(0), &[("box", BOX)]).await;
+        let query = [("box", BOX), ("verbose", "")];
+        let response = app.create(pictures::png(0), &query).await;
         let created = expect(response, StatusCode::CREATED).await;
-        created["params"]["seed"].as_u64().unwrap()
+        created["parameters"]["seed"].as_u64().unwrap()
     };
     assert_ne!(seed().await, seed().await);
 }
@@ -90,23 +94,24 @@ async fn the_same_seed_gives_the_same_boxes_and_a_random_seed_is_told() {
 #[tokio::test]
 async fn single_parameters_override_the_preset() {
     let app = TestApplication::start().await;
-    let params = [("params", r#"{"alpha": 0.25, "particles": 50}"#)];
-    let query = [("box", BOX), ("preset", "paper"), params[0]];
+    let params = [("parameters", r#"{"alpha": 0.25, "particles": 50}"#)];
+    let verbose = ("verbose", "1");
+    let query = [("box", BOX), ("preset", "paper"), verbose, params[0]];
     let created = expect(
         app.create(pictures::png(0), &query).await,
         StatusCode::CREATED,
     )
     .await;
-    assert_eq!(created["params"]["alpha"], 0.25);
-    assert_eq!(created["params"]["particles"], 50);
-    assert_eq!(created["params"]["bag_size"], 10);
+    assert_eq!(created["parameters"]["alpha"], 0.25);
+    assert_eq!(created["parameters"]["particles"], 50);
+    assert_eq!(created["parameters"]["bag_size"], 10);
 
     for (params, named) in [
         (r#"{"colour": 1}"#, "`bag_size`"),
         (r#"{"alpha": "high"}"#, "`alpha`"),
         (r#"{"alpha": 7}"#, "alpha"),
     ] {
-        let query = [("box", BOX), ("params", params)];
+        let query = [("box", BOX), ("parameters", params)];
         let response = app.create(pictures::png(0), &query).await;
         let problem = expect_problem(response, "invalid-parameter").await;
         assert!(
@@ -120,7 +125,7 @@ async fn single_parameters_override_the_preset() {
 async fn the_page_the_docs_and_the_health_are_served() {
     let app = TestApplication::start().await;
     let page = app.get("/").await.text().await.unwrap();
-    assert!(page.contains("curl") && page.contains("/docs/") && page.contains("/openapi.json"));
+    assert!(page.contains("curl") && page.contains("docs/") && page.contains("openapi.json"));
     // `/docs` redirects to `/docs/`, and the client follows.
     let docs = app.get("/docs").await;
     assert_eq!(docs.url().path(), "/docs/");

@@ -46,14 +46,14 @@ fn assert_same(answer: &Value, estimate: &Estimate) {
         ("height", target.height),
     ] {
         let got = answer["box"][name].as_f64().unwrap();
-        assert_eq!(
-            got.to_bits(),
-            value.to_bits(),
-            "frame {}: {name} {got} {value}",
-            estimate.frame
+        let at = estimate.frame;
+        assert!(
+            (got - value).abs() < 0.0051,
+            "frame {at}: {name} {got} {value}"
         );
     }
-    assert_eq!(answer["score"].as_f64().unwrap() as f32, estimate.score);
+    let score = answer["score"].as_f64().unwrap() as f32;
+    assert!((score - estimate.score).abs() < 0.00051);
 }
 
 #[tokio::test]

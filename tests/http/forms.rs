@@ -30,11 +30,13 @@ fn base64(frame: Vec<u8>) -> String {
     BASE64_STANDARD.encode(frame)
 }
 
-async fn id_of(response: Response) -> String {
+async fn id_of(app: &TestApplication, response: Response) -> String {
     let created = expect(response, StatusCode::CREATED).await;
-    assert_eq!(created["params"]["alpha"], 0.25);
-    assert_eq!(created["params"]["seed"], 7);
-    created["id"].as_str().unwrap().to_owned()
+    let id = created["id"].as_str().unwrap().to_owned();
+    let view = expect(app.get_session(&id).await, StatusCode::OK).await;
+    assert_eq!(view["parameters"]["alpha"], 0.25);
+    assert_eq!(view["parameters"]["seed"], 7);
+    id
 }
 
 #[tokio::test]
@@ -45,21 +47,21 @@ async fn the_three_forms_give_the_same_answers() {
         ("box", BOX),
         ("preset", "paper"),
         ("seed", "7"),
-        ("params", r#"{"alpha":0.25}"#),
+        ("parameters", r#"{"alpha":0.25}"#),
     ];
-    let raw = id_of(app.create(pictures::png(0), &query).await).await;
+    let raw = id_of(&app, app.create(pictures::png(0), &query).await).await;
     let form = Form::new().part("frame", part(pictures::png(0)));
     let form = form
         .text("box", BOX)
         .text("preset", "paper")
         .text("seed", "7");
-    let form = form.text("params", r#"{"alpha": 0.25}"#);
-    let multipart = id_of(post_form(&app, Method::POST, path, form).await).await;
+    let form = form.text("parameters", r#"{"alpha": 0.25}"#);
+    let multipart = id_of(&app, post_form(&app, Method::POST, path, form).await).await;
     let body = json!({
         "frame": base64(pictures::png(0)), "box": {"x": 20, "y": 15, "width": 16, "height": 12},
-        "preset": "paper", "seed": 7, "params": {"alpha": 0.25},
+        "preset": "paper", "seed": 7, "parameters": {"alpha": 0.25},
     });
-    let as_json = id_of(post_json(&app, Method::POST, path, &body).await).await;
+    let as_json = id_of(&app, post_json(&app, Method::POST, path, &body).await).await;
 
     let frames = |id: &str| format!("/sessions/{id}/frames");
     let a = app.post_frame(&raw, pictures::png(1)).await;
@@ -96,7 +98,8 @@ async fn the_three_forms_give_the_same_answers() {
     let b = post_form(&app, Method::POST, &frames(&multipart), form).await;
     let body = json!({"frames": (3..6).map(|t| base64(pictures::png(t))).collect::<Vec<_>>()});
     let c = post_json(&app, Method::POST, &frames(&as_json), &body).await;
-    let answers = json!({ "answers": singly });
+    let mut answers = singly[2].clone();
+    answers["answers"] = singly.into();
     assert_eq!(answers, expect(b, StatusCode::OK).await);
     assert_eq!(answers, expect(c, StatusCode::OK).await);
 }
@@ -108,17 +111,18 @@ async fn a_float_without_a_fraction_is_a_whole_number() {
     let body = |mut settings: Value| {
         settings["frame"] = base64(pictures::png(0)).into();
         settings["box"] = BOX.into();
+        settings["verbose"] = true.into();
         settings
     };
     for (settings, seed) in [
         (json!({"seed": 46.0}), 46),
-        (json!({"params": {"seed": 47.0}}), 47),
+        (json!({"parameters": {"seed": 47.0}}), 47),
     ] {
         let created = post_json(&app, Method::POST, "/sessions", &body(settings)).await;
         let created = expect(created, StatusCode::CREATED).await;
-        assert_eq!(created["params"]["seed"], seed);
+        assert_eq!(created["parameters"]["seed"], seed);
     }
-    let settings = json!({"params": {"seed": 46.5}});
+    let settings = json!({"parameters": {"seed": 46.5}});
     let refused = post_json(&app, Method::POST, "/sessions", &body(settings)).await;
     expect_problem(refused, "invalid-parameter").await;
 }
@@ -209,7 +213,7 @@ async fn unknown_and_doubled_names_are_refused_and_the_known_ones_named() {
 #[tokio::test]
 async fn a_setting_of_the_body_counts_before_that_of_the_query() {
     let app = TestApplication::start().await;
-    let query = [("box", "1,2,30,40"), ("seed", "1")];
+    let query = [("box", "1,2,30,40"), ("seed", "1"), ("verbose", "")];
     let form = || {
         let frame = part(pictures::png(0));
         Form::new().part("frame", frame).text("box", BOX)
@@ -219,7 +223,7 @@ async fn a_setting_of_the_body_counts_before_that_of_the_query() {
     for request in [request().multipart(form()), request().json(&body)] {
         let created = expect(request.send().await.unwrap(), StatusCode::CREATED).await;
         assert_eq!(created["box"]["x"], 20.0, "{created}");
-        assert_eq!(created["params"]["seed"], 1, "{created}");
+        assert_eq!(created["parameters"]["seed"], 1, "{created}");
     }
 }
 
@@ -253,7 +257,7 @@ async fn what_cannot_be_read_is_a_problem_in_every_form() {
         [("box", "1,2,3")],
         [("seed", "-1")],
         [("preset", "best")],
-        [("params", "7")],
+        [("parameters", "7")],
     ] {
         let response = app.create(pictures::png(0), &query).await;
         expect_problem(response, "malformed-request").await;
@@ -279,12 +283,11 @@ async fn json_with_very_many_values_is_refused_before_it_is_parsed() {
         let response = request.body(body).send().await.unwrap();
         expect_problem(response, slug).await;
     }
-    let body =
-        json!({"frame": base64(pictures::png(0)), "box": BOX, "params": " ".repeat(20_000) + "{}"});
+    let body = json!({"frame": base64(pictures::png(0)), "box": BOX, "parameters": " ".repeat(20_000) + "{}"});
     let response = post_json(&app, Method::POST, "/sessions", &body).await;
     assert_eq!(response.status(), StatusCode::CREATED, "spaces are trimmed");
     let long = format!("{{\"alpha\": 0.5{}}}", "0".repeat(20_000));
-    let body = json!({"frame": base64(pictures::png(0)), "box": BOX, "params": long});
+    let body = json!({"frame": base64(pictures::png(0)), "box": BOX, "parameters": long});
     let response = post_json(&app, Method::POST, "/sessions", &body).await;
     expect_problem(response, "malformed-request").await;
 }

@@ -27,7 +27,7 @@ pub fn bomb() -> Vec<u8> {
 
 /// Opens a session whose frames take long; gives its path.
 pub async fn open(app: &TestApplication) -> String {
-    let query = [("box", BOX), ("preset", "paper"), ("params", PARAMS)];
+    let query = [("box", BOX), ("preset", "paper"), ("parameters", PARAMS)];
     loop {
         let response = app.create(pictures::png(0), &query).await;
         // A busy machine may take longer for it than the time that a test gives its requests.

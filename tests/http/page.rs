@@ -4,12 +4,16 @@ use crate::application::{TestApplication, expect, expect_problem};
 use reqwest::{Method, StatusCode};
 use std::collections::BTreeSet;
 
-/// The paths below `/page/` that a text names.
-fn named(text: &str) -> Vec<String> {
+/// The paths below `/page/` that the text of a file names.
+fn named(path: &str, text: &str) -> Vec<String> {
+    let folder = &path[..=path.rfind('/').unwrap()];
     let texts = text.split(['"', '\'']);
     let paths = texts.filter_map(|text| {
-        let file = text.strip_prefix("./").or(text.strip_prefix("/page/"))?;
-        (file.ends_with(".js") || file.ends_with(".css")).then(|| format!("/page/{file}"))
+        let own = text
+            .strip_prefix("./")
+            .map(|file| format!("{folder}{file}"));
+        let path = own.or(text.starts_with("page/").then(|| format!("/{text}")))?;
+        (path.ends_with(".js") || path.ends_with(".css")).then_some(path)
     });
     paths.collect()
 }
@@ -27,9 +31,9 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
         assert_eq!(response.status(), StatusCode::OK, "{path}");
         let text = response.text().await.unwrap();
         bytes += text.len();
-        open.extend(named(&text));
+        open.extend(named(&path, &text));
     }
-    assert_eq!(seen.len(), 13, "{seen:?}");
+    assert_eq!(seen.len(), 17, "{seen:?}");
     assert!(bytes < 150_000, "{bytes}");
     expect_problem(app.get("/page/none.js").await, "route-not-found").await;
 }

@@ -1,13 +1,14 @@
 //! Every problem in the OpenAPI document, provoked.
 
 use crate::application::expect_problem;
-use crate::provoke::{Attempt, Blocked, Operation};
+use crate::blocked::Blocked;
+use crate::provoke::{Attempt, Operation};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Every operation with every problem type that the document says it may answer.
 fn documented() -> Vec<(Operation, String)> {
-    let document = serde_json::to_value(bagtrack::http::openapi_document()).unwrap();
+    let document: Value = serde_json::from_str(&bagtrack::http::openapi_document()).unwrap();
     let mut documented = Vec::new();
     for (path, methods) in document["paths"].as_object().unwrap() {
         for (method, operation) in methods.as_object().unwrap() {

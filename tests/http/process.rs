@@ -27,8 +27,13 @@ impl Service {
 
     /// With these variables.
     pub async fn start_in(flags: &[&str], variables: &[(&str, &str)]) -> Self {
+        Self::start_at("127.0.0.1:0", flags, variables).await
+    }
+
+    /// At this address.
+    pub async fn start_at(listen: &str, flags: &[&str], variables: &[(&str, &str)]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_bagtrack"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--log", "info"])
+            .args(["serve", "--listen", listen, "--log", "info"])
             .args(flags)
             .env("NO_COLOR", "1")
             .envs(variables.iter().copied())

@@ -1,15 +1,23 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect};
 use crate::heavy;
-use crate::metrics::{metrics, value};
 use crate::pictures;
 use crate::raw::RawConnection;
 use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
+use serde_json::{Value, json};
 use std::time::Duration;
 use tokio::task::JoinSet;
+
+/// The id of a session that there is not.
+const NEW_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
+
+/// Its body is JSON with a frame, shapes and states.
+pub const CVAT: &str = "/integrations/cvat";
 
 /// An operation of the OpenAPI document.
 #[derive(Clone)]
@@ -26,7 +34,13 @@ impl Operation {
         }
     }
 
-    fn takes_frames(&self) -> bool {
+    /// Its path for a session of this id. A session that is about to be opened has another.
+    pub fn path_of(&self, id: &str) -> String {
+        let opens = self.method == Method::PUT && self.path.ends_with("{id}");
+        self.path.replace("{id}", if opens { NEW_ID } else { id })
+    }
+
+    pub fn takes_frames(&self) -> bool {
         matches!(self.method, Method::POST | Method::PUT) && !self.path.ends_with("/token")
     }
 }
@@ -46,6 +60,8 @@ pub struct Attempt {
     frames: usize,
     media_type: Option<&'static str>,
     idempotency_key: Option<&'static str>,
+    /// Goes beside the frame.
+    snapshot: Option<Vec<u8>>,
     /// Sends the head alone.
     without_body: bool,
 }
@@ -67,6 +83,10 @@ fn settings(slug: &str, config: &mut Config) {
         "request-too-costly" => {
             config.limits.max_request_pixels = u64::from(pictures::WIDTH * pictures::HEIGHT);
         }
+        "store-unavailable" => {
+            config.store.store = Some(Secret::from("redis://127.0.0.1:1"));
+            config.store.store_timeout = Duration::from_millis(20);
+        }
         "not-ready" => config.shutdown_delay = Duration::from_secs(600),
         _ => {}
     }
@@ -75,20 +95,32 @@ fn settings(slug: &str, config: &mut Config) {
 impl Attempt {
     /// A service and a request to this operation that meets this problem.
     pub async fn provoke(operation: &Operation, slug: &str) -> Self {
-        let app = TestApplication::start_with(|config| settings(slug, config)).await;
-        let id = app.open().await;
+        let costly_shape = slug == "request-too-costly" && operation.path == CVAT;
+        let app = TestApplication::start_with(|config| {
+            settings(slug, config);
+            if costly_shape {
+                config.limits.max_request_cpu = Duration::from_millis(1);
+            }
+        });
+        let app = app.await;
+        // Nothing can be opened.
+        let (id, is_open) = match slug == "store-unavailable" || costly_shape {
+            true => (NEW_ID.to_owned(), false),
+            false => (app.open().await, true),
+        };
         let mut attempt = Self {
             app,
-            id: Some(id.clone()),
+            id: is_open.then(|| id.clone()),
             _held: None,
             _busy: None,
             method: operation.method.clone(),
-            path: operation.path.replace("{id}", &id),
+            path: operation.path_of(&id),
             query: Vec::new(),
             body: Vec::new(),
             frames: 1,
             media_type: None,
             idempotency_key: None,
+            snapshot: None,
             without_body: false,
         };
         if operation.takes_frames() {
@@ -133,7 +165,11 @@ impl Attempt {
                 self.query = vec![("box", "21,15,16,12")];
             }
             "session-not-found" => {
-                self.path = template.replace("{id}", "67e55044-10b1-426f-9247-bb680e5fe0c8");
+                self.path = template.replace("{id}", NEW_ID);
+            }
+            "session-exists" => {
+                let id = self.id.as_ref().unwrap();
+                self.path = template.replace("{id}", id);
             }
             "body-timeout" => self.without_body = true,
             "frame-out-of-order" if template.ends_with("/stream") => self.query.push(("from", "9")),
@@ -145,16 +181,28 @@ impl Attempt {
             "body-too-large" => self.body.extend([0; 1000]),
             "frame-too-large" => self.body = pictures::png_of(pictures::WIDTH + 1, 72),
             "too-many-frames" => self.frames = 3,
-            "unsupported-image" => self.body = b"GIF89a is not taken".to_vec(),
+            "unsupported-image" => self.body = b"BM, a bitmap, is not taken".to_vec(),
             "frame-damaged" => self.body.truncate(300),
-            "frame-size-mismatch" => self.body = pictures::png_of(64, 48),
+            "frame-size-mismatch" => {
+                self.body = pictures::png_of(64, 48);
+                if matches!(template, "/track" | CVAT) {
+                    let id = self.id.as_ref().unwrap();
+                    self.snapshot = Some(self.app.snapshot(id).await);
+                    self.query.clear();
+                }
+            }
             "invalid-box" => self.query = vec![("box", "1000,1000,10,10")],
-            "invalid-parameter" => self.query.push(("params", r#"{"alpha": 7}"#)),
+            "invalid-parameter" => self.query.push(("parameters", r#"{"alpha": 7}"#)),
+            "invalid-snapshot" if matches!(template, "/track" | CVAT) => {
+                self.query.clear();
+                self.snapshot = Some(b"no snapshot".to_vec());
+            }
             "invalid-snapshot" => {
                 self.query.clear();
                 self.media_type = Some(SNAPSHOT_MEDIA_TYPE);
             }
             "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
+            "request-too-costly" if template == CVAT => self.query = vec![("box", BOX); 100],
             "request-too-costly" => self.frames = 2,
             "session-busy" | "quota-exceeded" | "not-in-order" => {
                 let id = self.id.as_ref().unwrap();
@@ -168,15 +216,19 @@ impl Attempt {
                 self.app.shut_down();
                 while self.app.get("/readyz").await.status() == StatusCode::OK {}
             }
-            "too-many-sessions" => {}
+            "too-many-sessions" | "store-unavailable" => {}
             other => panic!("nothing provokes {other}: add it here"),
         }
     }
 
     pub async fn send(&self) -> Response {
-        let mut request = self
-            .app
-            .request(self.method.clone(), &self.path, &self.query);
+        let mut query = self.query.clone();
+        let mut body = None;
+        if self.path == CVAT {
+            let (rest, json) = cvat(&query, &self.body, self.snapshot.as_deref());
+            (query, body) = (rest, Some(json));
+        }
+        let mut request = self.app.request(self.method.clone(), &self.path, &query);
         if self.path.ends_with("/stream") {
             // What opens a WebSocket; the key may be any 16 bytes.
             request = request
@@ -193,16 +245,22 @@ impl Attempt {
                 .await
                 .unwrap();
         }
+        if let Some(body) = body {
+            return request.json(&body).send().await.unwrap();
+        }
         if let Some(media_type) = self.media_type {
             request = request.header("content-type", media_type);
         }
         if let Some(key) = self.idempotency_key {
             request = request.header("idempotency-key", key);
         }
-        let request = if self.frames > 1 {
+        let request = if self.frames > 1 || self.snapshot.is_some() {
             let part = || Part::bytes(self.body.clone()).file_name("frame.png");
             let form = (0..self.frames).fold(Form::new(), |form, _| form.part("frame", part()));
-            request.multipart(form)
+            let snapshot = self.snapshot.iter();
+            request.multipart(snapshot.fold(form, |form, snapshot| {
+                form.part("snapshot", Part::bytes(snapshot.clone()))
+            }))
         } else {
             request.body(self.body.clone())
         };
@@ -218,91 +276,22 @@ impl Attempt {
     }
 }
 
-/// A service whose only worker can be kept busy for longer than a request may take.
-pub struct Blocked {
-    app: TestApplication,
-    id: String,
-    bomb: Vec<u8>,
-}
-
-impl Blocked {
-    pub async fn start() -> Self {
-        let app = TestApplication::start_with(|config| {
-            config.workers = Some(1);
-            config.work_timeout = Duration::from_millis(20);
-            // So that the large frame is decoded.
-            config.max_frame_memory = 1 << 30;
-        });
-        let app = app.await;
-        let opened = loop {
-            let opened = app.create(pictures::png(0), &[("box", BOX)]).await;
-            if opened.status() == StatusCode::CREATED {
-                break opened.json::<serde_json::Value>().await.unwrap();
-            }
-        };
-        Self {
-            id: opened["id"].as_str().unwrap().to_owned(),
-            bomb: heavy::bomb(),
-            app,
-        }
-    }
-
-    /// The answers to these operations, sent while the worker decodes one large frame. None, where it had decoded that
-    /// before all of them were answered.
-    pub async fn attempts(&self, operations: &[Operation]) -> Option<Vec<Response>> {
-        let block = async {
-            loop {
-                let frame = self.bomb.clone();
-                let query = [("box", "2000,1500,1600,1200")];
-                let late = self.app.create(frame, &query).await;
-                expect_problem(late, "work-timeout").await;
-            }
-        };
-        let attempts = async {
-            let begun = loop {
-                if let Some(begun) = self.begun_at_work().await {
-                    break begun;
-                }
-            };
-            let attempts = operations.iter().map(|operation| self.attempt(operation));
-            let responses = futures_util::future::join_all(attempts).await;
-            // Nothing else has begun, so the worker was never free.
-            (self.begun_at_work().await == Some(begun)).then_some(responses)
-        };
-        tokio::select! {
-            responses = attempts => responses,
-            () = block => None,
-        }
-    }
-
-    /// How many pieces of work have begun, if the worker is at one of them.
-    async fn begun_at_work(&self) -> Option<f64> {
-        let text = metrics(&self.app).await;
-        let is_busy = value(&text, "bagtrack_workers_busy", &[]) == 1.0;
-        is_busy.then(|| value(&text, "bagtrack_queue_wait_seconds_count", &[]))
-    }
-
-    async fn attempt(&self, operation: &Operation) -> Response {
-        let path = operation.path.replace("{id}", &self.id);
-        // Numbered, since frames without numbers may not come at once.
-        let query: &[(&str, &str)] = match (operation.takes_frames(), operation.path.as_str()) {
-            (false, _) => &[],
-            (_, path) if path.ends_with("/frames") => &[("frame", "1")],
-            (_, path) if path.ends_with("/target") => &[("box", BOX), ("frame", "1")],
-            _ => &[("box", BOX)],
-        };
-        let mut request = self.app.request(operation.method.clone(), &path, query);
-        if operation.takes_frames() {
-            request = request.body(pictures::png(0));
-        }
-        request.send().await.unwrap()
-    }
-
-    /// What timed out while it waited was not done.
-    pub async fn finish(self) {
-        while self.begun_at_work().await.is_some() {}
-        assert_eq!(self.app.frames_of(&self.id).await, 1);
-        let text = metrics(&self.app).await;
-        assert_eq!(value(&text, "bagtrack_sessions", &[]), 1.0);
-    }
+/// The query and the body for CVAT with this frame, and the box that is in the query.
+pub fn cvat<'a>(
+    query: &[(&'a str, &'a str)],
+    frame: &[u8],
+    snapshot: Option<&[u8]>,
+) -> (Vec<(&'a str, &'a str)>, Value) {
+    let (given, query): (Vec<_>, Vec<_>) = query.iter().partition(|(name, _)| *name == "box");
+    let shapes = given.iter().map(|(_, text)| {
+        let sides: Vec<f64> = text.split(',').map(|side| side.parse().unwrap()).collect();
+        [sides[0], sides[1], sides[0] + sides[2], sides[1] + sides[3]]
+    });
+    let states = snapshot.map(|bytes| STANDARD.encode(bytes));
+    let body = json!({
+        "image": STANDARD.encode(frame),
+        "shapes": shapes.collect::<Vec<_>>(),
+        "states": states.into_iter().collect::<Vec<_>>(),
+    });
+    (query, body)
 }

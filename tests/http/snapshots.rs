@@ -3,8 +3,12 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use bagtrack::http::Secret;
-use bagtrack::sessions::{Answered, MAC_BYTES, MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack::sessions::{Fingerprint, MAC_BYTES, MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack::tracker::{Estimate, Rect};
 use reqwest::StatusCode;
+
+/// A stored answer: the frame's digest, the box that was given, the answer.
+type Answered = (Fingerprint, Option<Rect>, Estimate);
 
 const OLD: &str = "the secret of last year";
 const NEW: &str = "the secret of this year";
@@ -33,12 +37,13 @@ async fn a_session_goes_on_elsewhere_bit_for_bit() {
     }
     let view = expect(here.get_session(&id).await, StatusCode::OK).await;
     let snapshot = here.snapshot(&id).await;
-    let restored = expect(there.create(snapshot, &[]).await, StatusCode::CREATED).await;
+    let query = [("verbose", "true")];
+    let restored = expect(there.create(snapshot, &query).await, StatusCode::CREATED).await;
     let new_id = restored["id"].as_str().unwrap();
     assert_ne!(new_id, id);
     assert_eq!(restored["frame"], 11);
     assert_eq!(restored["box"], view["answer"]["box"]);
-    assert_eq!(restored["params"], view["params"]);
+    assert_eq!(restored["parameters"], view["parameters"]);
 
     // The last frame can be asked for again there, too.
     let again = there.post_numbered(new_id, 11, pictures::png(11)).await;

@@ -21,6 +21,9 @@ operation_problems!(
 );
 
 /// Metrics for Prometheus
+///
+/// Counters, gauges and histograms of requests, frames, sessions and work. With `BAGTRACK_METRICS_KEY` they have a key of
+/// their own.
 #[utoipa::path(
     get, path = "/metrics", tag = "service", operation_id = "getMetrics",
     responses(
@@ -48,7 +51,7 @@ pub async fn get(
     gauges.workers.set(workers as f64);
     gauges
         .workers_busy
-        .set(workers.saturating_sub(admission.free_workers()) as f64);
+        .set(admission.busy_workers().min(workers) as f64);
     gauges
         .draining
         .set(if state.is_draining() { 1.0 } else { 0.0 });

@@ -1,7 +1,8 @@
 //! What decoding and tracking measure.
 
 use super::maker::Maker;
-use crate::tracker::{Estimate, Status};
+use crate::sessions::Estimates;
+use crate::tracker::Status;
 use metrics::{Counter, Histogram, Label};
 use std::time::{Duration, Instant};
 
@@ -23,7 +24,7 @@ impl TrackingMetrics {
             let labels = [Label::from_static_parts("status", status)];
             make.counter(
                 "bagtrack_frames_total",
-                "Frames answered, by status.",
+                "Frames answered, by status; once for each target.",
                 &labels,
             )
         };
@@ -31,7 +32,7 @@ impl TrackingMetrics {
             decode: make.seconds("bagtrack_frame_decode_seconds", "Time to decode a frame."),
             step: make.seconds(
                 "bagtrack_frame_step_seconds",
-                "Processor time to track through a frame.",
+                "Processor time to track a target through a frame.",
             ),
             tracking: frames("tracking"),
             uncertain: frames("uncertain"),
@@ -53,24 +54,27 @@ impl TrackingMetrics {
     }
 
     /// Frames were tracked, with this processor time together. `before` is the answer to the frame before them.
-    pub fn tracked(&self, before: Estimate, answers: &[Estimate], time: Duration) {
+    pub fn tracked(&self, before: &Estimates, answers: &[Estimates], time: Duration) {
         if answers.is_empty() {
             return;
         }
-        let each = time.as_secs_f64() / answers.len() as f64;
-        self.step.record_many(each, answers.len());
-        let mut last = before.status;
+        let steps = answers.len() * before.as_slice().len();
+        self.step
+            .record_many(time.as_secs_f64() / steps as f64, steps);
+        let mut last = before;
         for answer in answers {
-            let counter = match answer.status {
-                Status::Tracking => &self.tracking,
-                Status::Uncertain => &self.uncertain,
-                Status::Lost => &self.lost,
-            };
-            counter.increment(1);
-            if answer.status == Status::Lost && last != Status::Lost {
-                self.losses.increment(1);
+            for (estimate, before) in answer.as_slice().iter().zip(last.as_slice()) {
+                let counter = match estimate.status {
+                    Status::Tracking => &self.tracking,
+                    Status::Uncertain => &self.uncertain,
+                    Status::Lost => &self.lost,
+                };
+                counter.increment(1);
+                if estimate.status == Status::Lost && before.status != Status::Lost {
+                    self.losses.increment(1);
+                }
             }
-            last = answer.status;
+            last = answer;
         }
     }
 }

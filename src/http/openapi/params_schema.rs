@@ -2,15 +2,15 @@
 
 use crate::http::upload::overrides::{ParamOverrides, by_name};
 use crate::tracker::{Parameter, Params, Preset};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::borrow::Cow;
-use utoipa::openapi::RefOr;
-use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, SchemaFormat, Type};
+use utoipa::openapi::{Ref, RefOr};
 use utoipa::{Number, PartialSchema, ToSchema};
 
 impl ToSchema for ParamOverrides {
     fn name() -> Cow<'static, str> {
-        "Params".into()
+        "Parameters".into()
     }
 }
 
@@ -27,11 +27,27 @@ impl PartialSchema for ParamOverrides {
                      `createSession`. The defaults are those of the preset `robust`. Without a seed a random one is \
                      drawn.",
                 ))
-                .additional_properties(Some(AdditionalProperties::FreeForm(false)))
-                .examples([json!({"seed": 7})]),
+                .additional_properties(Some(AdditionalProperties::FreeForm(false))),
             |object, row| object.property(row.name, param(row, defaults.remove(row.name))),
         );
         object.build().into()
+    }
+}
+
+/// The parameters as a text, in the query and in forms.
+#[derive(Debug)]
+pub struct ParametersText;
+
+impl ToSchema for ParametersText {}
+
+impl PartialSchema for ParametersText {
+    fn schema() -> RefOr<Schema> {
+        let text = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .format(Some(SchemaFormat::Custom("json".to_owned())))
+            .content_media_type("application/json")
+            .content_schema(Some(Ref::from_schema_name(ParamOverrides::name())));
+        text.build().into()
     }
 }
 

@@ -4,7 +4,9 @@ use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::ingest::IngestError;
-use crate::sessions::{QueueFull, ReplayError, SessionBusy, SnapshotError, TooManySessions};
+use crate::sessions::{
+    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreAway, TooManySessions,
+};
 use crate::tracker::TrackerError;
 use std::collections::BTreeMap;
 use utoipa::openapi::{
@@ -20,6 +22,7 @@ pub const SESSION: &[Kind] = &[
     Kind::Unauthorized,
     Kind::SessionNotFound,
     Kind::SessionExpired,
+    Kind::StoreUnavailable,
 ];
 
 /// The problems that every operation with frames may answer.
@@ -110,6 +113,7 @@ fn example(kind: Kind) -> Problem {
         Kind::OriginNotAllowed => Problem::origin_not_allowed(),
         Kind::HostNotAllowed => Problem::host_not_allowed(),
         Kind::SessionExpired => Problem::session_expired(),
+        Kind::SessionExists => Problem::session_exists(),
         Kind::IdempotencyKeyReused => Problem::idempotency_key_reused(),
         Kind::RouteNotFound => Problem::route_not_found(),
         Kind::SessionNotFound => Problem::session_not_found(),
@@ -156,5 +160,6 @@ fn example(kind: Kind) -> Problem {
         Kind::TooManySessions => TooManySessions(1024).into(),
         Kind::WorkTimeout => Problem::work_timeout(),
         Kind::NotReady => Problem::not_ready(),
+        Kind::StoreUnavailable => StoreAway::default().into(),
     }
 }

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 use utoipa::openapi::path::ParameterIn;
 use utoipa::openapi::schema::{
-    AdditionalProperties, AllOfBuilder, AnyOfBuilder, ArrayBuilder, KnownFormat, Object,
-    ObjectBuilder, Schema, SchemaFormat, Type,
+    AdditionalProperties, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema, SchemaFormat,
+    Type,
 };
 use utoipa::openapi::{RefOr, Required};
 use utoipa::{PartialSchema, ToSchema};
@@ -82,6 +82,16 @@ impl<S: Settings> PartialSchema for FormBody<S> {
         }
         body.properties.insert("frame".to_owned(), file.into());
         body.required.push("frame".to_owned());
+        if S::TAKES_SNAPSHOT {
+            let snapshot = ObjectBuilder::new()
+                .schema_type(Type::String)
+                .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+                .content_media_type("application/vnd.bagtrack.snapshot")
+                .description(Some(SNAPSHOT));
+            let snapshot: Schema = snapshot.build().into();
+            body.properties
+                .insert("snapshot".to_owned(), snapshot.into());
+        }
         Schema::Object(body).into()
     }
 }
@@ -101,9 +111,19 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
         let RefOr::T(Schema::Object(mut body)) = S::schema() else {
             unreachable!("settings are a struct with named fields")
         };
-        body.description = Some("Frames as base64 or data URLs, and the settings.".to_owned());
+        body.description = Some(
+            "Frames as base64 or data URLs, and the settings. At least one frame has to be there."
+                .to_owned(),
+        );
+        for property in body.properties.values_mut() {
+            describe_itself(property);
+        }
         body.properties
             .insert("frame".to_owned(), base64(FILE).into());
+        if S::TAKES_SNAPSHOT {
+            let snapshot = base64(SNAPSHOT).into();
+            body.properties.insert("snapshot".to_owned(), snapshot);
+        }
         match S::FRAMES {
             FrameCount::One => body.required.push("frame".to_owned()),
             FrameCount::Several => {
@@ -112,17 +132,39 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
                     .min_items(Some(1))
                     .description(Some("Several frames, in order."));
                 body.properties.insert("frames".to_owned(), frames.into());
-                let has = |name: &str| ObjectBuilder::new().required(name);
-                let either = AnyOfBuilder::new().item(has("frame")).item(has("frames"));
-                return AllOfBuilder::new().item(body).item(either).into();
+                // One of the two has to be there. A schema that says so in full makes generators require both.
+                body.min_properties = Some(1);
             }
         }
         Schema::Object(body).into()
     }
 }
 
+/// A schema that stands beside an object with nothing but its description gets that description. The two together would
+/// allow objects only.
+fn describe_itself(property: &mut RefOr<Schema>) {
+    let RefOr::T(Schema::AllOf(both)) = property else {
+        return;
+    };
+    let [inner, RefOr::T(Schema::Object(beside))] = &both.items[..] else {
+        return;
+    };
+    let description = beside.description.clone();
+    let mut inner = inner.clone();
+    match &mut inner {
+        RefOr::Ref(schema) => schema.description = description.unwrap_or_default(),
+        RefOr::T(Schema::Object(schema)) => schema.description = description,
+        RefOr::T(Schema::AnyOf(schema)) => schema.description = description,
+        RefOr::T(_) => return,
+    }
+    *property = inner;
+}
+
 const FILE: &str = "A frame: a JPEG, PNG or WebP file. In the call `createSession` it may be a session snapshot; \
     then nothing else is given.";
+
+const SNAPSHOT: &str =
+    "The track up to here, as the last answer had it. Without one, a track begins.";
 
 fn base64(description: &str) -> Object {
     ObjectBuilder::new()

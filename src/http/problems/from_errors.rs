@@ -4,8 +4,8 @@ use super::kind::Kind;
 use super::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
-    BytesFull, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
-    Stopped, TooManySessions, WorkLost,
+    BytesFull, InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed,
+    SnapshotError, StartError, Stopped, StoreAway, TooManySessions, WorkLost,
 };
 use crate::tracker::TrackerError;
 use std::sync::Arc;
@@ -61,6 +61,18 @@ impl From<TrackerError> for Problem {
     }
 }
 
+impl From<StartError> for Problem {
+    fn from(error: StartError) -> Self {
+        match error {
+            StartError::Refused { error, .. } => error.into(),
+            StartError::TooLarge { .. } => {
+                let detail = format!("{error}. Send fewer boxes, or parameters that keep less.");
+                Self::invalid_parameter(detail)
+            }
+        }
+    }
+}
+
 impl From<SnapshotError> for Problem {
     fn from(error: SnapshotError) -> Self {
         let advice = "Send the bytes of GET /sessions/{id}/snapshot unchanged, to a service with the same keys.";
@@ -97,6 +109,15 @@ impl From<TooManySessions> for Problem {
     }
 }
 
+impl From<InsertError> for Problem {
+    fn from(error: InsertError) -> Self {
+        match error {
+            InsertError::Full(full) => full.into(),
+            InsertError::Taken => Self::session_exists(),
+        }
+    }
+}
+
 impl From<Stopped> for Problem {
     fn from(stopped: Stopped) -> Self {
         match stopped {
@@ -126,6 +147,14 @@ impl From<NoSession> for Problem {
             NoSession::Unknown => Self::session_not_found(),
             NoSession::Expired => Self::session_expired(),
         }
+    }
+}
+
+impl From<StoreAway> for Problem {
+    fn from(away: StoreAway) -> Self {
+        let detail = "Send the request again after the time in `Retry-After`. A frame is not counted; sent with its number \
+            (`?frame=N`) it is never tracked twice.";
+        Self::new(Kind::StoreUnavailable, detail).caused_by(Arc::new(away))
     }
 }
 

@@ -18,6 +18,7 @@ pub enum Kind {
     BodyTimeout,
     FrameOutOfOrder,
     NotInOrder,
+    SessionExists,
     SessionExpired,
     BodyTooLarge,
     RequestTooCostly,
@@ -41,6 +42,7 @@ pub enum Kind {
     TooManySessions,
     WorkTimeout,
     NotReady,
+    StoreUnavailable,
 }
 
 impl Kind {
@@ -67,9 +69,11 @@ impl Kind {
     /// Seconds after which trying again makes sense, where it does.
     pub fn retry_after(self) -> Option<u32> {
         match self {
-            Self::SessionBusy | Self::QuotaExceeded | Self::QueueFull | Self::WorkTimeout => {
-                Some(1)
-            }
+            Self::SessionBusy
+            | Self::QuotaExceeded
+            | Self::QueueFull
+            | Self::WorkTimeout
+            | Self::StoreUnavailable => Some(1),
             Self::NotReady => Some(5),
             Self::TooManySessions => Some(10),
             _ => None,
@@ -91,6 +95,7 @@ impl Kind {
             Self::BodyTimeout => (408, "body-timeout", "The body took too long to arrive"),
             Self::FrameOutOfOrder => (409, "frame-out-of-order", "The frame number is out of order"),
             Self::NotInOrder => (409, "not-in-order", "Frames without numbers came at the same time"),
+            Self::SessionExists => (409, "session-exists", "Another session has this id"),
             Self::SessionExpired => (410, "session-expired", "The session has expired"),
             Self::BodyTooLarge => (413, "body-too-large", "The body is too large"),
             Self::RequestTooCostly => (413, "request-too-costly", "The frames of the request cost too much together"),
@@ -114,6 +119,7 @@ impl Kind {
             Self::TooManySessions => (503, "too-many-sessions", "The service holds as many sessions as it may"),
             Self::WorkTimeout => (503, "work-timeout", "The work took too long"),
             Self::NotReady => (503, "not-ready", "The service is not ready"),
+            Self::StoreUnavailable => (503, "store-unavailable", "The store of the sessions gives no answer"),
         }
     }
 }

@@ -10,4 +10,5 @@
 pub mod document;
 mod from_errors;
 pub mod kind;
+mod limits;
 pub mod problem;

@@ -49,8 +49,20 @@ impl Problem {
     /// No box came.
     pub fn missing_box() -> Self {
         let detail = "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query \
-            or as a field.";
+            or as a field; for several targets `boxes=x,y,width,height;x,y,width,height`.";
         Self::new(Kind::MissingBox, detail)
+    }
+
+    /// It is not told which target is meant, or there is none of this number.
+    pub fn which_target(count: usize) -> Self {
+        let detail = match count {
+            1 => "This session has one target; leave out `target`, or say 0.".to_owned(),
+            _ => format!(
+                "This session has {count} targets; say which one is meant: `target` from 0 to {}.",
+                count - 1
+            ),
+        };
+        Self::malformed(detail)
     }
 
     /// No route has this path.
@@ -106,6 +118,13 @@ impl Problem {
         Self::new(Kind::IdempotencyKeyReused, detail)
     }
 
+    /// A live session that another request opened has the id.
+    pub fn session_exists() -> Self {
+        let detail = "A live session has this id, and another frame, other settings or another key opened it. Make a new \
+            id.";
+        Self::new(Kind::SessionExists, detail)
+    }
+
     /// The route has other methods.
     pub fn method_not_allowed() -> Self {
         Self::new(
@@ -119,61 +138,6 @@ impl Problem {
         let detail = "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each \
             answer. This one was not tracked.";
         Self::new(Kind::NotInOrder, detail)
-    }
-
-    /// The path and query have more bytes than they may.
-    pub fn uri_too_long() -> Self {
-        Self::new(Kind::UriTooLong, "Send settings in the body.")
-    }
-
-    /// The head has more bytes or lines than it may.
-    pub fn head_too_large() -> Self {
-        Self::new(Kind::HeadTooLarge, "Send fewer or shorter headers.")
-    }
-
-    /// The address has as many connections as it may, and all of them are busy.
-    pub fn too_many_connections() -> Self {
-        let detail = "This address has as many connections as one may, all of them busy. Use them again, or try again \
-            after the time in `Retry-After`.";
-        Self::new(Kind::QuotaExceeded, detail)
-    }
-
-    /// The body did not arrive in time.
-    pub fn body_timeout() -> Self {
-        let detail = "Send the whole body faster, or a smaller frame. The session is unchanged.";
-        Self::new(Kind::BodyTimeout, detail)
-    }
-
-    /// The body has more bytes than it may.
-    pub fn body_too_large(limit: usize) -> Self {
-        let detail =
-            format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
-        Self::new(Kind::BodyTooLarge, detail)
-    }
-
-    /// The frames of the request have more pixels than those of one request may.
-    pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
-        let detail = format!(
-            "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
-             in a request. None of them was tracked."
-        );
-        Self::new(Kind::RequestTooCostly, detail)
-    }
-
-    /// The client has as many of something as one client may have.
-    pub fn quota_exceeded(what: &str, limit: usize) -> Self {
-        let detail = format!(
-            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
-        );
-        Self::new(Kind::QuotaExceeded, detail)
-    }
-
-    /// The request has more frames than it may.
-    pub fn too_many_frames(limit: usize) -> Self {
-        let detail = format!(
-            "A request may have at most {limit} frames here; send the rest in another one."
-        );
-        Self::new(Kind::TooManyFrames, detail)
     }
 
     /// A parameter is unknown, has the wrong type or is out of its range.
@@ -226,9 +190,23 @@ impl Problem {
         self
     }
 
-    pub(super) fn caused_by(mut self, cause: Arc<dyn Error + Send + Sync>) -> Self {
+    /// Says which of `count` targets is meant.
+    pub fn of_target(mut self, target: usize, count: usize) -> Self {
+        self.detail = format!(
+            "Target {target} of {count}, counted from 0: {}",
+            self.detail
+        );
+        self
+    }
+
+    pub(in crate::http) fn caused_by(mut self, cause: Arc<dyn Error + Send + Sync>) -> Self {
         self.cause = Some(cause);
         self
+    }
+
+    /// The same of another kind.
+    pub(in crate::http) fn with_kind(self, kind: Kind) -> Self {
+        Self { kind, ..self }
     }
 
     pub(super) fn expecting_frame(mut self, number: u64) -> Self {

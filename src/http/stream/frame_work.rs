@@ -3,14 +3,17 @@
 use super::open_streams::StreamPlace;
 use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::advance::{Answered, NextFrames};
+use crate::http::advance_session::advance_session;
 use crate::http::auth::caller::Caller;
+use crate::http::client::Client;
 use crate::http::clients::Account;
+use crate::http::durability::Durability;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
-use crate::http::work;
-use crate::sessions::{LockedSession, QueuePermit, SessionPermit, WorkMeter};
-use crate::tracker::{Estimate, Seen};
+use crate::http::{newest, stored};
+use crate::sessions::{Estimates, QueuePermit, Session, SessionPermit};
+use crate::tracker::Seen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -18,6 +21,8 @@ use uuid::Uuid;
 
 /// How long to wait before asking for a place again.
 const RETRY: Duration = Duration::from_millis(20);
+/// How long to wait before the store is tried again.
+const STORE_RETRY: Duration = Duration::from_millis(250);
 /// The last answers that are kept for a client that takes up after a broken line.
 pub const MAX_KEPT: usize = 32;
 
@@ -28,12 +33,14 @@ pub struct FrameWork {
     pub state: AppState,
     /// Who sends them.
     pub caller: Caller,
+    /// Where they come from.
+    pub client: Client,
     /// The quotas that they are counted by.
     pub account: Arc<Account>,
     /// The session.
     pub session: Uuid,
     /// The stream's place.
-    pub place: StreamPlace,
+    pub place: Arc<StreamPlace>,
     /// The frames that wait.
     pub waiting: Mutex<Waiting>,
     /// Whether frames may be skipped.
@@ -43,12 +50,14 @@ pub struct FrameWork {
 /// The answer to a frame.
 #[derive(Debug)]
 pub struct Given {
-    /// Where the target is.
-    pub estimate: Estimate,
+    /// Where the targets are.
+    pub estimates: Estimates,
     /// Whether it was given before.
     pub replayed: bool,
-    /// What the tracker saw, where that was asked for.
+    /// What the tracker of the target saw that was asked for.
     pub seen: Option<Seen>,
+    /// What the store has.
+    pub durability: Durability,
 }
 
 /// What became of a frame.
@@ -88,54 +97,56 @@ impl FrameWork {
     async fn permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
         let deadline = Instant::now() + self.state.config.work_timeout;
         loop {
-            let problem = match self.try_permits() {
+            let problem = match self.try_permits().await {
                 Ok(permits) => return Ok(permits),
                 Err(problem) => problem,
             };
-            let kind = problem.kind();
-            let may_wait = matches!(
-                kind,
-                Kind::QueueFull | Kind::QuotaExceeded | Kind::SessionBusy
-            );
-            if !may_wait || Instant::now() >= deadline {
+            if !may_wait(problem.kind()) || Instant::now() >= deadline {
                 return Err(problem);
             }
             sleep(RETRY).await;
         }
     }
 
-    fn try_permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
-        self.check_access()?;
+    async fn try_permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
         let state = &self.state;
-        let session = state.registry.find(self.session, self.caller.owner())?;
-        let session = session.enter()?;
+        let session = self.find().await?.enter()?;
         let request = Arc::new(self.account.request()?);
         let queue = state
             .admission
             .enter(request.lane(), Box::new(request.clone()))?;
         request.count_frames(1)?;
-        Ok((session, queue))
+        let targets = session.session().target_count();
+        Ok((session, queue.for_frames(targets)))
     }
 
-    /// Whether the caller may still use the session, which is there.
-    ///
-    /// # Errors
-    /// The token has ended, or the key; or the session.
-    pub fn check_access(&self) -> Result<(), Problem> {
+    /// The session, if the caller may still use it.
+    async fn find(&self) -> Result<Arc<Session>, Problem> {
         let (state, caller) = (&self.state, &self.caller);
         let keys = &state.access.keys;
         let has_key = !keys.are_needed() || keys.has_owner(caller.owner());
         if caller.has_ended(state.now()) || !has_key {
             return Err(Problem::unauthorized());
         }
-        state.registry.find(self.session, caller.owner())?;
+        stored::find(state, self.session, caller.owner(), &self.client).await
+    }
+
+    /// Whether the caller may still use the session, which is there, and whether the stream has its place. Asks the
+    /// store too, while no frame comes.
+    ///
+    /// # Errors
+    /// The token has ended, or the key; or the session.
+    pub async fn check_newest(&self) -> Result<(), Problem> {
+        let session = self.find().await?;
+        newest::refresh(&self.state, &session, &self.client).await?;
+        self.place.has_ended(&session);
         Ok(())
     }
 
     async fn answer(
         self: &Arc<Self>,
         frame: ArrivedFrame,
-        (session, queue): (SessionPermit, QueuePermit),
+        (mut session, mut queue): (SessionPermit, QueuePermit),
     ) -> Result<Given, Problem> {
         let ArrivedFrame {
             header,
@@ -150,31 +161,58 @@ impl FrameWork {
             return Err(Problem::missing_frame());
         }
         let config = &self.state.config;
-        let next = NextFrames {
-            number: header.frame,
-            files: vec![file],
-            correction: header.r#box.map(Into::into),
-            kept: MAX_KEPT.min(config.max_frames),
-            sees: header.see,
-        };
-        let (limits, stream) = (config.request_limits(), self.clone());
-        let advance = move |locked: &mut LockedSession, meter: &mut WorkMeter| {
-            let _charge = charge;
-            // The newer stream has told its client which frame is the next.
-            if stream.place.is_replaced() {
-                return Err(Problem::work_timeout());
+        let deadline = Instant::now() + config.work_timeout;
+        let (mut number, charge) = (header.frame, Arc::new(charge));
+        let shown = header.target.unwrap_or(0);
+        if header.see && shown >= session.session().target_count() {
+            return Err(Problem::which_target(session.session().target_count()));
+        }
+        loop {
+            let next = NextFrames {
+                number,
+                files: vec![file.clone()],
+                correction: header.correction(),
+                kept: MAX_KEPT.min(config.max_frames),
+                sees: header.see,
+                stream: Some(self.place.clone()),
+                _charge: Some(charge.clone()),
+            };
+            let at = session.session().clone();
+            match advance_session(&self.state, session, queue, &self.client, next).await {
+                Ok(answered) => return Ok(Given::of(answered, shown)),
+                Err(problem) if is_store_away(&problem) && Instant::now() < deadline => {
+                    // The store may have the frame, and only its answer was lost.
+                    number = number.or(Some(at.latest_frame() + 1));
+                    sleep(STORE_RETRY).await;
+                    (session, queue) = self.permits().await?;
+                }
+                Err(problem) => return Err(problem),
             }
-            next.advance(locked, &limits, meter, &stream.state.metrics.tracking)
-        };
-        let Answered {
-            estimates,
-            replayed,
-            seen,
-        } = work::on_session(&self.state, session, queue, advance).await?;
-        Ok(Given {
-            estimate: estimates[0],
-            replayed,
-            seen,
-        })
+        }
     }
+}
+
+impl Given {
+    /// The answer to one frame, with what the tracker of this target saw.
+    fn of(mut answered: Answered, target: usize) -> Self {
+        let seen = (target < answered.seen.len()).then(|| answered.seen.swap_remove(target));
+        Self {
+            estimates: answered.estimates.swap_remove(0),
+            replayed: answered.replayed,
+            seen,
+            durability: answered.durability,
+        }
+    }
+}
+
+fn is_store_away(problem: &Problem) -> bool {
+    problem.kind() == Kind::StoreUnavailable
+}
+
+/// Whether a frame waits where there is such a problem, and is tried again.
+fn may_wait(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::QueueFull | Kind::QuotaExceeded | Kind::SessionBusy | Kind::StoreUnavailable
+    )
 }

@@ -1,11 +1,14 @@
 //! Opens a stream.
 
 use super::frame_work::FrameWork;
-use super::session_stream::SessionStream;
+use super::open_streams::StreamPlace;
+use super::session_stream::{SessionStream, Stand};
 use super::waiting::Waiting;
 use crate::http::auth::caller::Caller;
 use crate::http::client::Client;
 use crate::http::connection_hold::ConnectionHold;
+use crate::http::durability::Durability;
+use crate::http::newest;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
@@ -13,7 +16,6 @@ use crate::http::request_id;
 use crate::http::session_path::SessionPath;
 use crate::http::state::AppState;
 use crate::sessions::{ByteCharge, ReplayError, Session};
-use crate::tracker::Estimate;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
@@ -70,7 +72,8 @@ operation_problems!(
 /// Send further frames without waiting for the answers, at most 32. If the line breaks, open the stream again with
 /// `?from=N`, N being the first frame without an answer: the stored answers come again, with `"replayed": true`, and
 /// frames go on with the number `next`. With `drop=true` a frame that waits is skipped for a newer one; `"skipped"` in
-/// an answer counts the frames before it that were.
+/// an answer counts the frames before it that were. With a store, `"checkpoint": N` in an answer names the last frame
+/// whose state is in it, and `"durable": false` says that the store could not be reached and has not this frame.
 ///
 /// A page sends its session token as a protocol: `new WebSocket(url, ["bagtrack", token])`. The service closes with
 /// 4000 and the status of a problem (410: the session has expired), 4409 when a newer stream of the session has taken
@@ -88,7 +91,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let (mut parts, _) = request.into_parts();
     let settings = settings(&parts.uri)?;
     let path = SessionPath::from_request_parts(&mut parts, &state).await?;
-    let session = path.find(&state)?;
+    let session = path.find(&state).await?;
     let upgrade = WebSocketUpgrade::from_request_parts(&mut parts, &state).await;
     let upgrade = upgrade.map_err(|error| {
         let detail = format!("{error}. This call opens a WebSocket.");
@@ -100,19 +103,21 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
         Problem::internal(Arc::new(error))
     })?;
     let caller = Caller::from_request_parts(&mut parts, &state).await?;
-    let account = state.clients.account(&Client::of(&parts));
+    let client = Client::of(&parts);
+    let account = state.clients.account(&client);
     let max_bytes = max_message_bytes(&state, &session);
     let mut buffers = ByteCharge::new(&state.uploads, account.bytes());
     // A message in pieces is there twice: the pieces that have come, and the one that comes.
     buffers.grow(2 * max_bytes + READ_BYTES + WRITE_BYTES)?;
     // The stream before this one tracks no further frame.
-    let place = state.streams.take(session.id());
-    let (next, stored) = stand(&state, &session, settings.from).await?;
+    let place = Arc::new(state.streams.take(session.id()));
+    let stand = stand(&state, &session, &client, &place, settings.from).await?;
     let newest_wins = settings.drop.unwrap_or(false);
     let stream = SessionStream {
         work: Arc::new(FrameWork {
             state,
             caller,
+            client,
             account,
             session: session.id(),
             place,
@@ -121,8 +126,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
         }),
         connection,
         buffers,
-        next,
-        stored,
+        stand,
         request_id,
         path: parts.uri.path().to_owned(),
     };
@@ -153,21 +157,29 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     usual.min(state.config.max_frame_bytes)
 }
 
-/// The number of the session's next frame, and its stored answers from frame `from` on. Waits for the frame at work, of
-/// the stream before this one too.
+/// Where the session stands. Waits for the frame at work, of the stream before this one too. A stream before it at another
+/// replica tracks no further frame either.
 async fn stand(
     state: &AppState,
     session: &Arc<Session>,
+    client: &Client,
+    place: &StreamPlace,
     from: Option<u64>,
-) -> Result<(u64, Vec<Estimate>), Problem> {
-    let waiting = timeout(state.config.work_timeout, session.visit()?.lock());
+) -> Result<Stand, Problem> {
+    let waiting = newest::lock_fenced(state, session.visit()?, client);
+    let waiting = timeout(state.config.work_timeout, waiting);
     let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
-    let expected = session.latest().frame + 1;
-    let from = from.unwrap_or(expected);
+    place.begin(session);
+    let next = locked.state().latest_frame() + 1;
+    let from = from.unwrap_or(next);
     let stored = locked.state().answers_from(from);
     let stored = stored.ok_or(ReplayError::OutOfOrder {
         got: from,
-        expected,
+        expected: next,
     })?;
-    Ok((expected, stored))
+    Ok(Stand {
+        next,
+        stored,
+        durability: Durability::of(session),
+    })
 }

@@ -1,9 +1,12 @@
 //! The text messages of a stream, as JSON.
 
+use crate::http::advance::GivenBox;
 use crate::http::answer::Answer;
+use crate::http::durability::Durability;
 use crate::http::problems::problem::Problem;
 use crate::http::target_box::TargetBox;
-use crate::tracker::{Estimate, Seen};
+use crate::sessions::Estimates;
+use crate::tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
 
@@ -22,6 +25,9 @@ pub struct FrameHeader {
     /// The box in it, where the user corrects it.
     #[serde(default, deserialize_with = "target_box")]
     pub r#box: Option<TargetBox>,
+    /// Which target is corrected, or is told about, counted from 0.
+    #[serde(default)]
+    pub target: Option<usize>,
     /// Whether the answer shall tell what the tracker saw.
     #[serde(default)]
     pub see: bool,
@@ -38,6 +44,12 @@ fn target_box<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Targe
 }
 
 impl FrameHeader {
+    /// The correction, where there is one.
+    pub fn correction(&self) -> Option<GivenBox> {
+        let target = self.target;
+        self.r#box.map(|to| GivenBox { target, to })
+    }
+
     /// Reads a text message.
     ///
     /// # Errors
@@ -75,6 +87,12 @@ pub struct StreamAnswer {
     /// Whether it was given before.
     #[serde(skip_serializing_if = "is_false")]
     replayed: bool,
+    /// With a store: the last frame whose state is in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<u64>,
+    /// `false` where the store could not be reached and has not this frame.
+    #[serde(skip_serializing_if = "is_true")]
+    durable: bool,
     /// Whether the service is about to end.
     #[serde(skip_serializing_if = "is_false")]
     draining: bool,
@@ -114,14 +132,23 @@ impl From<Seen> for SeenView {
 
 impl StreamAnswer {
     /// The answer to a frame before which so many were skipped.
-    pub fn new(estimate: Estimate, skipped: u64, replayed: bool, draining: bool) -> Self {
+    pub fn new(estimates: &Estimates, skipped: u64, replayed: bool, draining: bool) -> Self {
         Self {
-            answer: estimate.into(),
+            answer: estimates.into(),
             skipped,
             replayed,
+            checkpoint: None,
+            durable: true,
             draining,
             seen: None,
         }
+    }
+
+    /// With what the store has.
+    pub fn with_durability(mut self, durability: Durability) -> Self {
+        self.checkpoint = durability.checkpoint();
+        self.durable = !durability.lacks_frame();
+        self
     }
 
     /// With what the tracker saw.
@@ -133,6 +160,10 @@ impl StreamAnswer {
 
 fn is_zero(number: &u64) -> bool {
     *number == 0
+}
+
+fn is_true(flag: &bool) -> bool {
+    *flag
 }
 
 fn is_false(flag: &bool) -> bool {

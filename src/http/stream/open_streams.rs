@@ -1,8 +1,10 @@
-//! Which session has a stream: at most one, the newest.
+//! Which session has a stream: at most one, the newest. With a store, a stream at another replica has begun a new
+//! generation of the session's record.
 
+use crate::sessions::Session;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use tokio::sync::Notify;
 use uuid::Uuid;
 
@@ -23,6 +25,8 @@ pub struct StreamPlace {
     streams: OpenStreams,
     session: Uuid,
     replacement: Arc<Replacement>,
+    /// The generation of the session's record in the store, which began with the stream.
+    generation: OnceLock<u64>,
 }
 
 impl OpenStreams {
@@ -38,6 +42,7 @@ impl OpenStreams {
             streams: self.clone(),
             session,
             replacement,
+            generation: OnceLock::new(),
         }
     }
 
@@ -48,6 +53,24 @@ impl OpenStreams {
 }
 
 impl StreamPlace {
+    /// The stream begins at the session as it stands.
+    pub fn begin(&self, session: &Session) {
+        if let Some(version) = session.version() {
+            // A stream begins once.
+            let _ = self.generation.set(version.generation);
+        }
+    }
+
+    /// Whether the stream has ended, since another one has the place now, here or at another replica.
+    pub fn has_ended(&self, session: &Session) -> bool {
+        let own = self.generation.get();
+        let now = session.version().map(|version| version.generation);
+        if own.is_some_and(|own| now != Some(*own)) {
+            self.replacement.done.store(true, Ordering::Release);
+        }
+        self.is_replaced()
+    }
+
     /// Whether another stream has the place now.
     pub fn is_replaced(&self) -> bool {
         self.replacement.done.load(Ordering::Acquire)

@@ -5,11 +5,11 @@ use super::frame_work::{Done, FrameWork, Given};
 use super::message::{FrameHeader, Hello, StreamAnswer};
 use super::waiting::ArrivedFrame;
 use crate::http::connection_hold::ConnectionHold;
+use crate::http::durability::Durability;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::sessions::ByteCharge;
-use crate::tracker::Estimate;
+use crate::sessions::{ByteCharge, Estimates};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 use serde::Serialize;
@@ -21,6 +21,17 @@ use tokio::time::{Instant, interval_at, timeout};
 /// Time for a client to answer the close.
 const CLOSING: Duration = Duration::from_secs(2);
 
+/// Where a session stands when a stream is opened.
+#[derive(Debug)]
+pub struct Stand {
+    /// The number of the next frame.
+    pub next: u64,
+    /// The stored answers that the client asked for.
+    pub stored: Vec<Estimates>,
+    /// What the store has.
+    pub durability: Durability,
+}
+
 /// An open stream.
 pub struct SessionStream {
     /// What its frames have in common.
@@ -29,10 +40,8 @@ pub struct SessionStream {
     pub connection: ConnectionHold,
     /// The memory of the buffers that messages are received in.
     pub buffers: ByteCharge,
-    /// The number of the next frame.
-    pub next: u64,
-    /// The stored answers that the client asked for.
-    pub stored: Vec<Estimate>,
+    /// Where the session stands.
+    pub stand: Stand,
     /// The id of the request that opened it, for problems.
     pub request_id: String,
     /// The path of that request.
@@ -84,9 +93,11 @@ impl SessionStream {
         socket: &mut WebSocket,
         counts: &mut Counts,
     ) -> Result<End, axum::Error> {
-        send(socket, &Hello { next: self.next }).await?;
-        for estimate in std::mem::take(&mut self.stored) {
-            send(socket, &self.answer(estimate, 0, true)).await?;
+        let next = self.stand.next;
+        send(socket, &Hello { next }).await?;
+        for estimates in std::mem::take(&mut self.stand.stored) {
+            let answer = self.answer(&estimates, 0, true);
+            send(socket, &answer.with_durability(self.stand.durability)).await?;
         }
         let work = self.work.clone();
         let mut header = Ok(FrameHeader::default());
@@ -128,10 +139,11 @@ impl SessionStream {
                     }
                     counts.skipped += skipped;
                     match answer {
-                        Ok(Given { estimate, replayed, seen }) => {
+                        Ok(Given { estimates, replayed, seen, durability }) => {
                             counts.answered += 1;
-                            let answer = self.answer(estimate, skipped, replayed);
-                            send(socket, &answer.with_seen(seen)).await?;
+                            let answer = self.answer(&estimates, skipped, replayed);
+                            let answer = answer.with_seen(seen).with_durability(durability);
+                            send(socket, &answer).await?;
                         }
                         Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
                         Err(problem) => {
@@ -141,8 +153,10 @@ impl SessionStream {
                     }
                 }
                 _ = pings.tick() => {
-                    if let Err(problem) = work.check_access() {
-                        return Ok(End::Problem(problem));
+                    match work.check_newest().await {
+                        Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
+                        _ if work.place.is_replaced() => return Ok(End::Replaced),
+                        _ => {}
                     }
                     // While frames wait nothing is read, so nothing can be heard.
                     if !is_heard && may_come {
@@ -174,8 +188,8 @@ impl SessionStream {
         })
     }
 
-    fn answer(&self, estimate: Estimate, skipped: u64, replayed: bool) -> StreamAnswer {
-        StreamAnswer::new(estimate, skipped, replayed, self.work.state.is_draining())
+    fn answer(&self, estimates: &Estimates, skipped: u64, replayed: bool) -> StreamAnswer {
+        StreamAnswer::new(estimates, skipped, replayed, self.work.state.is_draining())
     }
 
     async fn send_problem(

@@ -8,6 +8,8 @@ use axum::body::Bytes;
 pub(super) struct Fields {
     /// The files, in order.
     pub(super) files: Vec<Bytes>,
+    /// The snapshot beside the files.
+    pub(super) snapshot: Option<Bytes>,
     /// The texts.
     pub(super) texts: Texts,
 }

@@ -1,21 +1,13 @@
 //! JSON uploads: `frame` and `frames` are base64, all other fields are settings.
 
+use super::base64_file;
 use super::fields::Fields;
 use super::settings::{FrameCount, Settings};
 use crate::http::problems::problem::Problem;
-use base64::Engine;
-use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use bytes::Bytes;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::borrow::Cow;
 use std::fmt;
-
-/// Standard base64, with or without padding.
-const BASE64: GeneralPurpose = GeneralPurpose::new(
-    &base64::alphabet::STANDARD,
-    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
-);
 
 /// Bytes that parsing takes for each byte of a body, beside the body: three quarters for the files, the rest for copies
 /// of texts that have escapes or line breaks in them.
@@ -66,10 +58,15 @@ pub(super) fn read<S: Settings>(
     for (name, value) in members {
         match &*name {
             _ if value.get() == "null" => {}
-            "frame" => fields.files.push(frame(text(&name, value)?)?),
+            "frame" => fields
+                .files
+                .push(base64_file::decode(&text(&name, value)?)?),
+            "snapshot" if S::TAKES_SNAPSHOT && fields.snapshot.is_none() => {
+                fields.snapshot = Some(base64_file::decode(&text(&name, value)?)?);
+            }
             "frames" if S::FRAMES == FrameCount::Several => {
                 for text in frames(value, max_files)? {
-                    fields.files.push(frame(text)?);
+                    fields.files.push(base64_file::decode(&text)?);
                 }
             }
             _ if value.get().starts_with('"') => fields.texts.add(&name, &text(&name, value)?)?,
@@ -97,25 +94,4 @@ fn text<'a>(name: &str, value: &'a RawValue) -> Result<Cow<'a, str>, Problem> {
             .map(Cow::Owned)
             .map_err(|_| Problem::malformed(format!("`{name}` must be a string."))),
     }
-}
-
-/// Base64, possibly as a data URL, possibly broken into lines.
-fn frame(text: Cow<str>) -> Result<Bytes, Problem> {
-    let encoded = match text.strip_prefix("data:") {
-        Some(url) => {
-            let split = url.split_once(";base64,").map(|(_, encoded)| encoded);
-            split
-                .ok_or_else(|| Problem::malformed("A data URL must be `data:image/…;base64,…`."))?
-        }
-        None => &text,
-    };
-    let has_space = encoded.bytes().any(|byte| byte.is_ascii_whitespace());
-    let decoded = if has_space {
-        BASE64.decode(encoded.split_ascii_whitespace().collect::<String>())
-    } else {
-        BASE64.decode(encoded)
-    };
-    decoded
-        .map(Bytes::from)
-        .map_err(|error| Problem::malformed(format!("A frame is not base64: {error}.")))
 }

@@ -15,13 +15,16 @@
 //! text; a setting is unknown, doubled or no value of its type. Each is a problem document, and no session changes.
 
 pub mod admit;
+pub mod base64_file;
 mod body;
 mod fields;
 mod json;
+pub mod json_body;
 mod multipart;
 pub mod overrides;
 mod pace;
 pub mod session_request;
 pub mod settings;
+pub mod switch;
 pub mod texts;
 pub mod uploaded;

@@ -1,4 +1,4 @@
-//! Multipart uploads: `frame` parts are files, all others are settings.
+//! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
 
 use super::body::{self, Buffer};
 use super::fields::Fields;
@@ -15,6 +15,7 @@ pub(super) async fn read(
     request: Request,
     max_bytes: usize,
     max_files: usize,
+    takes_snapshot: bool,
     fields: &mut Fields,
     charge: &mut ByteCharge,
 ) -> Result<(), Problem> {
@@ -24,7 +25,9 @@ pub(super) async fn read(
     })?;
     while let Some(part) = multipart.next_field().await.map_err(failed)? {
         let name = part.name().unwrap_or("").to_owned();
-        if name != "frame" {
+        if name == "snapshot" && takes_snapshot && fields.snapshot.is_none() {
+            fields.snapshot = Some(read_part(part, max_bytes, max_bytes, charge).await?);
+        } else if name != "frame" {
             // One byte more than may be, so that a longer text is refused as such.
             let text = read_part(part, max_bytes, MAX_TEXT_BYTES + 1, charge).await?;
             fields.texts.add(&name, &String::from_utf8_lossy(&text))?;

@@ -1,6 +1,6 @@
 //! A preset with single parameters set otherwise.
 
-use super::settings::whole;
+use super::settings::{WholeNumber, whole};
 use crate::http::problems::problem::Problem;
 use crate::tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
@@ -38,7 +38,7 @@ impl<'de> Deserialize<'de> for ParamOverrides {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Cow::<str>::deserialize(deserializer)?;
         serde_json::from_str(&text).map(Self).map_err(|_| {
-            D::Error::custom("`params` must be a JSON object of parameters, like {\"seed\": 7}")
+            D::Error::custom("`parameters` must be a JSON object of parameters, like {\"seed\": 7}")
         })
     }
 }
@@ -72,6 +72,20 @@ impl ParamOverrides {
         params.seed = seed.unwrap_or(params.seed);
         Ok(params)
     }
+}
+
+/// The parameters of these settings: those of `preset` or the default one, with single ones set otherwise.
+///
+/// # Errors
+/// See [`ParamOverrides::resolve`].
+pub fn resolve(
+    preset: Option<PresetName>,
+    seed: Option<WholeNumber>,
+    params: Option<ParamOverrides>,
+) -> Result<Params, Problem> {
+    let preset = preset.map_or_else(Preset::default, Preset::from);
+    let params = params.unwrap_or_default();
+    params.resolve(preset, seed.map(|seed| seed.0))
 }
 
 /// The parameters by their names.

@@ -1,6 +1,7 @@
 //! The least rate of a body. A client that sends a byte now and then would hold its connection and its session's place
 //! until the deadline of the body.
 
+use crate::http::limits_config::LimitsConfig;
 use crate::sessions::ByteCharge;
 use axum::body::{Body, Bytes, HttpBody};
 use http_body::Frame;
@@ -21,6 +22,16 @@ pub(super) struct Pace {
     pub(super) grace: Duration,
     /// Least bytes a second.
     pub(super) min_rate: u32,
+}
+
+impl Pace {
+    /// That of the settings.
+    pub(super) fn of(limits: &LimitsConfig) -> Self {
+        Self {
+            grace: limits.body_grace,
+            min_rate: limits.min_body_rate,
+        }
+    }
 }
 
 /// A body that fails when it is too slow. Where its reader keeps what arrives, it is charged for that too.

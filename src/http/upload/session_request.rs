@@ -4,15 +4,28 @@ use super::admit::admit;
 use super::settings::Settings;
 use super::texts::Texts;
 use super::uploaded::Upload;
+use crate::http::accept::AnswerForm;
+use crate::http::base_path::client_path;
+use crate::http::client::Client;
+use crate::http::newest::renew_if_busy;
 use crate::http::problems::problem::Problem;
+use crate::http::request_id;
 use crate::http::session_path::SessionPath;
 use crate::http::state::AppState;
-use crate::sessions::{QueuePermit, Session, SessionPermit};
+use crate::sessions::{QueuePermit, SessionPermit};
 use axum::extract::{FromRequest, FromRequestParts, Request};
 
 /// A request with frames for a live session, with its permits.
 #[derive(Debug)]
 pub struct SessionRequest<S> {
+    /// Who sends it.
+    pub client: Client,
+    /// The form of the answer.
+    pub form: AnswerForm,
+    /// The path of the request, as its client knows it.
+    pub path: String,
+    /// The id of the request.
+    pub request_id: String,
     /// The permit of the session.
     pub permit: SessionPermit,
     /// The place in the queue.
@@ -26,28 +39,31 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
 
     async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
         let texts = Texts::of_query::<S>(request.uri())?;
+        let (uri, request_id) = (client_path(&request), request_id::of(&request));
         let (mut parts, body) = request.into_parts();
         let path = SessionPath::from_request_parts(&mut parts, state).await?;
-        let permit = path.find(state)?.enter()?;
+        let permit = path.find(state).await?.enter()?;
+        let (client, form) = (Client::of(&parts), AnswerForm::of(&parts.headers));
         let read = async {
-            let client = admit(state, &parts)?;
+            let admitted = admit(state, &parts)?;
             let request = Request::from_parts(parts, body);
-            Upload::read(state, client, texts, request).await
+            Upload::read(state, admitted, texts, request).await
         };
-        let read = read.await;
-        let (upload, queue) =
-            read.inspect_err(|problem| renew_if_busy(permit.session(), problem))?;
+        let (upload, queue) = match read.await {
+            Ok(read) => read,
+            Err(problem) => {
+                renew_if_busy(state, permit.session(), &problem).await;
+                return Err(problem);
+            }
+        };
         Ok(Self {
+            client,
+            form,
+            path: uri,
+            request_id,
             permit,
             queue,
             upload,
         })
-    }
-}
-
-/// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it alive.
-pub fn renew_if_busy(session: &Session, problem: &Problem) {
-    if problem.retry_seconds().is_some() {
-        session.renew();
     }
 }

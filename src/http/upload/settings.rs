@@ -20,6 +20,10 @@ pub enum FrameCount {
 pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
     /// How many frames the route takes.
     const FRAMES: FrameCount;
+    /// Whether a snapshot may come beside the frames.
+    const TAKES_SNAPSHOT: bool = false;
+    /// Whether a video may come in place of the frames.
+    const TAKES_VIDEO: bool = false;
     /// What the names of the schemas of its bodies begin with.
     const SCHEMA_PREFIX: &'static str;
 }
@@ -27,6 +31,13 @@ pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
 /// A whole number from 0 to 2⁶⁴ - 1, parsed from its text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WholeNumber(pub u64);
+
+impl WholeNumber {
+    /// As an index; one that is too large for that stays too large for any list.
+    pub fn as_index(self) -> usize {
+        usize::try_from(self.0).unwrap_or(usize::MAX)
+    }
+}
 
 impl<'de> Deserialize<'de> for WholeNumber {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

@@ -8,8 +8,10 @@ use super::{body, json, multipart};
 use crate::http::clients::RequestPermit;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use crate::http::snapshot::MEDIA_TYPE;
 use crate::http::state::AppState;
-use crate::http::{snapshot, work};
+use crate::http::work;
+use crate::ingest::video::{VideoFormat, video_format};
 use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
@@ -24,6 +26,9 @@ const MIN_STRIPPED: usize = 256;
 const STRIPPED: &str =
     "The file has lost its line breaks and zeros, as `curl -d` does: use `--data-binary @file`.";
 
+const VIDEO: &str = "A video goes to `POST /sessions/{id}/frames`, one in a request, after a picture has opened the \
+    session. Here send a JPEG, PNG or WebP image.";
+
 /// What a client uploaded.
 #[derive(Debug)]
 pub struct Upload<S> {
@@ -31,14 +36,18 @@ pub struct Upload<S> {
     pub files: Vec<Bytes>,
     /// The settings, from the query and the body.
     pub settings: S,
+    /// The snapshot beside the files.
+    pub snapshot: Option<Bytes>,
+    /// How the only file is stored, where it is a video.
+    pub video: Option<VideoFormat>,
     /// Whether the content type says that the file is a session snapshot.
     pub is_snapshot: bool,
 }
 
 impl<S: Settings> Upload<S> {
     /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
-    /// their names. JSON is parsed on a
-    /// worker. The place holds `permit` and the memory of the files until the request's work has ended.
+    /// their names. JSON is parsed on a worker. The place holds `permit` and the memory of the files until the request's
+    /// work has ended.
     ///
     /// # Errors
     /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
@@ -50,11 +59,7 @@ impl<S: Settings> Upload<S> {
         request: Request,
     ) -> Result<(Self, QueuePermit), Problem> {
         let max_bytes = state.config.max_body_bytes;
-        let limits = &state.config.limits;
-        let pace = Pace {
-            grace: limits.body_grace,
-            min_rate: limits.min_body_rate,
-        };
+        let pace = Pace::of(&state.config.limits);
         let new_charge = || ByteCharge::new(&state.uploads, permit.bytes());
         let mut charge = new_charge();
         let max_files = match S::FRAMES {
@@ -64,6 +69,7 @@ impl<S: Settings> Upload<S> {
         let media_type = media_type(&request);
         let mut fields = Fields {
             files: Vec::new(),
+            snapshot: None,
             texts: Texts::default(),
         };
         let mut json = None;
@@ -71,7 +77,16 @@ impl<S: Settings> Upload<S> {
             // The parser keeps bytes that it has not given out yet; they are charged beside the files.
             let arriving = Some(new_charge());
             let request = request.map(|body| Body::new(PacedBody::new(body, pace, arriving)));
-            multipart::read(request, max_bytes, max_files, &mut fields, &mut charge).await?;
+            let takes = S::TAKES_SNAPSHOT;
+            multipart::read(
+                request,
+                max_bytes,
+                max_files,
+                takes,
+                &mut fields,
+                &mut charge,
+            )
+            .await?;
         } else {
             let body = Body::new(PacedBody::new(request.into_body(), pace, None));
             let bytes = body::read(body, max_bytes, &mut charge).await?;
@@ -95,14 +110,27 @@ impl<S: Settings> Upload<S> {
             };
             fields = work::run(state, queue.clone(), parse).await?;
         }
-        let Fields { files, texts: own } = fields;
+        let Fields {
+            files,
+            snapshot,
+            texts: own,
+        } = fields;
         check_files(&files, max_files)?;
+        let formats = files.iter().map(|file| video_format(file, &media_type));
+        let video = formats.flatten().next();
+        if video.is_some() && (!S::TAKES_VIDEO || files.len() > 1) {
+            return Err(Problem::new(Kind::UnsupportedImage, VIDEO));
+        }
         let upload = Self {
             settings: own.or(texts).parse()?,
-            is_snapshot: media_type == snapshot::MEDIA_TYPE,
+            is_snapshot: media_type == MEDIA_TYPE,
+            snapshot,
+            video,
             files,
         };
-        permit.count_frames(upload.files.len())?;
+        if upload.video.is_none() {
+            permit.count_frames(upload.files.len())?;
+        }
         Ok((upload, queue))
     }
 }

@@ -1,0 +1,68 @@
+//! In which form a client wants its answer.
+
+use axum::http::HeaderMap;
+use axum::http::header::ACCEPT;
+
+/// The media type of answers as lines.
+pub const LINES: &str = "application/x-ndjson";
+
+/// The form of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnswerForm {
+    /// JSON, when all frames are tracked.
+    Json,
+    /// A line of JSON for each frame, as soon as it is tracked.
+    Lines,
+    /// The frame as PNG, with the answer drawn on it.
+    Picture,
+}
+
+impl AnswerForm {
+    /// The form that the header `Accept` likes best; JSON where it names none of them.
+    pub fn of(headers: &HeaderMap) -> Self {
+        let values = headers.get_all(ACCEPT).iter();
+        let texts = values.filter_map(|value| value.to_str().ok());
+        let mut best = (0.0, Self::Json);
+        for range in texts.flat_map(|text| text.split(',')) {
+            let (name, parameters) = range.split_once(';').unwrap_or((range, ""));
+            let form = match name.trim().to_ascii_lowercase().as_str() {
+                LINES | "application/ndjson" | "application/jsonl" => Self::Lines,
+                "image/png" => Self::Picture,
+                "application/json" | "application/*" | "*/*" => Self::Json,
+                _ => continue,
+            };
+            let quality = parameters.split(';').find_map(|parameter| {
+                let value = parameter.trim().strip_prefix("q=")?;
+                value.trim().parse().ok()
+            });
+            let quality: f32 = quality.unwrap_or(1.0);
+            if quality > best.0 {
+                best = (quality, form);
+            }
+        }
+        best.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_form_liked_best_counts_and_the_first_of_equals() {
+        let form = |text: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(ACCEPT, text.parse().unwrap());
+            AnswerForm::of(&headers)
+        };
+        assert_eq!(AnswerForm::of(&HeaderMap::new()), AnswerForm::Json);
+        assert_eq!(form("*/*"), AnswerForm::Json);
+        assert_eq!(form("text/html, image/*"), AnswerForm::Json);
+        assert_eq!(form("image/png"), AnswerForm::Picture);
+        assert_eq!(form("Application/X-NDJSON, */*"), AnswerForm::Lines);
+        assert_eq!(form("application/json, image/png"), AnswerForm::Json);
+        assert_eq!(form("*/*;q=0.1, image/png;q=0.5"), AnswerForm::Picture);
+        assert_eq!(form("image/png; q=0, application/jsonl"), AnswerForm::Lines);
+        assert_eq!(form("image/png;q=0"), AnswerForm::Json);
+    }
+}

@@ -1,0 +1,52 @@
+//! A new session's first frame, with the boxes and parameters that come with it.
+
+use super::advance;
+use super::problems::problem::Problem;
+use super::state::AppState;
+use super::upload::overrides::{self, ParamOverrides, PresetName};
+use super::upload::settings::WholeNumber;
+use crate::sessions::{
+    Boxes, Fingerprint, PerTarget, SessionState, StartError, WorkMeter, frame_format,
+};
+use axum::body::Bytes;
+
+/// What a session begins with, beside the frame.
+#[derive(Debug)]
+pub struct FirstFrame {
+    /// The targets' boxes.
+    pub boxes: Boxes,
+    /// The set of parameters.
+    pub preset: Option<PresetName>,
+    /// The seed of all random draws.
+    pub seed: Option<WholeNumber>,
+    /// Parameters that are set otherwise than in the preset.
+    pub params: Option<ParamOverrides>,
+}
+
+impl FirstFrame {
+    /// The session that begins with this file.
+    ///
+    /// # Errors
+    /// The frame, a box or a parameter cannot be used.
+    pub fn begin(
+        self,
+        state: &AppState,
+        file: &Bytes,
+        meter: &mut WorkMeter,
+    ) -> Result<SessionState, Problem> {
+        let params = overrides::resolve(self.preset, self.seed, self.params)?;
+        let boxes = &self.boxes;
+        let format = |source| frame_format(&params, source, boxes);
+        let (limits, metrics) = (state.config.frame_limits(), &state.metrics.tracking);
+        let files = std::slice::from_ref(file);
+        let frame = &advance::decode(files, &limits, &format, meter, metrics)?[0];
+        let started = SessionState::start(frame, Fingerprint::of(file), boxes, &params);
+        started.map_err(|error| match (&error, boxes) {
+            (StartError::Refused { target, .. }, PerTarget::List(list)) => {
+                let target = *target;
+                Problem::from(error).of_target(target, list.len())
+            }
+            _ => error.into(),
+        })
+    }
+}

@@ -1,0 +1,56 @@
+//! Settings as they are written on the command line and in the environment.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::time::Duration;
+
+/// Reads a duration: `10m`, `30s`, `500ms`, or a number of seconds alone.
+///
+/// # Errors
+/// It is none of these.
+pub fn parse_duration(text: &str) -> Result<Duration, humantime::DurationError> {
+    match text.parse() {
+        Ok(seconds) => Ok(Duration::from_secs(seconds)),
+        Err(_) => humantime::parse_duration(text),
+    }
+}
+
+/// Reads an address to listen on: `127.0.0.1:8080`, `[::1]:8080`, or a host's name with a port. Of several addresses of
+/// a name the first one of IPv4 counts.
+///
+/// # Errors
+/// It has no port, or the name no address.
+pub fn parse_listen(text: &str) -> Result<SocketAddr, String> {
+    let usage = "an address with a port, like 127.0.0.1:8080 or localhost:8080";
+    let found = text
+        .to_socket_addrs()
+        .map_err(|error| format!("it must be {usage}: {error}"))?;
+    let found: Vec<SocketAddr> = found.collect();
+    let first = found.iter().find(|address| address.is_ipv4());
+    let address = first.or(found.first()).copied();
+    address.ok_or_else(|| format!("it must be {usage}: the name has no address"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_alone_is_seconds() {
+        let read = |text| parse_duration(text).ok();
+        assert_eq!(read("10"), Some(Duration::from_secs(10)));
+        assert_eq!(read("10m"), Some(Duration::from_secs(600)));
+        assert_eq!(read("500ms"), Some(Duration::from_millis(500)));
+        assert_eq!((read("-1"), read("ten"), read("")), (None, None, None));
+    }
+
+    #[test]
+    fn a_name_is_taken_as_its_address() {
+        let local = parse_listen("localhost:8080").unwrap();
+        assert!(local.ip().is_loopback() && local.port() == 8080);
+        assert_eq!(parse_listen("0.0.0.0:1").unwrap().to_string(), "0.0.0.0:1");
+        assert_eq!(parse_listen("[::1]:1").unwrap().to_string(), "[::1]:1");
+        for text in ["localhost", "8080", "", "127.0.0.1:99999"] {
+            assert!(parse_listen(text).is_err(), "{text}");
+        }
+    }
+}

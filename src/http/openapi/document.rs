@@ -1,0 +1,72 @@
+//! The document as it is sent: what the handlers say, and what follows from all of them together.
+
+use super::key_order::InOrder;
+use crate::http::api;
+use serde_json::{Map, Value, json};
+
+/// The id in all examples: that of `putSession` opens the session which the others use.
+const EXAMPLE_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
+/// The calls that open a session.
+const OPENING: [&str; 2] = ["createSession", "putSession"];
+/// A handshake cannot be made by following a link.
+const HANDSHAKE: &str = "openStream";
+
+/// The OpenAPI document as JSON, of a service at the root of its host.
+pub fn document() -> String {
+    document_at("/")
+}
+
+/// The OpenAPI document of a service at this path.
+pub fn document_at(base_path: &str) -> String {
+    let document = serde_json::to_value(api::handlers());
+    let mut document = document.expect("the document is plain JSON");
+    document["servers"][0]["url"] = base_path.into();
+    let links = links(&document);
+    for operation in operations(&mut document) {
+        give_id(operation);
+        if OPENING.iter().any(|id| operation["operationId"] == *id) {
+            operation["responses"]["201"]["links"] = links.clone();
+        }
+    }
+    serde_json::to_string_pretty(&InOrder(&document)).expect("the document is plain JSON")
+}
+
+fn operations(document: &mut Value) -> impl Iterator<Item = &mut Value> {
+    let paths = document["paths"].as_object_mut();
+    let paths = paths.expect("a document has paths").values_mut();
+    paths
+        .filter_map(Value::as_object_mut)
+        .flat_map(Map::values_mut)
+}
+
+/// The id of a session gets an example.
+fn give_id(operation: &mut Value) {
+    let parameters = operation.get_mut("parameters");
+    let parameters = parameters.and_then(Value::as_array_mut);
+    for parameter in parameters.into_iter().flatten() {
+        if parameter["in"] == "path" {
+            parameter["example"] = EXAMPLE_ID.into();
+        }
+    }
+}
+
+/// From a new session to all calls on it.
+fn links(document: &Value) -> Value {
+    let paths = document["paths"].as_object().expect("a document has paths");
+    let on_session = paths
+        .iter()
+        .filter(|(path, _)| path.starts_with("/sessions/{id}"));
+    let operations = on_session.filter_map(|(_, methods)| methods.as_object());
+    let ids = operations
+        .flat_map(Map::values)
+        .filter_map(|operation| operation["operationId"].as_str());
+    let ids = ids.filter(|id| *id != HANDSHAKE && !OPENING.contains(id));
+    ids.map(|id| {
+        (
+            id.to_owned(),
+            json!({"operationId": id, "parameters": {"id": "$response.body#/id"}}),
+        )
+    })
+    .collect::<Map<_, _>>()
+    .into()
+}

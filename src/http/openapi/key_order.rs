@@ -1,0 +1,57 @@
+//! Writes JSON with the members of objects in a chosen order: some readers of OpenAPI documents take the first.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::Value;
+
+/// Members that stand before all others, in this order. Generators of clients make their call from the first media type
+/// of a body, and Swagger UI shows it: the raw file before the forms, and those before base64. Of an answer they take
+/// the first, too, and JSON is wanted before a picture.
+const FIRST: [&str; 20] = [
+    "openapi",
+    "info",
+    "servers",
+    "tags",
+    "security",
+    "paths",
+    "image/jpeg",
+    "image/webp",
+    "application/octet-stream",
+    "application/vnd.bagtrack.snapshot",
+    "multipart/form-data",
+    "application/json",
+    "image/png",
+    "operationId",
+    "summary",
+    "description",
+    "$ref",
+    "type",
+    "name",
+    "in",
+];
+
+/// JSON to be written in order.
+pub struct InOrder<'a>(pub &'a Value);
+
+impl Serialize for InOrder<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Value::Object(object) => {
+                let mut members: Vec<_> = object.iter().collect();
+                // The sort is stable: the others stay as they were.
+                members.sort_by_key(|(name, _)| {
+                    FIRST
+                        .iter()
+                        .position(|first| first == name)
+                        .unwrap_or(FIRST.len())
+                });
+                let mut map = serializer.serialize_map(Some(members.len()))?;
+                for (name, value) in members {
+                    map.serialize_entry(name, &InOrder(value))?;
+                }
+                map.end()
+            }
+            Value::Array(array) => serializer.collect_seq(array.iter().map(InOrder)),
+            other => other.serialize(serializer),
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Files in JSON: base64, possibly as a data URL, possibly broken into lines.
+
+use crate::http::problems::problem::Problem;
+use base64::Engine;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use bytes::Bytes;
+
+/// Standard base64, with or without padding.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+/// The file of a text.
+///
+/// # Errors
+/// It is not base64.
+pub fn decode(text: &str) -> Result<Bytes, Problem> {
+    let encoded = match text.strip_prefix("data:") {
+        Some(url) => {
+            let split = url.split_once(";base64,").map(|(_, encoded)| encoded);
+            split
+                .ok_or_else(|| Problem::malformed("A data URL must be `data:image/…;base64,…`."))?
+        }
+        None => text,
+    };
+    let has_space = encoded.bytes().any(|byte| byte.is_ascii_whitespace());
+    let decoded = if has_space {
+        BASE64.decode(encoded.split_ascii_whitespace().collect::<String>())
+    } else {
+        BASE64.decode(encoded)
+    };
+    decoded
+        .map(Bytes::from)
+        .map_err(|error| Problem::malformed(format!("A file is not base64: {error}.")))
+}

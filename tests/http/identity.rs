@@ -1,0 +1,94 @@
+//! Sessions under ids that their clients have made.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use bagtrack::http::Secret;
+use reqwest::{Method, RequestBuilder, StatusCode};
+use std::time::Duration;
+
+const ID: &str = "0190c3a2-7b1e-7c58-9d5f-3b8f0c6f2a11";
+
+fn put(app: &TestApplication, id: &str, query: &[(&str, &str)]) -> RequestBuilder {
+    let request = app.request(Method::PUT, &format!("/sessions/{id}"), query);
+    request.body(pictures::png(0))
+}
+
+#[tokio::test]
+async fn the_same_request_gets_the_same_answer_also_after_a_frame() {
+    let app = TestApplication::start().await;
+    let first = put(&app, ID, &[("box", BOX)]).send().await.unwrap();
+    assert_eq!(first.status(), StatusCode::CREATED);
+    assert_eq!(first.headers()["location"], format!("/sessions/{ID}"));
+    assert!(!first.headers().contains_key("replayed"));
+    let body = first.text().await.unwrap();
+    assert!(body.contains(ID), "{body}");
+    expect(app.post_frame(ID, pictures::png(1)).await, StatusCode::OK).await;
+    app.clock.advance(Duration::from_secs(30));
+
+    let again = put(&app, ID, &[("box", BOX)]).send().await.unwrap();
+    assert_eq!(again.status(), StatusCode::CREATED);
+    assert_eq!(again.headers()["replayed"], "true");
+    assert_eq!(again.text().await.unwrap(), body, "the seed was drawn once");
+    assert_eq!(app.frames_of(ID).await, 2, "the session goes on");
+}
+
+#[tokio::test]
+async fn another_request_for_the_same_id_is_refused() {
+    let app = TestApplication::start().await;
+    let query = [("box", BOX), ("seed", "7")];
+    let opened = put(&app, ID, &query).send().await.unwrap();
+    assert_eq!(opened.status(), StatusCode::CREATED);
+    for other in [
+        put(&app, ID, &[("box", BOX), ("seed", "8")]),
+        put(&app, ID, &query).body(pictures::png(1)),
+    ] {
+        expect_problem(other.send().await.unwrap(), "session-exists").await;
+    }
+    assert_eq!(app.frames_of(ID).await, 1);
+    expect(app.delete_session(ID).await, StatusCode::NO_CONTENT).await;
+    let anew = put(&app, ID, &[("box", BOX), ("seed", "8")]);
+    assert_eq!(anew.send().await.unwrap().status(), StatusCode::CREATED);
+}
+
+#[tokio::test]
+async fn requests_at_the_same_time_open_one_session() {
+    let app = TestApplication::start().await;
+    let requests = (0..12).map(|_| put(&app, ID, &[("box", BOX)]).send());
+    let mut bodies = Vec::new();
+    for response in futures_util::future::join_all(requests).await {
+        bodies.push(response.unwrap().text().await.unwrap());
+    }
+    bodies.dedup();
+    assert_eq!(bodies.len(), 1, "{bodies:?}");
+}
+
+#[tokio::test]
+async fn an_id_of_another_client_is_taken() {
+    let mut app = TestApplication::start_with(|config| {
+        config.access.api_keys = vec![
+            Secret::from("ann:0123456789abcdef"),
+            Secret::from("ben:fedcba9876543210"),
+        ];
+    })
+    .await;
+    let query = [("box", BOX), ("seed", "7")];
+    let opened = put(&app, ID, &query).send().await.unwrap();
+    assert_eq!(opened.status(), StatusCode::CREATED);
+    app.key = Some("fedcba9876543210".to_owned());
+    expect_problem(
+        put(&app, ID, &query).send().await.unwrap(),
+        "session-exists",
+    )
+    .await;
+    expect_problem(app.get_session(ID).await, "session-not-found").await;
+}
+
+#[tokio::test]
+async fn an_id_that_is_no_uuid_and_a_key_beside_an_id_are_refused() {
+    let app = TestApplication::start().await;
+    let named = put(&app, "my-session", &[("box", BOX)]);
+    expect_problem(named.send().await.unwrap(), "malformed-request").await;
+    let twice = put(&app, ID, &[("box", BOX)]).header("idempotency-key", "key");
+    expect_problem(twice.send().await.unwrap(), "malformed-request").await;
+    expect_problem(app.get_session(ID).await, "session-not-found").await;
+}

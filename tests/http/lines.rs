@@ -1,0 +1,108 @@
+//! Answers as lines of JSON.
+
+use crate::application::{TestApplication, expect, expect_problem};
+use crate::pictures;
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, Response, StatusCode};
+use serde_json::Value;
+
+pub const LINES: &str = "application/x-ndjson";
+
+/// The lines of an answer, each of which has an end.
+pub async fn lines(response: Response) -> Vec<Value> {
+    let status = response.status();
+    let media_type = response.headers()["content-type"].clone();
+    let text = response.text().await.unwrap();
+    assert_eq!(status, StatusCode::OK, "{text}");
+    assert_eq!(media_type, LINES);
+    assert!(text.ends_with('\n'), "{text}");
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+async fn post(
+    app: &TestApplication,
+    id: &str,
+    query: &[(&str, &str)],
+    frames: Vec<Vec<u8>>,
+) -> Response {
+    let path = format!("/sessions/{id}/frames");
+    let form = frames.into_iter().fold(Form::new(), |form, frame| {
+        form.part("frame", Part::bytes(frame).file_name("frame.png"))
+    });
+    let request = app.request(Method::POST, &path, query);
+    let request = request.header("accept", LINES);
+    request.multipart(form).send().await.unwrap()
+}
+
+fn frames(numbers: std::ops::RangeInclusive<u32>) -> Vec<Vec<u8>> {
+    numbers.map(pictures::png).collect()
+}
+
+/// The answers of plain posts to the frames 1 to `last`.
+async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
+    let id = app.open().await;
+    let mut answers = Vec::new();
+    for t in 1..=last {
+        let response = app.post_frame(&id, pictures::png(t)).await;
+        answers.push(expect(response, StatusCode::OK).await);
+    }
+    answers
+}
+
+#[tokio::test]
+async fn each_frame_gets_the_answer_of_a_plain_post_as_a_line() {
+    let app = TestApplication::start().await;
+    let expected = posted(&app, 13).await;
+    let id = app.open().await;
+    assert_eq!(
+        lines(post(&app, &id, &[], frames(1..=12)).await).await,
+        expected[..12]
+    );
+    // One frame is a line, too.
+    assert_eq!(
+        lines(post(&app, &id, &[], frames(13..=13)).await).await,
+        expected[12..]
+    );
+}
+
+#[tokio::test]
+async fn frames_before_a_bad_one_count_and_its_problem_is_the_last_line() {
+    let app = TestApplication::start().await;
+    let expected = posted(&app, 6).await;
+    let id = app.open().await;
+    let mut bad = frames(1..=6);
+    bad[3] = b"no image".to_vec();
+    let mut got = lines(post(&app, &id, &[("frame", "1")], bad).await).await;
+    let last = got.pop().unwrap();
+    assert_eq!(got, expected[..3]);
+    assert_eq!(last["type"], "urn:bagtrack:problem:unsupported-image");
+    assert_eq!(last["status"], 415);
+    assert_eq!(last["instance"], format!("/sessions/{id}/frames"));
+    assert_eq!(app.frames_of(&id).await, 4);
+
+    // Sent again as it should be: what was answered is answered again, and the rest is tracked.
+    let mut got = lines(post(&app, &id, &[("frame", "1")], frames(1..=6)).await).await;
+    for answer in &mut got[..3] {
+        let replayed = answer.as_object_mut().unwrap().remove("replayed");
+        assert_eq!(replayed, Some(true.into()));
+    }
+    assert_eq!(got, expected);
+    assert_eq!(app.frames_of(&id).await, 7);
+}
+
+#[tokio::test]
+async fn a_refused_first_frame_is_the_answer_to_the_request() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let other_size = post(&app, &id, &[], vec![pictures::png_of(64, 48)]).await;
+    expect_problem(other_size, "frame-size-mismatch").await;
+    let early = post(&app, &id, &[("frame", "40")], frames(1..=2)).await;
+    let problem = expect_problem(early, "frame-out-of-order").await;
+    assert_eq!(problem["expected_frame"], 1);
+    lines(post(&app, &id, &[("frame", "1")], frames(1..=2)).await).await;
+    let differs = post(&app, &id, &[("frame", "2")], frames(5..=6)).await;
+    expect_problem(differs, "frame-differs").await;
+    assert_eq!(app.frames_of(&id).await, 3);
+}

@@ -1,0 +1,170 @@
+//! Videos as bodies. Most need ffmpeg, and say so where there is none.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::lines::lines;
+use crate::pictures;
+use image::ImageFormat;
+use reqwest::{Method, Response};
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+const FRAMES: u32 = 12;
+
+fn has_ffmpeg() -> bool {
+    let found = Command::new("ffmpeg").arg("-version").output().is_ok();
+    if !found {
+        eprintln!("left out: there is no ffmpeg");
+    }
+    found
+}
+
+/// The drawn frames 1 to [`FRAMES`] as a video of this kind.
+fn video(extension: &str) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("video").with_extension(extension);
+    let mut command = Command::new("ffmpeg");
+    command.args([
+        "-v",
+        "error",
+        "-f",
+        "image2pipe",
+        "-framerate",
+        "25",
+        "-c:v",
+        "png",
+    ]);
+    command.args(["-i", "pipe:0"]);
+    if extension != "gif" {
+        command.args(["-pix_fmt", "yuv420p", "-b:v", "2M"]);
+    }
+    let mut child = command.arg(&file).stdin(Stdio::piped()).spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    for t in 1..=FRAMES {
+        input.write_all(&pictures::png(t)).unwrap();
+    }
+    drop(input);
+    assert!(child.wait().unwrap().success(), "{extension}");
+    std::fs::read(file).unwrap()
+}
+
+fn motion_jpeg() -> Vec<u8> {
+    let frames = (1..=FRAMES).map(|t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg));
+    frames.flatten().collect()
+}
+
+async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>) -> Response {
+    let path = format!("/sessions/{id}/frames");
+    let request = app.request(Method::POST, &path, &[]);
+    let request = request.header("content-type", media_type);
+    request.body(video).send().await.unwrap()
+}
+
+#[tokio::test]
+async fn a_video_is_tracked_and_answered_line_by_line() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start().await;
+    for (media_type, video) in [
+        // Its index is at the end.
+        ("video/mp4", video("mp4")),
+        ("video/webm", video("webm")),
+        ("image/gif", video("gif")),
+        ("video/x-motion-jpeg", motion_jpeg()),
+        // As curl labels what it is not told about.
+        ("application/x-www-form-urlencoded", video("mp4")),
+    ] {
+        let id = app.open().await;
+        let answers = lines(post(&app, &id, media_type, video).await).await;
+        assert_eq!(answers.len(), FRAMES as usize, "{media_type}: {answers:?}");
+        for (answer, t) in answers.iter().zip(1..) {
+            assert_eq!(answer["frame"], t);
+            let x = answer["box"]["x"].as_f64().unwrap();
+            assert!(
+                (x - f64::from(20 + 2 * t)).abs() < 3.0,
+                "{media_type}: {answer}"
+            );
+        }
+        assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+    }
+}
+
+#[tokio::test]
+async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
+    let mp4 = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
+    for program in ["off", "/nowhere/ffmpeg"] {
+        let app = TestApplication::start_with(|config| config.limits.ffmpeg = program.to_owned());
+        let app = app.await;
+        let id = app.open().await;
+        let refused = post(&app, &id, "video/mp4", mp4.clone()).await;
+        let problem = expect_problem(refused, "unsupported-image").await;
+        assert_eq!(problem["status"], 415);
+        assert!(
+            problem["detail"].as_str().unwrap().contains("ffmpeg"),
+            "{problem}"
+        );
+        assert_eq!(app.frames_of(&id).await, 1);
+    }
+}
+
+#[tokio::test]
+async fn a_session_is_opened_with_a_picture() {
+    let app = TestApplication::start().await;
+    let gif = [b"GIF89a".to_vec(), vec![0; 400]].concat();
+    let problem = expect_problem(
+        app.create(gif.clone(), &[("box", BOX)]).await,
+        "unsupported-image",
+    );
+    let detail = problem.await["detail"].as_str().unwrap().to_owned();
+    assert!(
+        detail.contains("/frames") && detail.contains("picture"),
+        "{detail}"
+    );
+    let id = app.open().await;
+    let request = app.request(
+        Method::POST,
+        &format!("/sessions/{id}/frames"),
+        &[("draw", "")],
+    );
+    let drawn = request.body(gif).send().await.unwrap();
+    expect_problem(drawn, "malformed-request").await;
+}
+
+#[tokio::test]
+async fn what_is_wrong_with_a_video_is_told() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start_with(|config| config.limits.max_video_frames = 5).await;
+    let id = app.open().await;
+    let whole = video("mp4");
+    let mut got = lines(post(&app, &id, "video/mp4", whole.clone()).await).await;
+    let last = got.pop().unwrap();
+    assert_eq!(last["type"], "urn:bagtrack:problem:too-many-frames");
+    assert_eq!(got.len(), 5);
+    assert_eq!(app.frames_of(&id).await, 6);
+    // The index is missing.
+    let cut = whole[..whole.len() / 2].to_vec();
+    let problem = expect_problem(post(&app, &id, "video/mp4", cut).await, "frame-damaged").await;
+    assert!(
+        problem["detail"].as_str().unwrap().contains("video"),
+        "{problem}"
+    );
+    assert_eq!(app.frames_of(&id).await, 6);
+    // A playlist is no video, whatever its label says.
+    let playlist = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n".to_vec();
+    expect_problem(
+        post(&app, &id, "video/mp4", playlist).await,
+        "unsupported-image",
+    )
+    .await;
+
+    let created = app.create(pictures::png_of(64, 48), &[("box", BOX)]).await;
+    let created = expect(created, reqwest::StatusCode::CREATED).await;
+    let other = created["id"].as_str().unwrap();
+    expect_problem(
+        post(&app, other, "video/mp4", whole).await,
+        "frame-size-mismatch",
+    )
+    .await;
+}
