@@ -69,6 +69,9 @@ pub struct Options {
     /// The server's binary; otherwise `bagtrack` beside this program's folder.
     #[arg(long)]
     server: Option<PathBuf>,
+    /// The mix's attackers alone, against `--url`, without good clients.
+    #[arg(long, requires = "url")]
+    attackers_only: bool,
 }
 
 impl Options {
@@ -81,6 +84,15 @@ impl Options {
 #[tokio::main(worker_threads = 2)]
 async fn main() -> ExitCode {
     let options = Options::parse();
+    if options.attackers_only {
+        return match attackers_only(&options).await {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("the attackers: {error}");
+                ExitCode::FAILURE
+            }
+        };
+    }
     let mut failed = 0;
     macro_rules! attack {
         ($($name:ident),*) => {$(
@@ -119,6 +131,11 @@ async fn main() -> ExitCode {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     }
+}
+
+async fn attackers_only(options: &Options) -> Outcome<()> {
+    let target = Target::start(options, mix::SETTINGS).await?;
+    mix::attackers(&target, options).await
 }
 
 fn report(name: &str, begun: Instant, verdict: Outcome<Verdict>) -> u32 {

@@ -1,10 +1,14 @@
-//! All at once, at twice what the service can do: bombs, costly sessions, slow and silent clients, garbage, floods.
+//! All at once, at more than the service can do: bombs, costly sessions, slow and silent clients, garbage, floods.
+//!
+//! The attackers are a process of their own at the lowest priority. They would be on other machines: here they take only
+//! what the service and the good clients leave, which still keeps every worker busy.
 
 use crate::costly_sessions::QUERY;
 use crate::decode_bombs::{bomb, form};
-use crate::good::{GoodClients, frames};
+use crate::good::{GoodClients, Tally, frames};
 use crate::target::Target;
 use crate::{Options, Outcome, Verdict, raw};
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
 use tokio::time::sleep;
@@ -17,6 +21,29 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     let quiet = quiet.stop().await?;
 
     let good = GoodClients::start(target, 8).await?;
+    let mut attackers = start_attackers(target, options)?;
+    while attackers.try_wait()?.is_none() {
+        sleep(Duration::from_millis(100)).await;
+    }
+    let attacked = attackers.wait()?.success();
+    let loud = good.stop().await?;
+    let (kept, memory) = target.peak();
+    let p99 = |tally: &Tally| tally.micros.value_at_quantile(0.99).max(1) as f64;
+    let ratio = p99(&loud) / p99(&quiet);
+    let seen = format!("quiet {quiet}; under attack {loud}; p99 × {ratio:.1}; {memory}");
+    Ok(Verdict::new(attacked && loud.lost == 0 && kept, seen))
+}
+
+fn start_attackers(target: &Target, options: &Options) -> Outcome<Child> {
+    let mut command = Command::new("nice");
+    command.args(["-n", "19"]).arg(std::env::current_exe()?);
+    command.args(["--attackers-only", "--url", &target.url]);
+    command.args(["--seconds", &options.seconds.to_string()]);
+    Ok(command.spawn()?)
+}
+
+/// What the attackers do, for `options.seconds`.
+pub async fn attackers(target: &Target, options: &Options) -> Outcome<()> {
     let end = Instant::now() + Duration::from_secs(options.seconds);
     let mut attackers = JoinSet::new();
     let (frames, bomb) = (frames()?, bomb()?);
@@ -60,10 +87,5 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
         });
     }
     attackers.join_all().await;
-    let loud = good.stop().await?;
-    let (kept, memory) = target.peak();
-    let p99 = |tally: &crate::good::Tally| tally.micros.value_at_quantile(0.99).max(1) as f64;
-    let ratio = p99(&loud) / p99(&quiet);
-    let seen = format!("quiet {quiet}; under attack {loud}; p99 × {ratio:.1}; {memory}");
-    Ok(Verdict::new(loud.lost == 0 && kept, seen))
+    Ok(())
 }

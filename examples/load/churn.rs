@@ -3,8 +3,7 @@
 use crate::Outcome;
 use crate::drive::{Driver, Failure};
 use crate::process::Server;
-use bytes::Bytes;
-use reqwest::{Client, StatusCode};
+use bagtrack_client::ClientError;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
@@ -29,9 +28,7 @@ pub async fn run(
     let mut clients = JoinSet::new();
     for number in 0..sessions {
         let client = ChurningClient {
-            create: driver.create.clone(),
-            url: driver.url.clone(),
-            pictures: driver.pictures.clone(),
+            driver: driver.clone(),
             every: Duration::from_secs_f64(f64::from(sessions) / rate),
         };
         clients.spawn(client.run(number, end));
@@ -76,9 +73,7 @@ async fn resident(server: &Server, over: Duration) -> Outcome<f64> {
 
 /// Opens one session after the other.
 struct ChurningClient {
-    create: String,
-    url: String,
-    pictures: Vec<Bytes>,
+    driver: Driver,
     every: Duration,
 }
 
@@ -90,26 +85,19 @@ impl ChurningClient {
         due.set_missed_tick_behavior(MissedTickBehavior::Delay);
         while Instant::now() < end {
             // A connection for each session, as clients have it that come and go.
-            let http = Client::builder().pool_max_idle_per_host(1).build()?;
-            let created = http.post(&self.create).body(self.pictures[0].clone());
-            let created = created.send().await?.error_for_status()?;
-            let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
-            let id = session["id"].as_str().ok_or("a session without an id")?;
-            let session = format!("{}/sessions/{id}", self.url);
-            let post = format!("{session}/frames");
+            let mut session = self.driver.session(&self.driver.client(1)?).await?;
             let life = 20 + (37 * opened + 61 * number) % 180;
             opened += 1;
-            for (t, picture) in (1..life).zip(self.pictures.iter().cycle().skip(1)) {
+            for (t, picture) in (1..life).zip(self.driver.pictures.iter().cycle().skip(1)) {
                 due.tick().await;
                 if t % 40 == 0 {
                     let damaged = picture.slice(..picture.len() / 2);
-                    let answer = http.post(&post).body(damaged).send().await?;
-                    if answer.status() != StatusCode::UNPROCESSABLE_ENTITY {
-                        return Err(format!("a damaged frame: {}", answer.status()).into());
+                    match session.track(damaged).await {
+                        Err(ClientError::Refused(problem)) if problem.status == 422 => {}
+                        other => return Err(format!("a damaged frame: {other:?}").into()),
                     }
                 }
-                let answer = http.post(&post).body(picture.clone()).send().await?;
-                answer.error_for_status()?.bytes().await?;
+                session.track(picture.clone()).await?;
                 sent += 1;
                 if Instant::now() >= end {
                     break;
@@ -117,7 +105,7 @@ impl ChurningClient {
             }
             // Every fifth client just goes away.
             if !(opened + number).is_multiple_of(5) {
-                http.delete(&session).send().await?.error_for_status()?;
+                session.end().await?;
             }
         }
         Ok((opened, sent))

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use bagtrack::tracker::Rect;
+use bagtrack::tracker::{self, Rect};
+use bagtrack_client::{Client, ClientError, OpenOptions, Preset, Session};
 use bytes::Bytes;
 use hdrhistogram::Histogram;
-use reqwest::{Client, StatusCode};
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until};
 
@@ -38,43 +38,63 @@ impl Done {
 }
 
 /// Sends pictures to a server.
+#[derive(Clone)]
 pub struct Driver {
-    /// The server.
-    pub url: String,
-    /// Where a session of the preset is opened with the first picture.
-    pub create: String,
+    url: String,
+    target: bagtrack_client::Rect,
+    /// How sessions are opened with the first picture.
+    pub options: OpenOptions,
     /// What is sent, over and over.
     pub pictures: Vec<Bytes>,
 }
 
 impl Driver {
     /// Clients of the server at `url`.
-    pub fn new(url: &str, pictures: Vec<Vec<u8>>, target: Rect, preset: &str) -> Self {
+    pub fn new(url: &str, pictures: Vec<Vec<u8>>, target: Rect, preset: tracker::Preset) -> Self {
         let Rect {
             x,
             y,
             width,
             height,
         } = target;
+        let preset = match preset {
+            tracker::Preset::Robust => Preset::Robust,
+            tracker::Preset::Paper => Preset::Paper,
+        };
         Self {
             url: url.to_owned(),
-            create: format!("{url}/sessions?box={x},{y},{width},{height}&preset={preset}"),
+            target: bagtrack_client::Rect {
+                x,
+                y,
+                width,
+                height,
+            },
+            options: OpenOptions::new().preset(preset),
             pictures: pictures.into_iter().map(Bytes::from).collect(),
         }
     }
 
-    /// Opens so many sessions.
+    /// A client with so many connections. It sends every request once, so that a failure is seen and each latency is
+    /// that of one request; and it takes no snapshots, which would be in some latencies.
+    pub fn client(&self, connections: usize) -> Result<Client, ClientError> {
+        let http = reqwest::Client::builder().pool_max_idle_per_host(connections);
+        let client = Client::builder(&self.url).http(http.build()?);
+        let client = client.retry_for(Duration::ZERO).snapshot_every(0);
+        client.build()
+    }
+
+    /// Opens a session.
+    pub async fn session(&self, client: &Client) -> Result<Session, ClientError> {
+        let first = self.pictures[0].clone();
+        client.open(first, self.target, &self.options).await
+    }
+
+    /// Opens so many sessions, each with a connection of its own.
     pub async fn open(&self, sessions: u32) -> Outcome<Clients> {
         let mut clients = Vec::new();
         for _ in 0..sessions {
-            let http = Client::builder().pool_max_idle_per_host(1).build()?;
-            let created = http.post(&self.create).body(self.pictures[0].clone());
-            let created = created.send().await?.error_for_status()?;
-            let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
-            let id = session["id"].as_str().ok_or("a session without an id")?;
             clients.push(ClientSession {
-                http,
-                session: format!("{}/sessions/{id}", self.url),
+                session: self.session(&self.client(1)?).await?,
                 pictures: self.pictures.clone(),
                 next: 1,
             });
@@ -119,8 +139,7 @@ impl Clients {
     /// Ends the sessions.
     pub async fn close(self) -> Outcome<()> {
         for client in self.0 {
-            let ended = client.http.delete(&client.session).send().await?;
-            ended.error_for_status()?;
+            client.session.end().await?;
         }
         Ok(())
     }
@@ -134,8 +153,7 @@ struct Schedule {
 }
 
 struct ClientSession {
-    http: Client,
-    session: String,
+    session: Session,
     pictures: Vec<Bytes>,
     /// The picture that is sent next.
     next: usize,
@@ -148,7 +166,6 @@ impl ClientSession {
         schedule: Option<Schedule>,
         end: Instant,
     ) -> Result<(Self, Histogram<u64>), Failure> {
-        let post = format!("{}/frames", self.session);
         let mut latencies = Histogram::new(3)?;
         for index in 0..frames {
             let due = match schedule {
@@ -158,12 +175,7 @@ impl ClientSession {
             sleep_until(due).await;
             let picture = self.pictures[self.next].clone();
             self.next = (self.next + 1) % self.pictures.len();
-            let answer = self.http.post(&post).body(picture).send().await?;
-            let status = answer.status();
-            let body = answer.bytes().await?;
-            if status != StatusCode::OK {
-                return Err(format!("{status}: {}", String::from_utf8_lossy(&body)).into());
-            }
+            self.session.track(picture).await?;
             latencies.record(due.elapsed().as_micros() as u64)?;
             if Instant::now() > end {
                 break;

@@ -88,7 +88,7 @@ fn main() -> Outcome<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
-    let driver = Driver::new(server.url(), pictures.clone(), target, &options.preset);
+    let driver = Driver::new(server.url(), pictures.clone(), target, preset);
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
     }

@@ -4,8 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use bagtrack::tracker::Preset;
-use bytes::Bytes;
-use reqwest::Client;
+use bagtrack_client::Client;
 use tokio::task::JoinSet;
 
 use crate::Outcome;
@@ -24,11 +23,11 @@ const CLIENTS: usize = 16;
 /// the same size, and a fifth of the frames fill it.
 pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u32) -> Outcome<()> {
     let params = preset.params();
+    let mut driver = driver.clone();
+    driver.options = driver.options.parameter("update_every", 1);
     let fill = Arc::new(Fill {
-        http: Client::builder().pool_max_idle_per_host(CLIENTS).build()?,
-        create: format!("{}&params=%7B%22update_every%22%3A1%7D", driver.create),
-        url: driver.url.clone(),
-        pictures: driver.pictures.clone(),
+        client: driver.client(CLIENTS)?,
+        driver,
         // Twice as many as the bag and the history need: `robust` skips frames that fail its update gate.
         frames: 2 * (params.bag_size + params.history),
     });
@@ -71,24 +70,18 @@ pub async fn print(driver: &Driver, server: &Server, preset: Preset, sessions: u
 }
 
 struct Fill {
-    http: Client,
-    create: String,
-    url: String,
-    pictures: Vec<Bytes>,
+    client: Client,
+    driver: Driver,
     frames: u32,
 }
 
 impl Fill {
     /// Opens a session and fills its bag.
     async fn one(&self) -> Result<(), Failure> {
-        let created = self.http.post(&self.create).body(self.pictures[0].clone());
-        let created = created.send().await?.error_for_status()?;
-        let session: serde_json::Value = serde_json::from_slice(&created.bytes().await?)?;
-        let id = session["id"].as_str().ok_or("a session without an id")?;
-        let post = format!("{}/sessions/{id}/frames", self.url);
-        for (_, picture) in (0..self.frames).zip(self.pictures.iter().cycle().skip(1)) {
-            let answer = self.http.post(&post).body(picture.clone()).send().await?;
-            answer.error_for_status()?.bytes().await?;
+        let mut session = self.driver.session(&self.client).await?;
+        let pictures = self.driver.pictures.iter().cycle().skip(1);
+        for (_, picture) in (0..self.frames).zip(pictures) {
+            session.track(picture.clone()).await?;
         }
         Ok(())
     }

@@ -1,0 +1,37 @@
+//! How long to wait before a request is sent again.
+
+use std::time::Duration;
+use tokio::time::Instant;
+
+const FIRST: Duration = Duration::from_millis(100);
+const LONGEST: Duration = Duration::from_secs(5);
+
+/// Pauses that grow, until the time is up.
+pub struct Backoff {
+    begin: Instant,
+    retry_for: Duration,
+    next: Duration,
+}
+
+impl Backoff {
+    pub fn new(retry_for: Duration) -> Self {
+        Self {
+            begin: Instant::now(),
+            retry_for,
+            next: FIRST,
+        }
+    }
+
+    /// Waits, at least as long as the service asks for. False, and at once, where the time would be up then.
+    pub async fn wait(&mut self, asked: Option<Duration>) -> bool {
+        // Clients that were cut off together do not come back together.
+        let own = self.next.mul_f64(0.5 + rand::random::<f64>() / 2.0);
+        let pause = own.max(asked.unwrap_or_default());
+        self.next = (2 * self.next).min(LONGEST);
+        if self.begin.elapsed().saturating_add(pause) > self.retry_for {
+            return false;
+        }
+        tokio::time::sleep(pause).await;
+        true
+    }
+}

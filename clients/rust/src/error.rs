@@ -1,0 +1,36 @@
+//! What can go wrong.
+
+use crate::problem::Problem;
+
+/// Why a call failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClientError {
+    /// The service refused the request; the session is as it was. Frames without an answer are forgotten.
+    #[error("the service refuses: {0}")]
+    Refused(#[source] Box<Problem>),
+    /// For as long as is tried the service said to come again later. The frame is kept: the next call sends it.
+    #[error("the service is not available: {0}")]
+    Unavailable(#[source] Box<Problem>),
+    /// For as long as is tried no whole answer came, and the frame is kept; or the request cannot be made at all.
+    #[error("no answer: {0}")]
+    Transport(#[from] reqwest::Error),
+    /// The service has lost frames and asks for this one again, which is not kept any more.
+    #[error("the service asks for frame {frame} again, which is not kept")]
+    NotKept {
+        /// The number of the frame.
+        frame: u64,
+    },
+    /// The answer is none of a bagtrack service.
+    #[error("the answer cannot be read: {0}")]
+    Answer(#[from] serde_json::Error),
+    /// An API key has characters that a header cannot have.
+    #[error("the API key has characters that a header cannot have")]
+    InvalidKey,
+}
+
+impl From<Box<Problem>> for ClientError {
+    fn from(problem: Box<Problem>) -> Self {
+        Self::Refused(problem)
+    }
+}

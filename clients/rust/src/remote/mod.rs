@@ -1,0 +1,211 @@
+//! A session at the service: where it stands there, and how it goes on when frames or the whole session are lost.
+
+mod care;
+
+use crate::answer::Answer;
+use crate::backoff::Backoff;
+use crate::error::ClientError;
+use crate::kept::{Kept, MOST};
+use crate::problem::Problem;
+use crate::transport::{FRAME, Reply, Request, Transport};
+use crate::upload::{Origin, Upload};
+use bytes::Bytes;
+use reqwest::Method;
+use serde::Deserialize;
+use tokio::time::Instant;
+use uuid::Uuid;
+
+/// A session at the service.
+#[derive(Debug)]
+pub struct Remote {
+    transport: Transport,
+    id: Uuid,
+    /// The last frame whose answer the caller has.
+    answered: u64,
+    /// The last frame that the service has, as far as is known.
+    at: u64,
+    kept: Kept,
+    snapshot_every: u64,
+    resent: u64,
+    tried_to_move: Option<Instant>,
+}
+
+/// The answer to what opens a session.
+#[derive(Deserialize)]
+struct Created {
+    id: Uuid,
+    frame: u64,
+    parameters: Parameters,
+}
+
+#[derive(Deserialize)]
+struct Parameters {
+    seed: u64,
+}
+
+/// The answer to a request with frames.
+#[derive(Deserialize)]
+struct FrameAnswers {
+    #[serde(flatten)]
+    last: Answer,
+    #[serde(default)]
+    answers: Vec<Answer>,
+}
+
+/// The answers to the frames of a request, at least one.
+fn answers(reply: &Reply) -> Result<Vec<Answer>, ClientError> {
+    let FrameAnswers { last, mut answers } = serde_json::from_slice(&reply.body)?;
+    if answers.is_empty() {
+        answers.push(last);
+    }
+    for answer in &mut answers {
+        answer.note(&reply.headers);
+    }
+    Ok(answers)
+}
+
+/// Opens a session; asks until there is an answer.
+async fn create(transport: &mut Transport, origin: &Origin) -> Result<Created, ClientError> {
+    let reply = transport.call(&origin.request(Uuid::new_v4())).await?;
+    Ok(serde_json::from_slice(&reply.checked()?.body)?)
+}
+
+impl Remote {
+    /// Opens a session; the frame of the origin is not looked at.
+    pub async fn open(
+        mut transport: Transport,
+        origin: Origin,
+        snapshot_every: u32,
+    ) -> Result<Self, ClientError> {
+        let created = create(&mut transport, &origin).await?;
+        let mut query = origin.query;
+        if origin.media_type == FRAME {
+            // The same boxes come again only with the seed that was drawn.
+            query.retain(|(name, _)| *name != "seed");
+            query.push(("seed", created.parameters.seed.to_string()));
+        }
+        let mut kept = Kept::default();
+        if snapshot_every > 0 {
+            kept.renew(Origin {
+                frame: created.frame,
+                query,
+                ..origin
+            });
+        }
+        Ok(Self {
+            transport,
+            id: created.id,
+            answered: created.frame,
+            at: created.frame,
+            kept,
+            snapshot_every: u64::from(snapshot_every).min(MOST as u64 / 2),
+            resent: 0,
+            tried_to_move: None,
+        })
+    }
+
+    pub fn id(&self) -> Uuid {
+        self.id
+    }
+
+    pub fn answered(&self) -> u64 {
+        self.answered
+    }
+
+    pub fn resent(&self) -> u64 {
+        self.resent
+    }
+
+    /// Sends the next frames, after those that got no answer. At least one answer.
+    pub async fn advance(&mut self, upload: Upload) -> Result<Vec<Answer>, ClientError> {
+        let before = self.kept.last().unwrap_or(0).max(self.answered);
+        // It is kept before it is sent: a call that is dropped counts as one without answer.
+        self.kept.put(before + 1, upload);
+        let delivered = self.deliver(before + 1).await;
+        if let Err(ClientError::Refused(_) | ClientError::NotKept { .. }) = delivered {
+            self.kept.forget_after(self.at.max(self.answered));
+        }
+        let answers = delivered?;
+        if let Some(last) = answers.last() {
+            self.answered = last.frame;
+            self.look_after(last).await;
+        }
+        Ok(answers)
+    }
+
+    /// Brings the service up to this frame; the answers to the request that has it.
+    async fn deliver(&mut self, number: u64) -> Result<Vec<Answer>, ClientError> {
+        let mut backoff = Backoff::new(self.transport.retry_for);
+        loop {
+            let next = (self.at + 1).min(number);
+            let upload = self.kept.from(next);
+            let upload = upload.ok_or(ClientError::NotKept { frame: next })?;
+            let reply = self.transport.call(&upload.request(self.id, next)).await?;
+            let problem = match reply.checked() {
+                Ok(reply) => {
+                    let last = upload.last(next);
+                    self.at = self.at.max(last);
+                    self.resent += (next..=last.min(self.answered)).count() as u64;
+                    if last < number {
+                        continue;
+                    }
+                    return answers(&reply);
+                }
+                Err(problem) => problem,
+            };
+            let expected = problem.expected_frame.filter(|&expected| expected < next);
+            let (is_gone, goes_back) = (is_gone(&problem), expected.is_some());
+            // Where every replica loses the session again, this ends with the time for retries.
+            if !(is_gone || goes_back) || !backoff.wait(None).await {
+                return Err(problem.into());
+            }
+            match expected {
+                Some(expected) => self.at = expected.saturating_sub(1),
+                None => self.open_again(problem).await?,
+            }
+        }
+    }
+
+    /// Opens the session again after the service has lost it.
+    async fn open_again(&mut self, lost: Box<Problem>) -> Result<(), ClientError> {
+        let Some(origin) = self.kept.origin() else {
+            return Err(lost.into());
+        };
+        let created = create(&mut self.transport, origin).await?;
+        (self.id, self.at) = (created.id, created.frame);
+        Ok(())
+    }
+
+    fn request_snapshot(&self) -> Request {
+        Request::bare(Method::GET, format!("/sessions/{}/snapshot", self.id))
+    }
+
+    pub async fn snapshot(&mut self) -> Result<Bytes, ClientError> {
+        let reply = self.transport.call(&self.request_snapshot()).await?;
+        match reply.checked() {
+            Ok(reply) => return Ok(reply.body),
+            Err(problem) if is_gone(&problem) => self.open_again(problem).await?,
+            Err(problem) => return Err(problem.into()),
+        }
+        if self.at < self.answered {
+            self.deliver(self.answered).await?;
+        }
+        let reply = self.transport.call(&self.request_snapshot()).await?;
+        Ok(reply.checked()?.body)
+    }
+
+    pub async fn end(mut self) -> Result<(), ClientError> {
+        let request = Request::bare(Method::DELETE, format!("/sessions/{}", self.id));
+        match self.transport.call(&request).await?.checked() {
+            Ok(_) => Ok(()),
+            // It has ended: by itself, or with an answer that got lost.
+            Err(problem) if is_gone(&problem) => Ok(()),
+            Err(problem) => Err(problem.into()),
+        }
+    }
+}
+
+/// Whether the service does not have the session any more.
+fn is_gone(problem: &Problem) -> bool {
+    matches!(problem.status, 404 | 410)
+}

@@ -1,0 +1,98 @@
+//! A session: frames go in, boxes come back.
+
+use crate::answer::{Answer, Rect};
+use crate::error::ClientError;
+use crate::remote::Remote;
+use crate::upload::Upload;
+use bytes::Bytes;
+use uuid::Uuid;
+
+/// Follows targets through frames at a service. It has one frame after the other on its way.
+#[derive(Debug)]
+pub struct Session(Remote);
+
+impl Session {
+    pub(crate) fn new(remote: Remote) -> Self {
+        Self(remote)
+    }
+
+    /// Its id at the service, which changes when the session is opened again.
+    pub fn id(&self) -> Uuid {
+        self.0.id()
+    }
+
+    /// The number of the last frame that was answered; that of the first is 0.
+    pub fn frame(&self) -> u64 {
+        self.0.answered()
+    }
+
+    /// How many frames were sent again after they had been answered, because the service had lost them.
+    pub fn resent(&self) -> u64 {
+        self.0.resent()
+    }
+
+    /// Finds the targets in the next frame: the bytes of a JPEG, PNG or WebP file of the first frame's size.
+    ///
+    /// # Errors
+    /// The service refuses the frame, and the session is as it was; or it gives no answer, and the next call sends the
+    /// frame before its own.
+    pub async fn track(&mut self, frame: impl Into<Bytes>) -> Result<Answer, ClientError> {
+        self.next(vec![frame.into()], None).await
+    }
+
+    /// Sends the next frames in one request. If one is bad, none is taken, and the problem has its `index`.
+    ///
+    /// # Errors
+    /// As [`track`](Self::track).
+    pub async fn track_many<F: Into<Bytes>>(
+        &mut self,
+        frames: impl IntoIterator<Item = F>,
+    ) -> Result<Vec<Answer>, ClientError> {
+        let frames: Vec<Bytes> = frames.into_iter().map(Into::into).collect();
+        if frames.is_empty() {
+            return Ok(Vec::new());
+        }
+        let correction = None;
+        self.0.advance(Upload { frames, correction }).await
+    }
+
+    /// Sends the next frame with the right box of a target in it; targets are counted from 0. The frame may be one that
+    /// was sent before: it counts as the next one.
+    ///
+    /// # Errors
+    /// As [`track`](Self::track).
+    pub async fn correct(
+        &mut self,
+        frame: impl Into<Bytes>,
+        target: usize,
+        rect: Rect,
+    ) -> Result<Answer, ClientError> {
+        self.next(vec![frame.into()], Some((target, rect))).await
+    }
+
+    /// The whole session as bytes, for [`Client::restore`](crate::Client::restore).
+    ///
+    /// # Errors
+    /// The service refuses, or gives no answer.
+    pub async fn snapshot(&mut self) -> Result<Bytes, ClientError> {
+        self.0.snapshot().await
+    }
+
+    /// Ends the session. One that is only dropped expires after a while.
+    ///
+    /// # Errors
+    /// The service refuses, or gives no answer.
+    pub async fn end(self) -> Result<(), ClientError> {
+        self.0.end().await
+    }
+
+    /// Sends a frame.
+    async fn next(
+        &mut self,
+        frames: Vec<Bytes>,
+        correction: Option<(usize, Rect)>,
+    ) -> Result<Answer, ClientError> {
+        let mut answers = self.0.advance(Upload { frames, correction }).await?;
+        Ok(answers.swap_remove(0))
+    }
+}

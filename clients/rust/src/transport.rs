@@ -1,0 +1,168 @@
+//! Requests over HTTP: one that fails for a moment is sent again.
+
+use crate::backoff::Backoff;
+use crate::error::ClientError;
+use crate::problem::Problem;
+use bytes::Bytes;
+use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, RETRY_AFTER};
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, StatusCode, Url};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The media type of a frame.
+pub const FRAME: &str = "application/octet-stream";
+/// The media type of a snapshot.
+pub const SNAPSHOT: &str = "application/vnd.bagtrack.snapshot";
+
+/// Names and values.
+pub type Query = Vec<(&'static str, String)>;
+
+/// A request; it may be sent several times.
+pub struct Request {
+    pub method: Method,
+    /// Below the service's address.
+    pub path: String,
+    pub query: Query,
+    pub body: Body,
+}
+
+impl Request {
+    /// One without settings and body.
+    pub fn bare(method: Method, path: String) -> Self {
+        let (query, body) = (Query::new(), Body::Empty);
+        Self {
+            method,
+            path,
+            query,
+            body,
+        }
+    }
+}
+
+/// What a request carries.
+pub enum Body {
+    Empty,
+    /// Bytes of this media type.
+    Bytes(&'static str, Bytes),
+    /// Several frames.
+    Frames(Vec<Bytes>),
+}
+
+/// The answer to a request.
+pub struct Reply {
+    pub status: StatusCode,
+    pub headers: HeaderMap,
+    pub body: Bytes,
+}
+
+impl Reply {
+    /// The answer, where it is a good one.
+    pub fn checked(self) -> Result<Self, Box<Problem>> {
+        match self.status.is_success() {
+            true => Ok(self),
+            false => Err(Box::new(self.problem())),
+        }
+    }
+
+    fn problem(&self) -> Problem {
+        let seconds = self.headers.get(RETRY_AFTER);
+        let seconds = seconds.and_then(|value| value.to_str().ok()?.parse().ok());
+        Problem::read(self.status, seconds.map(Duration::from_secs), &self.body)
+    }
+
+    /// Whether the same request may succeed later: as the service says, or a proxy before it.
+    fn may_come_again(&self) -> bool {
+        matches!(self.status.as_u16(), 408 | 429 | 502 | 503 | 504)
+    }
+}
+
+/// The service, as one session (or a client) reaches it.
+#[derive(Debug, Clone)]
+pub struct Transport {
+    pub http: reqwest::Client,
+    /// At least one.
+    pub addresses: Arc<[Url]>,
+    /// Which of them is in use.
+    pub used: usize,
+    pub authorization: Option<HeaderValue>,
+    /// The longest time for one request.
+    pub timeout: Duration,
+    /// For how long a request is sent again.
+    pub retry_for: Duration,
+}
+
+impl Transport {
+    /// Goes on at the next address, where there is more than one.
+    pub fn next_address(&mut self) {
+        self.used = (self.used + 1) % self.addresses.len();
+    }
+
+    /// The answer to a request, which is sent again where that may help.
+    pub async fn call(&mut self, request: &Request) -> Result<Reply, ClientError> {
+        let mut backoff = Backoff::new(self.retry_for);
+        // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
+        let mut has_broken = self.retry_for.is_zero();
+        loop {
+            match self.attempt(request).await {
+                Ok(reply) if !reply.may_come_again() => return Ok(reply),
+                Ok(reply) => {
+                    let problem = reply.problem();
+                    if problem.kind() == "not-ready" {
+                        self.next_address();
+                    }
+                    if !backoff.wait(problem.retry_after).await {
+                        return Err(ClientError::Unavailable(Box::new(problem)));
+                    }
+                }
+                Err(error) if error.is_builder() => return Err(error.into()),
+                Err(_) if !has_broken => has_broken = true,
+                Err(error) => {
+                    self.next_address();
+                    if !backoff.wait(None).await {
+                        return Err(error.into());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sends a request once.
+    pub async fn attempt(&self, request: &Request) -> Result<Reply, reqwest::Error> {
+        let mut url = self.addresses[self.used].clone();
+        url.set_path(&format!(
+            "{}{}",
+            url.path().trim_end_matches('/'),
+            request.path
+        ));
+        if !request.query.is_empty() {
+            url.query_pairs_mut().extend_pairs(&request.query);
+        }
+        let mut sent = self.http.request(request.method.clone(), url);
+        sent = sent.timeout(self.timeout);
+        if let Some(authorization) = &self.authorization {
+            sent = sent.header(AUTHORIZATION, authorization);
+        }
+        sent = match &request.body {
+            Body::Empty => sent,
+            Body::Bytes(media_type, bytes) => {
+                sent.header(CONTENT_TYPE, *media_type).body(bytes.clone())
+            }
+            Body::Frames(frames) => sent.multipart(form(frames)),
+        };
+        let answer = sent.send().await?;
+        Ok(Reply {
+            status: answer.status(),
+            headers: answer.headers().clone(),
+            body: answer.bytes().await?,
+        })
+    }
+}
+
+fn form(frames: &[Bytes]) -> Form {
+    frames.iter().fold(Form::new(), |form, frame| {
+        let length = frame.len() as u64;
+        let part = Part::stream_with_length(frame.clone(), length);
+        form.part("frame", part.file_name("frame"))
+    })
+}

@@ -1,0 +1,71 @@
+//! What is sent in one request, and what opens a session.
+
+use crate::answer::Rect;
+use crate::transport::{Body, FRAME, Query, Request};
+use bytes::Bytes;
+use reqwest::Method;
+use uuid::Uuid;
+
+/// Frames of a session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Upload {
+    /// At least one.
+    pub frames: Vec<Bytes>,
+    /// With one frame: a target, and its right box.
+    pub correction: Option<(usize, Rect)>,
+}
+
+impl Upload {
+    /// The number of its last frame, where its first has this one.
+    pub fn last(&self, first: u64) -> u64 {
+        first + self.frames.len() as u64 - 1
+    }
+
+    /// The request that sends it with these numbers.
+    pub fn request(&self, id: Uuid, number: u64) -> Request {
+        let mut query: Query = vec![("frame", number.to_string())];
+        let (method, path) = match self.correction {
+            None => (Method::POST, "frames"),
+            Some((target, rect)) => {
+                query.push(("box", rect.to_string()));
+                query.push(("target", target.to_string()));
+                (Method::PUT, "target")
+            }
+        };
+        let body = match &self.frames[..] {
+            [frame] => Body::Bytes(FRAME, frame.clone()),
+            frames => Body::Frames(frames.to_vec()),
+        };
+        let path = format!("/sessions/{id}/{path}");
+        Request {
+            method,
+            path,
+            query,
+            body,
+        }
+    }
+}
+
+/// What opens a session: a first frame with its settings, or a snapshot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// The frame that the session stands at then.
+    pub frame: u64,
+    pub query: Query,
+    pub media_type: &'static str,
+    pub body: Bytes,
+}
+
+impl Origin {
+    /// The request that opens a session with this id; its answer has the parameters.
+    pub fn request(&self, id: Uuid) -> Request {
+        let mut query = self.query.clone();
+        query.push(("verbose", "true".to_owned()));
+        Request {
+            method: Method::PUT,
+            path: format!("/sessions/{id}"),
+            query,
+            body: Body::Bytes(self.media_type, self.body.clone()),
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! What the clients upload: real videos where they are, else the project's sample clip.
+
+use bagtrack::sample::{Clip as Sample, Settings};
+use image::ImageFormat;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+/// The files of a video, and the first box.
+#[derive(Clone)]
+pub struct Clip {
+    pub frames: Vec<Vec<u8>>,
+    pub first_box: String,
+}
+
+impl Clip {
+    /// The clip of a client, with so many frames.
+    pub fn of(client: usize, frames: usize) -> Self {
+        match std::env::var_os("BAGTRACK_SEQUENCES") {
+            Some(root) => Self::video(&PathBuf::from(root), client, frames),
+            None => Self::sample(client, frames),
+        }
+    }
+
+    fn video(root: &Path, client: usize, frames: usize) -> Self {
+        let folders = std::fs::read_dir(root).expect("BAGTRACK_SEQUENCES names a folder");
+        let mut folders: Vec<PathBuf> = folders
+            .map(|entry| entry.expect("a readable folder").path())
+            .filter(|path| path.join("groundtruth_rect.txt").is_file())
+            .collect();
+        folders.sort();
+        let folder = &folders[client % folders.len()];
+        let entries = std::fs::read_dir(folder.join("img")).expect("a folder of frames");
+        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        let text = std::fs::read_to_string(folder.join("groundtruth_rect.txt")).unwrap();
+        let line = text.lines().next().expect("a first box");
+        let numbers = line.split([',', '\t', ' ']).filter(|text| !text.is_empty());
+        let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+        Self {
+            frames: paths
+                .iter()
+                .take(frames)
+                .map(|path| std::fs::read(path).unwrap())
+                .collect(),
+            first_box: format!(
+                "{},{},{},{}",
+                numbers[0] - 1.0,
+                numbers[1] - 1.0,
+                numbers[2],
+                numbers[3]
+            ),
+        }
+    }
+
+    fn sample(client: usize, frames: usize) -> Self {
+        let sample = Sample::new(Settings {
+            frames: u32::try_from(frames).unwrap().max(200),
+            seed: client as u64 % 3,
+            ..Settings::default()
+        })
+        .expect("a clip");
+        let target = sample.target(0);
+        let encode = |index: u32| {
+            let mut bytes = Cursor::new(Vec::new());
+            let picture = sample.draw(index);
+            picture.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+            bytes.into_inner()
+        };
+        Self {
+            frames: (0..u32::try_from(frames).unwrap()).map(encode).collect(),
+            first_box: format!(
+                "{},{},{},{}",
+                target.x, target.y, target.width, target.height
+            ),
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Several replicas of the program, and a Redis that they share.
+
+mod addresses;
+mod balancers;
+mod chaos;
+mod clip;
+mod failures;
+mod lossy;
+mod pair;
+mod prefix;
+mod replica;
+mod server;
+mod sharing;
+mod stream_client;
+mod streams;
+mod tracking_client;

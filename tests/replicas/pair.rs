@@ -1,0 +1,83 @@
+//! Two replicas, and a session of theirs.
+
+use crate::clip::Clip;
+use crate::replica::Replica;
+use crate::server::Redis;
+use crate::tracking_client::{Answer, Track};
+use reqwest::{Client, Response, StatusCode};
+use serde_json::Value;
+use uuid::Uuid;
+
+/// The body of an answer that has this status.
+pub async fn json(response: Response, status: StatusCode) -> Value {
+    let got = response.status();
+    let text = response.text().await.unwrap();
+    assert_eq!(got, status, "{text}");
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+pub struct Pair {
+    pub redis: Redis,
+    pub replicas: [Replica; 2],
+    pub client: Client,
+    pub clip: Clip,
+    pub id: Uuid,
+}
+
+impl Pair {
+    /// Two replicas, and a session that was opened at the first.
+    pub async fn open(flags: &[&str], frames: usize) -> Self {
+        let redis = Redis::start();
+        let replica = || Replica::with_store(&redis.url(), flags);
+        let pair = Self {
+            replicas: [replica(), replica()],
+            redis,
+            client: Client::new(),
+            clip: Clip::of(0, frames),
+            id: Uuid::new_v4(),
+        };
+        json(pair.put(0, 7).await, StatusCode::CREATED).await;
+        pair
+    }
+
+    /// The answers of a service without a store.
+    pub async fn undisturbed(&self) -> Vec<Answer> {
+        let alone = Replica::start(&[]);
+        let track = Track::open(alone.url(""), Client::new(), 7, self.clip.clone());
+        track.await.follow().await
+    }
+
+    pub fn url(&self, replica: usize, rest: &str) -> String {
+        self.replicas[replica].url(&format!("/sessions/{}{rest}", self.id))
+    }
+
+    pub async fn put(&self, replica: usize, seed: u64) -> Response {
+        let query = format!("?box={}&seed={seed}", self.clip.first_box);
+        let request = self.client.put(self.url(replica, &query));
+        let request = request.body(self.clip.frames[0].clone());
+        request.send().await.unwrap()
+    }
+
+    pub async fn post(&self, replica: usize, number: usize) -> Response {
+        self.post_as(replica, number, number).await
+    }
+
+    /// The frame `file` under this number.
+    pub async fn post_as(&self, replica: usize, number: usize, file: usize) -> Response {
+        let url = self.url(replica, &format!("/frames?frame={number}"));
+        let request = self.client.post(url).body(self.clip.frames[file].clone());
+        request.send().await.unwrap()
+    }
+
+    /// A frame without a number.
+    pub async fn post_unnumbered(&self, replica: usize, file: usize) -> Response {
+        let request = self.client.post(self.url(replica, "/frames"));
+        let request = request.body(self.clip.frames[file].clone());
+        request.send().await.unwrap()
+    }
+
+    /// The session as a replica tells it.
+    pub async fn view(&self, replica: usize) -> Response {
+        self.client.get(self.url(replica, "")).send().await.unwrap()
+    }
+}

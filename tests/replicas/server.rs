@@ -1,0 +1,87 @@
+//! Other programs that the tests start: on free ports, with their files in a folder that goes with them.
+
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use tempfile::TempDir;
+
+/// A port that is free now.
+pub fn free_port() -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    listener.local_addr().expect("it is bound").port()
+}
+
+/// Waits until something listens.
+pub fn wait_for(address: SocketAddr, process: &mut Child) {
+    while TcpStream::connect(address).is_err() {
+        if let Some(status) = process.try_wait().expect("it was started") {
+            panic!("the program at {address} has ended: {status}");
+        }
+        std::thread::yield_now();
+    }
+}
+
+/// A process that ends with the test.
+pub struct Process(pub Child);
+
+impl Process {
+    pub fn start(command: &mut Command) -> Self {
+        let started = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        Self(started.unwrap_or_else(|error| panic!("{command:?}: {error}")))
+    }
+
+    /// `kill -9`.
+    pub fn kill(&mut self) {
+        self.0.kill().expect("it was started");
+        self.0.wait().expect("it was started");
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A Redis with an append-only file, written before each answer.
+pub struct Redis {
+    process: Process,
+    folder: TempDir,
+    pub address: SocketAddr,
+}
+
+impl Redis {
+    pub fn start() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
+        let process = Self::process(folder.path(), address);
+        Self {
+            process,
+            folder,
+            address,
+        }
+    }
+
+    fn process(folder: &Path, address: SocketAddr) -> Process {
+        let mut command = Command::new("redis-server");
+        command.current_dir(folder).args(["--bind", "127.0.0.1"]);
+        command.args(["--port", &address.port().to_string(), "--save", ""]);
+        command.args(["--appendonly", "yes", "--appendfsync", "always"]);
+        let mut process = Process::start(&mut command);
+        wait_for(address, &mut process.0);
+        process
+    }
+
+    pub fn url(&self) -> String {
+        format!("redis://{}", self.address)
+    }
+
+    pub fn stop(&mut self) {
+        self.process.kill();
+    }
+
+    pub fn start_again(&mut self) {
+        self.process = Self::process(self.folder.path(), self.address);
+    }
+}

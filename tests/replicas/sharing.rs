@@ -1,0 +1,221 @@
+//! What replicas do with one session between them, while nothing fails.
+
+use crate::clip::Clip;
+use crate::pair::{Pair, json};
+use crate::replica::Replica;
+use crate::server::Redis;
+use reqwest::{Client, StatusCode};
+use serde_json::Value;
+use uuid::Uuid;
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
+    let pair = Pair::open(&[], 20).await;
+    let expected = pair.undisturbed().await;
+    for number in 1..20 {
+        let answer = pair.post(number % 2, number).await;
+        assert_eq!(answer.headers()["checkpoint"], number.to_string().as_str());
+        assert!(!answer.headers().contains_key("durable"));
+        let answer = json(answer, StatusCode::OK).await;
+        assert_eq!(answer, expected[number - 1]);
+        // Sent again to the other one, which has not seen it.
+        let again = pair.post((number + 1) % 2, number).await;
+        assert_eq!(again.headers()["replayed"], "true");
+        assert_eq!(json(again, StatusCode::OK).await, answer);
+    }
+    for replica in 0..2 {
+        let view = pair.view(replica).await;
+        assert_eq!(json(view, StatusCode::OK).await["frames"], 20);
+    }
+    let early = json(pair.post(0, 30 - 12).await, StatusCode::CONFLICT).await;
+    assert_eq!(early["expected_frame"], 20);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn of_two_frames_with_one_number_one_wins_and_the_other_is_told_the_next_number() {
+    let pair = Pair::open(&[], 30).await;
+    for number in 1..15 {
+        let (first, second) = tokio::join!(
+            pair.post_as(0, number, number),
+            pair.post_as(1, number, 29 - number)
+        );
+        let mut won = 0;
+        for answer in [first, second] {
+            match answer.status() {
+                StatusCode::OK => won += 1,
+                StatusCode::CONFLICT => {
+                    let problem: Value = answer.json().await.unwrap();
+                    assert_eq!(problem["expected_frame"], number + 1, "{problem}");
+                }
+                status => panic!("{status}: {}", answer.text().await.unwrap()),
+            }
+        }
+        assert_eq!(won, 1, "frame {number}");
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
+    let pair = Pair::open(&[], 3).await;
+    for number in 1..7 {
+        let answer = json(pair.post_unnumbered(number % 2, 1).await, StatusCode::OK);
+        assert_eq!(answer.await["frame"], number);
+    }
+    let posts = (0..6).map(|n| pair.post_unnumbered(n % 2, 1));
+    let mut numbers = Vec::new();
+    for answer in futures_util::future::join_all(posts).await {
+        match answer.status() {
+            StatusCode::OK => {
+                let answer = json(answer, StatusCode::OK).await;
+                numbers.push(answer["frame"].as_u64().unwrap());
+            }
+            _ => {
+                let problem = json(answer, StatusCode::CONFLICT).await;
+                assert_eq!(problem["type"], "urn:bagtrack:problem:not-in-order");
+            }
+        }
+    }
+    numbers.sort_unstable();
+    let last = *numbers.last().expect("one of them is taken");
+    assert_eq!(numbers, (7..=last).collect::<Vec<_>>());
+    for replica in 0..2 {
+        let view = json(pair.view(replica).await, StatusCode::OK).await;
+        assert_eq!(view["frames"], last + 1);
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn an_early_frame_waits_for_those_that_go_to_the_other_replica() {
+    let pair = Pair::open(&[], 12).await;
+    let expected = pair.undisturbed().await;
+    for first in [1, 4, 7] {
+        let (third, second, first_answer) = tokio::join!(
+            pair.post(0, first + 2),
+            async {
+                // The third is at its replica by then, or comes in time.
+                json(pair.view(1).await, StatusCode::OK).await;
+                pair.post(1, first + 1).await
+            },
+            async {
+                json(pair.view(0).await, StatusCode::OK).await;
+                json(pair.view(1).await, StatusCode::OK).await;
+                pair.post(first % 2, first).await
+            }
+        );
+        for (number, answer) in [
+            (first, first_answer),
+            (first + 1, second),
+            (first + 2, third),
+        ] {
+            let answer = json(answer, StatusCode::OK).await;
+            assert_eq!(answer, expected[number - 1]);
+        }
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_refused_frame_does_not_keep_a_session_in_the_store() {
+    let pair = Pair::open(&["--session-first", "3s", "--session-idle", "3s"], 3).await;
+    let opened = std::time::Instant::now();
+    let refused = |replica: usize| {
+        let request = pair.client.post(pair.url(replica, "/frames?frame=9"));
+        request.body(pair.clip.frames[1].clone()).send()
+    };
+    let mut count = 0;
+    let gone = loop {
+        let answer = refused(count % 2).await.unwrap();
+        count += 1;
+        match answer.status() {
+            StatusCode::CONFLICT => assert!(opened.elapsed().as_secs() < 10, "it lives on"),
+            status => break status,
+        }
+    };
+    assert!(count > 1);
+    assert!(
+        matches!(gone, StatusCode::GONE | StatusCode::NOT_FOUND),
+        "{gone}"
+    );
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_session_is_opened_once_and_ended_everywhere() {
+    let pair = Pair::open(&[], 3).await;
+    let first = pair.put(0, 7).await.text().await.unwrap();
+    let again = pair.put(1, 7).await;
+    assert_eq!(again.status(), StatusCode::CREATED);
+    assert_eq!(again.headers()["replayed"], "true");
+    assert_eq!(again.headers()["checkpoint"], "0");
+    assert_eq!(again.text().await.unwrap(), first);
+    let other = json(pair.put(1, 8).await, StatusCode::CONFLICT).await;
+    assert_eq!(other["type"], "urn:bagtrack:problem:session-exists");
+
+    let keyed = async |replica: usize| {
+        let query = format!("/sessions?box={}", pair.clip.first_box);
+        let request = pair.client.post(pair.replicas[replica].url(&query));
+        let request = request.header("idempotency-key", "a-key");
+        let request = request.body(pair.clip.frames[0].clone());
+        json(request.send().await.unwrap(), StatusCode::CREATED).await
+    };
+    assert_eq!(keyed(0).await, keyed(1).await);
+
+    json(pair.post(1, 1).await, StatusCode::OK).await;
+    let delete = pair.client.delete(pair.url(1, "")).send().await.unwrap();
+    assert_eq!(delete.status(), StatusCode::NO_CONTENT);
+    for replica in 0..2 {
+        json(pair.post(replica, 2).await, StatusCode::NOT_FOUND).await;
+        json(pair.view(replica).await, StatusCode::NOT_FOUND).await;
+    }
+    // Another session under the same id is not mistaken for the first.
+    json(pair.put(0, 9).await, StatusCode::CREATED).await;
+    json(pair.post(1, 1).await, StatusCode::OK).await;
+    json(pair.post(0, 2).await, StatusCode::OK).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn sessions_belong_to_their_keys_at_every_replica_and_expire_everywhere() {
+    let redis = Redis::start();
+    let flags = [
+        "--api-keys",
+        "ann:0123456789abcdef,ben:fedcba9876543210",
+        "--session-first",
+        "300ms",
+    ];
+    let replica = || Replica::with_store(&redis.url(), &flags);
+    let (first, second) = (replica(), replica());
+    let (client, clip, id) = (Client::new(), Clip::of(0, 2), Uuid::new_v4());
+    let query = format!("/sessions/{id}?box={}", clip.first_box);
+    let request = client
+        .put(first.url(&query))
+        .bearer_auth("0123456789abcdef");
+    let opened = request.body(clip.frames[0].clone()).send().await.unwrap();
+    json(opened, StatusCode::CREATED).await;
+    let view = |key: &str| {
+        client
+            .get(second.url(&format!("/sessions/{id}")))
+            .bearer_auth(key)
+            .send()
+    };
+    json(
+        view("fedcba9876543210").await.unwrap(),
+        StatusCode::NOT_FOUND,
+    )
+    .await;
+    json(view("0123456789abcdef").await.unwrap(), StatusCode::OK).await;
+    let gone = loop {
+        let answer = view("0123456789abcdef").await.unwrap();
+        if answer.status() != StatusCode::OK {
+            break answer.status();
+        }
+    };
+    assert!(
+        matches!(gone, StatusCode::GONE | StatusCode::NOT_FOUND),
+        "{gone}"
+    );
+}

@@ -1,0 +1,144 @@
+//! Streams of a session at several replicas.
+
+use crate::pair::{Pair, json};
+use crate::stream_client::StreamClient;
+use reqwest::StatusCode;
+use serde_json::Value;
+use uuid::Uuid;
+
+/// The replica to which a stream went that a newer one replaced.
+const REPLACED: u16 = 4409;
+
+fn answer_of(message: &Value) -> Value {
+    let mut answer = message.clone();
+    let fields = answer.as_object_mut().expect("an answer");
+    fields.retain(|name, _| !matches!(name.as_str(), "checkpoint" | "replayed"));
+    answer
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more() {
+    let pair = Pair::open(&[], 20).await;
+    let expected = pair.undisturbed().await;
+    let frames = &pair.clip.frames;
+    let mut old = StreamClient::open(pair.replicas[0].address, pair.id, "").await;
+    assert_eq!(old.next, 1);
+    for number in 1..6 {
+        let answer = old.track(&frames[number]).await;
+        assert_eq!(answer["checkpoint"], number, "{answer}");
+        assert!(answer.get("durable").is_none());
+        assert_eq!(answer_of(&answer), expected[number - 1]);
+    }
+    // A client whose line broke before it had the answers to frames 3 to 5.
+    let mut new = StreamClient::open(pair.replicas[1].address, pair.id, "?from=3").await;
+    assert_eq!(new.next, 6);
+    for number in 3..6 {
+        let answer = new.message().await;
+        assert_eq!(answer["replayed"], true);
+        assert_eq!(answer["checkpoint"], 5);
+        assert_eq!(answer_of(&answer), expected[number - 1]);
+    }
+    // What comes over the old line is not tracked.
+    old.send(&frames[6]).await;
+    assert_eq!(old.receive().await, Err(REPLACED));
+    for number in 6..12 {
+        let answer = new.track(&frames[number]).await;
+        assert_eq!(answer_of(&answer), expected[number - 1]);
+    }
+    // Posts and a third stream go on from there.
+    let posted = json(pair.post(0, 12).await, StatusCode::OK).await;
+    assert_eq!(posted, expected[11]);
+    let answer = new.track(&frames[13]).await;
+    assert_eq!(answer_of(&answer), expected[12]);
+    let mut third = StreamClient::open(pair.replicas[0].address, pair.id, "?from=13").await;
+    assert_eq!(third.next, 14);
+    assert_eq!(answer_of(&third.message().await), expected[12]);
+    assert_eq!(answer_of(&third.track(&frames[14]).await), expected[13]);
+    let view = json(pair.view(1).await, StatusCode::OK).await;
+    assert_eq!(view["frames"], 15);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_frame_of_a_stream_waits_while_the_store_is_away() {
+    let mut pair = Pair::open(&[], 10).await;
+    let expected = pair.undisturbed().await;
+    let address = pair.replicas[0].address;
+    let mut stream = StreamClient::open(address, pair.id, "").await;
+    for number in 1..10 {
+        if number % 3 == 0 {
+            pair.redis.stop();
+            stream.send(&pair.clip.frames[number]).await;
+            while pair.replicas[0].readiness().await == StatusCode::OK {}
+            pair.redis.start_again();
+        } else {
+            stream.send(&pair.clip.frames[number]).await;
+        }
+        let answer = stream.message().await;
+        assert_eq!(answer["checkpoint"], number, "{answer}");
+        assert_eq!(answer_of(&answer), expected[number - 1]);
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn with_best_effort_answers_of_a_stream_say_what_is_not_durable() {
+    // A busy machine is no store that is away; one that has ended is so at once.
+    let flags = ["--store-mode", "best-effort", "--store-timeout", "3s"];
+    let mut pair = Pair::open(&flags, 4).await;
+    let mut stream = StreamClient::open(pair.replicas[0].address, pair.id, "").await;
+    assert_eq!(stream.track(&pair.clip.frames[1]).await["checkpoint"], 1);
+    pair.redis.stop();
+    let answer = stream.track(&pair.clip.frames[2]).await;
+    assert_eq!(answer["frame"], 2, "{answer}");
+    assert_eq!(answer["durable"], false);
+    assert_eq!(answer["checkpoint"], 1);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_stream() {
+    let flags = ["--ping-interval", "1s"];
+    let pair = Pair::open(&flags, 2).await;
+    let open = async |replica: usize| {
+        StreamClient::open(pair.replicas[replica].address, pair.id, "").await
+    };
+    let mut old = open(0).await;
+    let mut new = open(1).await;
+    // Both answer pings meanwhile.
+    tokio::select! {
+        end = old.receive() => assert_eq!(end, Err(REPLACED)),
+        end = new.receive() => panic!("{end:?}"),
+    }
+    let mut other = open(0).await;
+    tokio::select! {
+        end = new.receive() => assert_eq!(end, Err(REPLACED)),
+        end = other.receive() => panic!("{end:?}"),
+    }
+    let deleted = pair.client.delete(pair.url(1, "")).send().await.unwrap();
+    assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
+    let problem = other.message().await;
+    assert_eq!(problem["type"], "urn:bagtrack:problem:session-not-found");
+    assert_eq!(other.receive().await, Err(4404));
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn the_picture_of_the_bag_is_the_same_at_both_replicas() {
+    let pair = Pair::open(&[], 6).await;
+    for number in 1..6 {
+        json(pair.post(0, number).await, StatusCode::OK).await;
+    }
+    let mut pictures = Vec::new();
+    for replica in 0..2 {
+        let answer = pair.client.get(pair.url(replica, "/bag.png")).send().await;
+        let answer = answer.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK);
+        pictures.push(answer.bytes().await.unwrap());
+    }
+    assert_eq!(pictures[0], pictures[1]);
+    let unknown = pair.replicas[1].url(&format!("/sessions/{}/bag.png", Uuid::new_v4()));
+    let unknown = pair.client.get(unknown).send().await.unwrap();
+    json(unknown, StatusCode::NOT_FOUND).await;
+}
