@@ -1,6 +1,6 @@
 // Drawing a box: by mouse, finger, pen or keyboard.
 
-/** @typedef {import("./api.js").Box} Box */
+/** @typedef {import("./js/bagtrack.js").Box} Box */
 
 /** Least side of a box in pixels of the frame. */
 const LEAST = 6;

@@ -38,7 +38,7 @@ export class SampleClip {
 
   async first() {
     const first = this.fetch(0);
-    const clip = await (await fetch(`/sample/${this.name}/clip.json`)).json();
+    const clip = await (await fetch(`./sample/${this.name}/clip.json`)).json();
     this.frames = clip.truth.length;
     return first;
   }
@@ -50,7 +50,7 @@ export class SampleClip {
   async load(index) {
     for (let attempt = 1; ; attempt += 1) {
       try {
-        const response = await fetch(`/sample/${this.name}/${index}.jpg`);
+        const response = await fetch(`./sample/${this.name}/${index}.jpg`);
         if (!response.ok) throw new Error("The sample clip cannot be loaded.");
         const blob = await response.blob();
         return { blob, bitmap: await createImageBitmap(blob), time: index / FRAMES_A_SECOND };

@@ -1,9 +1,9 @@
 // The page: what the buttons do, and what is shown.
 
-import { Problem, readBag, useKey } from "./api.js";
 import { BoxDrawing } from "./box.js";
 import { Chart, showVotes } from "./chart.js";
 import { SampleClip } from "./clip.js";
+import { Client, Problem } from "./js/bagtrack.js";
 import { words } from "./problems.js";
 import { Run } from "./run.js";
 import { asCsv, asJson, Recording, save } from "./save.js";
@@ -22,6 +22,8 @@ const stage = new Stage(picture);
 const chart = new Chart(/** @type {HTMLCanvasElement} */ (get("chart")));
 const see = /** @type {HTMLInputElement} */ (get("see"));
 const record = /** @type {HTMLInputElement} */ (get("record"));
+/** What fails for longer is said. */
+const client = new Client(new URL(".", location.href), { patience: 1500 });
 const DRAW = "Draw a box around what to follow.";
 
 /** @type {Run | undefined} */
@@ -68,7 +70,7 @@ async function choose(open) {
     const source = await open();
     const first = await source.first();
     if (own !== choice) return source.stop();
-    run = new Run(source, first, { answer: answered, fail, line, end: ended });
+    run = new Run(client, source, first, { answer: answered, fail, line, end: ended });
     run.sees = see.checked;
     for (const id of ["stage", "keys", "controls"]) get(id).hidden = false;
     for (const id of ["figures", "curve", "results", "seen"]) get(id).hidden = true;
@@ -103,7 +105,7 @@ new BoxDrawing(picture, {
 
 /**
  * @param {Run} own
- * @param {import("./api.js").Box} box
+ * @param {import("./js/bagtrack.js").Box} box
  */
 async function follow(own, box) {
   isFollowing = true;
@@ -141,7 +143,7 @@ function answered(shown, answer) {
   set("skipped", String(run.skipped));
   if (answer.votes) {
     get("seen").hidden = false;
-    showBag(run.id);
+    showBag(run);
     showVotes(/** @type {HTMLCanvasElement} */ (get("votes")), answer.votes);
     if (answer.status !== "lost") stage.copyPatch(/** @type {HTMLCanvasElement} */ (get("patch")), answer.box);
   }
@@ -155,13 +157,13 @@ function answered(shown, answer) {
 let bagShownAt = 0;
 
 /** Shows the bag, at most every two seconds.
- * @param {string} id */
-async function showBag(id) {
+ * @param {Run} own */
+async function showBag(own) {
   const now = performance.now();
   if (now - bagShownAt < 2000) return;
   bagShownAt = now;
   // The session may end meanwhile; then the last picture stays.
-  const blob = await readBag(id).catch(() => undefined);
+  const blob = await own.session?.bag().catch(() => undefined);
   const shown = /** @type {HTMLImageElement} */ (get("bag"));
   if (!blob) return;
   if (shown.src) URL.revokeObjectURL(shown.src);
@@ -217,7 +219,7 @@ see.addEventListener("change", () => {
 });
 get("key-form").addEventListener("submit", (event) => {
   event.preventDefault();
-  useKey(/** @type {HTMLInputElement} */ (get("key")).value);
+  client.key = /** @type {HTMLInputElement} */ (get("key")).value;
   get("key-form").hidden = true;
   say("");
   again?.();
@@ -226,4 +228,4 @@ get("save-csv").addEventListener("click", () => run && save(asCsv(run.rows), "bo
 get("save-json").addEventListener("click", () => run && save(asJson(run.rows), "boxes.json"));
 get("save-video").addEventListener("click", async () => recording && save(await recording.finish(), "boxes.webm"));
 if (!Recording.isPossible()) record.disabled = true;
-for (const host of document.querySelectorAll(".host")) host.textContent = location.origin;
+for (const host of document.querySelectorAll(".host")) host.textContent = new URL(".", location.href).href.slice(0, -1);

@@ -1,12 +1,9 @@
 // One run: a source of frames, its session, and what the service answers.
 
-import { endSession, openSession } from "./api.js";
-import { FrameStream } from "./stream.js";
-
 /**
- * @typedef {import("./api.js").Box} Box
+ * @typedef {import("./js/bagtrack.js").Box} Box
  * @typedef {import("./clip.js").Picture} Picture
- * @typedef {import("./stream.js").Answer} Answer
+ * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
  *
  * @typedef {object} Row What is known of one tracked frame.
  * @property {number} frame Its number in the session.
@@ -30,11 +27,13 @@ const RATE_OVER = 30;
 
 export class Run {
   /**
+   * @param {import("./js/bagtrack.js").Client} client
    * @param {import("./clip.js").Source} source
    * @param {Picture} picture The first one.
    * @param {Told} told
    */
-  constructor(source, picture, told) {
+  constructor(client, source, picture, told) {
+    this.client = client;
     this.source = source;
     this.told = told;
     /** The picture that was answered last. */
@@ -49,27 +48,26 @@ export class Run {
     this.isPaused = false;
     this.isOver = false;
     this.hasAll = false;
-    this.id = "";
+    /** Frames without an answer. */
+    this.underWay = 0;
+    /** @type {import("./js/bagtrack.js").Session | undefined} */
+    this.session = undefined;
     /** @type {Box | undefined} A box that was drawn, until the frames on their way are answered. */
     this.drawn = undefined;
-    /** @type {FrameStream | undefined} */
+    /** @type {import("./js/bagtrack.js").FrameStream | undefined} */
     this.stream = undefined;
   }
 
   /** Opens the session with the box in the first frame, and begins.
    * @param {Box} box */
   async begin(box) {
-    const created = await openSession(this.picture.blob, box);
-    this.id = created.id;
-    if (this.isOver) return void endSession(this.id);
-    this.note({ frame: 0, box: created.box, score: 1, status: "tracking" }, this.picture, true);
-    this.stream = new FrameStream(created.id, this.source.isLive, {
-      answer: (answer, sent) => this.answered(answer, sent),
-      skip: (sent) => this.skip(sent.what),
-      fail: (problem) => this.fail(problem),
-      line: (isUp) => this.told.line(isUp),
-    });
-    await this.stream.open();
+    const session = await this.client.open(this.picture.blob, box);
+    this.session = session;
+    if (this.isOver) return this.endSession();
+    this.note({ frame: 0, box: session.box, score: 1, status: "tracking" }, this.picture, true);
+    const onLine = (/** @type {boolean} */ isUp) => this.told.line(isUp);
+    this.stream = session.stream({ live: this.source.isLive, window: WINDOW, patience: Infinity, onLine });
+    this.stream.ended.then((problem) => problem && this.fail(problem));
     const started = this.source.start(
       (picture) => this.deliver(picture),
       () => {
@@ -82,12 +80,27 @@ export class Run {
 
   /** @param {Picture} picture */
   deliver(picture) {
-    const stream = this.stream;
-    if (!stream || this.isPaused || this.drawn || stream.unanswered.length >= WINDOW) {
-      if (this.source.isLive) return this.skip(picture);
-    }
-    stream?.send({ blob: picture.blob, at: performance.now(), see: this.sees, what: picture });
+    const isFull = this.isPaused || this.drawn || this.underWay >= WINDOW;
+    if (isFull && this.source.isLive) return this.skip(picture);
+    this.send(picture, { see: this.sees });
     this.throttle();
+  }
+
+  /**
+   * @param {Picture} picture
+   * @param {{box?: Box, see?: boolean}} header
+   */
+  async send(picture, header) {
+    const at = performance.now();
+    this.underWay += 1;
+    try {
+      const answer = await this.stream?.track(picture.blob, header);
+      this.underWay -= 1;
+      if (answer) this.answered(answer, picture, at, header.box !== undefined);
+      else this.skip(picture);
+    } catch (problem) {
+      this.fail(problem);
+    }
   }
 
   /** @param {Picture} picture */
@@ -97,20 +110,21 @@ export class Run {
   }
 
   throttle() {
-    const waiting = this.stream?.unanswered.length ?? 0;
-    this.source.hold(this.isPaused || this.drawn !== undefined || waiting >= WINDOW);
+    this.source.hold(this.isPaused || this.drawn !== undefined || this.underWay >= WINDOW);
   }
 
   /**
    * @param {Answer} answer
-   * @param {import("./stream.js").Sent} sent
+   * @param {Picture} picture
+   * @param {number} at When it was sent, in milliseconds.
+   * @param {boolean} corrected
    */
-  answered(answer, sent) {
+  answered(answer, picture, at, corrected) {
     const now = performance.now();
-    this.trip = now - sent.at;
+    this.trip = now - at;
     this.answeredAt = [...this.answeredAt, now].slice(-RATE_OVER);
-    this.picture = sent.what;
-    this.note(answer, sent.what, sent.box !== undefined);
+    this.picture = picture;
+    this.note(answer, picture, corrected);
     this.sendDrawn();
     this.checkEnd();
   }
@@ -147,20 +161,21 @@ export class Run {
   }
 
   sendDrawn() {
-    const { stream, drawn: box, picture } = this;
-    if (box && stream?.unanswered.length === 0) {
+    const { drawn: box, picture } = this;
+    if (box && this.underWay === 0) {
       this.drawn = undefined;
-      stream.send({ blob: picture.blob, box, at: performance.now(), what: picture });
+      this.send(picture, { box });
     }
     this.throttle();
   }
 
   checkEnd() {
-    if (this.hasAll && this.stream?.unanswered.length === 0) this.told.end();
+    if (this.hasAll && this.underWay === 0) this.told.end();
   }
 
   /** @param {unknown} error */
   fail(error) {
+    if (this.isOver) return;
     this.stop();
     this.told.fail(error);
   }
@@ -169,7 +184,12 @@ export class Run {
     if (this.isOver) return;
     this.isOver = true;
     this.source.stop();
-    this.stream?.end();
-    if (this.id) endSession(this.id);
+    this.stream?.close();
+    this.endSession();
+  }
+
+  endSession() {
+    // One that cannot be ended expires.
+    this.session?.end().catch(() => undefined);
   }
 }

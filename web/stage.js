@@ -1,6 +1,6 @@
 // The picture with its box and particles.
 
-/** @typedef {import("./api.js").Box} Box */
+/** @typedef {import("./js/bagtrack.js").Box} Box */
 
 /** @type {Record<string, string>} Visible on any picture, together with the dark line around them. */
 const COLORS = { tracking: "#3ddc97", uncertain: "#ffc24b", lost: "#ff6b5e", drawn: "#ffffff" };
@@ -12,7 +12,7 @@ export class Stage {
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     /** @type {ImageBitmap | undefined} The picture that is shown. */
     this.bitmap = undefined;
-    /** @type {import("./stream.js").Answer | undefined} */
+    /** @type {import("./js/bagtrack.js").StreamAnswer | undefined} */
     this.answer = undefined;
     /** @type {Box | undefined} The box that is being drawn. */
     this.drawn = undefined;
@@ -20,7 +20,7 @@ export class Stage {
 
   /**
    * @param {ImageBitmap} bitmap
-   * @param {import("./stream.js").Answer} [answer]
+   * @param {import("./js/bagtrack.js").StreamAnswer} [answer]
    */
   show(bitmap, answer) {
     if (this.bitmap !== bitmap) this.bitmap?.close();

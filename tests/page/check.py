@@ -6,12 +6,18 @@ Needs the packages playwright and axe-playwright-python from PyPI, and chromium.
 """
 
 import argparse
+import contextlib
 import csv
+import functools
+import http.server
 import io
 import json
 import pathlib
+import re
 import tempfile
+import threading
 import time
+import urllib.parse
 
 import axe_playwright_python
 from playwright.sync_api import sync_playwright
@@ -24,6 +30,7 @@ FRAMES_A_SECOND = 25
 TO_THE_END = 60_000
 DRAW = "Draw a box around what to follow"
 WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
+EXAMPLES = WEB.parent / "clients" / "js" / "examples"
 
 
 class Checks:
@@ -59,7 +66,7 @@ class Checks:
         own = ("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:")
         page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))
         if self.from_disk:
-            page.route("**/page/*", lambda route: route.fulfill(path=WEB / route.request.url.split("/")[-1]))
+            page.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
             page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
         page.goto(url + "/")
         said(page, "Nothing is uploaded")
@@ -74,6 +81,12 @@ class Checks:
         found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
         told = [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in found]
         assert not told, f"{where}: {told}"
+
+
+def on_disk(url):
+    """A file of the page, or of the client that it uses."""
+    path = url.split("/page/")[1]
+    return (WEB.parent / "clients" if path.startswith("js/") else WEB) / path
 
 
 def said(page, text):
@@ -150,10 +163,13 @@ def near(table, truth):
 
 def opened(page, start):
     """What the session was opened with: its box and its seed."""
-    with page.expect_response(lambda response: "/sessions?box=" in response.url) as response:
+    with page.expect_response(lambda response: "?box=" in response.url) as response:
         start()
     created = response.value.json()
-    return response.value.url.split("box=")[1], created["params"]["seed"]
+    query = urllib.parse.parse_qs(urllib.parse.urlsplit(response.value.url).query)
+    session = urllib.parse.urljoin(response.value.url, response.value.headers["location"])
+    view = page.request.get(session).json()
+    return query["box"][0], view["parameters"]["seed"]
 
 
 def same_as_the_api(checks, table, clip, box, seed):
@@ -220,7 +236,8 @@ def correction_and_recording(checks):
     frames(page, 40)
     page.locator("#stop").click()
     table = rows(page)
-    corrected = [row for row in table[1:] if float(row["score"]) == 1 and abs(float(row["x"]) - 10) < 2]
+    drawn = {"x": 10, "y": 10, "width": 60, "height": 50}
+    corrected = [row for row in table[1:] if all(float(row[side]) == value for side, value in drawn.items())]
     assert len(corrected) == 1, corrected
     assert [int(row["frame"]) for row in table] == list(range(len(table)))
     video = saved(page, "#save-video")
@@ -302,7 +319,9 @@ def keyboard_alone(checks):
     page.context.close()
 
 
-def camera(checks):
+@contextlib.contextmanager
+def camera_of_the_clip(checks):
+    """A browser whose camera shows the sample clip."""
     with tempfile.NamedTemporaryFile(suffix=".mjpeg") as clip:
         for index in range(0, 150, 3):
             clip.write(checks.service.bytes(f"/sample/card/{index}.jpg"))
@@ -312,6 +331,12 @@ def camera(checks):
             "--use-fake-device-for-media-stream",
             f"--use-file-for-fake-video-capture={clip.name}",
         )
+        yield browser
+        browser.close()
+
+
+def camera(checks):
+    with camera_of_the_clip(checks) as browser:
         page = checks.page(browser=browser)
         page.locator("#camera").click()
         said(page, DRAW)
@@ -321,7 +346,27 @@ def camera(checks):
         table = rows(page)
         assert [int(row["frame"]) for row in table] == list(range(len(table)))
         print(f"  {len(table)} frames of the camera, {page.locator('#skipped').inner_text()} skipped")
-        browser.close()
+
+
+def page_of_another_origin(checks):
+    """The example of the JavaScript client, with a camera."""
+    pages = http.server.SimpleHTTPRequestHandler
+    pages.log_message = lambda *_: None
+    elsewhere = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(pages, directory=EXAMPLES))
+    threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+    origin = f"http://127.0.0.1:{elsewhere.server_port}"
+    service = Service(checks.program, "--cors-origins", origin)
+    with camera_of_the_clip(checks) as browser:
+        page = browser.new_page()
+        page.goto(f"{origin}/camera.html?service={service.url}")
+        page.locator("#message").filter(has_text="Drag a box").wait_for()
+        drag(page, checks.clips["card"]["truth"][0])
+        page.locator("#message").filter(has_text=re.compile("Frame [3-9][0-9]: ")).wait_for(timeout=TO_THE_END)
+        drag(page, checks.clips["card"]["truth"][0])
+        told = page.locator("#message").inner_text()
+        assert re.fullmatch("Frame [0-9]+: (tracking|uncertain|lost)", told), told
+    service.stop()
+    elsewhere.shutdown()
 
 
 def camera_refused(checks):
@@ -336,7 +381,7 @@ def camera_refused(checks):
 def ended_session(checks):
     """The session is ended behind the page's back."""
     page = checks.page(allowed=("404",))
-    with page.expect_response(lambda response: "/sessions?box=" in response.url) as response:
+    with page.expect_response(lambda response: "?box=" in response.url) as response:
         choose(page, "card")
         drag(page, checks.clips["card"]["truth"][0])
     frames(page, 10)
@@ -379,6 +424,7 @@ ALL = [
     phone_by_touch,
     keyboard_alone,
     camera,
+    page_of_another_origin,
     camera_refused,
     ended_session,
     key_needed,

@@ -1,0 +1,85 @@
+// A service: it opens sessions.
+
+import { Session, boxText } from "./session.js";
+import { Transport } from "./transport.js";
+
+/**
+ * @typedef {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} Frame A JPEG, PNG or WebP file.
+ *
+ * @typedef {object} OpenOptions
+ * @property {"robust" | "paper"} [preset]
+ * @property {number} [seed] Seed of all random draws; a random one when left out.
+ * @property {Record<string, unknown>} [parameters] Parameters that are set otherwise than in the preset.
+ * @property {AbortSignal} [signal]
+ */
+
+const SNAPSHOT = "application/vnd.bagtrack.snapshot";
+
+/** A random UUID. Pages that do not come over HTTPS have no `crypto.randomUUID`. */
+function newId() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  bytes[6] = (bytes[6] & 0x0f) | 0x40;
+  bytes[8] = (bytes[8] & 0x3f) | 0x80;
+  const hex = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  return hex.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+}
+
+export class Client {
+  /**
+   * @param {string | URL} url Where the service is, with its base path, where it has one.
+   * @param {object} [options]
+   * @param {string} [options.key] An API key or a session token, where the service has keys.
+   * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
+   * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
+   */
+  constructor(url, options = {}) {
+    this.transport = new Transport(url, options.key ?? "", options.patience ?? 20_000);
+    this.WebSocket = options.WebSocket ?? globalThis.WebSocket;
+  }
+
+  /** The key that is sent with every call. */
+  set key(/** @type {string} */ key) {
+    this.transport.key = key;
+  }
+
+  /**
+   * Opens a session. The client makes its id, so that asking twice opens one session.
+   * @param {Frame} frame The first frame.
+   * @param {import("./session.js").Box} box The target's box in it.
+   * @param {OpenOptions} [options]
+   * @returns {Promise<Session>}
+   */
+  async open(frame, box, { preset, seed, parameters, signal } = {}) {
+    const json = parameters && JSON.stringify(parameters);
+    const query = { preset, seed, parameters: json, box: boxText(box) };
+    return this.create({ query, body: frame, type: "application/octet-stream", signal });
+  }
+
+  /**
+   * Opens a session that goes on where a snapshot was taken, here or at another instance with the same secret.
+   * @param {Frame} snapshot
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<Session>}
+   */
+  restore(snapshot, signal) {
+    return this.create({ body: snapshot, type: SNAPSHOT, signal });
+  }
+
+  /**
+   * A session that is open already, such as one that a page was given a token for.
+   * @param {string} id
+   * @returns {Promise<Session>}
+   */
+  async attach(id) {
+    const response = await this.transport.call("GET", `sessions/${encodeURIComponent(id)}`);
+    const view = await response.json();
+    return new Session(this, view.id, view.answer.frame, view.answer.box, response.headers);
+  }
+
+  /** @param {import("./transport.js").Request} request */
+  async create(request) {
+    const response = await this.transport.call("PUT", `sessions/${newId()}`, request);
+    const { id, frame, box } = await response.json();
+    return new Session(this, id, frame, box, response.headers);
+  }
+}

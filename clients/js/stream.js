@@ -1,0 +1,250 @@
+// A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice.
+
+import { Problem } from "./problem.js";
+import { pause } from "./transport.js";
+
+/**
+ * @typedef {object} Seen What the tracker saw, where that was asked for.
+ * @property {number[][]} [particles] Centre x and y, width, weight; likeliest first.
+ * @property {number[]} [votes] One for each entry of the bag.
+ *
+ * @typedef {import("./session.js").Answer & Seen} StreamAnswer
+ *
+ * @typedef {object} StreamOptions
+ * @property {boolean} [live] Whether the newest frame wins: one that waits is skipped when a newer one comes.
+ * @property {number} [window] Frames on their way at a time, 1 to 32 (8).
+ * @property {number} [patience] Milliseconds in which a broken line is opened again; as the client's when left out.
+ * @property {(isUp: boolean) => void} [onLine] Is told when the line breaks and when it is up again.
+ *
+ * @typedef {object} Waiting A frame without an answer.
+ * @property {import("./client.js").Frame} frame
+ * @property {{box?: import("./session.js").Box, see?: boolean}} header
+ * @property {(answer: StreamAnswer | undefined) => void} resolve
+ * @property {(problem: unknown) => void} reject
+ */
+
+/** Most frames that are kept until the store has them. */
+const MOST_KEPT = 256;
+const FIRST_PAUSE = 200;
+const LONGEST_PAUSE = 5000;
+/** Close codes from here on are this and an HTTP status: the service closed the stream for good. */
+const OF_STATUS = 4000;
+/** As browsers call a line that broke. */
+const ABNORMAL = 1006;
+
+export class FrameStream {
+  /**
+   * @param {import("./session.js").Session} session
+   * @param {StreamOptions} [options]
+   */
+  constructor(session, options = {}) {
+    this.session = session;
+    this.live = options.live ?? false;
+    this.window = options.window ?? 8;
+    this.patience = options.patience ?? session.client.transport.patience;
+    this.onLine = options.onLine ?? (() => undefined);
+    /** @type {Waiting[]} Oldest first. */
+    this.waiting = [];
+    /** @type {(Waiting & {number: number})[]} Answered frames that a service with a store may ask for again. */
+    this.kept = [];
+    /** How many of those that wait are on their way. */
+    this.sent = 0;
+    /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
+    this.misnumbered = 0;
+    /** @type {WebSocket | undefined} */
+    this.socket = undefined;
+    this.isUp = false;
+    this.isEnded = false;
+    this.wait = FIRST_PAUSE;
+    /** When the line broke. */
+    this.downSince = Date.now();
+    /** @type {Problem | undefined} */
+    this.lastProblem = undefined;
+    /** @type {(problem: Error | undefined) => void} */
+    this.tellEnd = () => undefined;
+    /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
+    this.ended = new Promise((resolve) => (this.tellEnd = resolve));
+    session.hold(this);
+    this.connect();
+  }
+
+  /**
+   * Sends the next frame. Many may be sent without waiting for their answers.
+   * @param {import("./client.js").Frame} frame
+   * @param {object} [header]
+   * @param {import("./session.js").Box} [header.box] The right box in this frame, which may be one that was sent before.
+   * @param {boolean} [header.see] Whether the answer shall tell what the tracker saw.
+   * @returns {Promise<StreamAnswer | undefined>} Nothing where the frame was skipped, in a live stream.
+   */
+  track(frame, { box, see } = {}) {
+    if (this.isEnded) return Promise.reject(new Error("The stream has ended."));
+    return new Promise((resolve, reject) => {
+      // Of live frames that cannot be sent yet, the newest is kept.
+      if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
+      this.waiting.push({ frame, header: { box, see }, resolve, reject });
+      this.transmit();
+    });
+  }
+
+  /** Ends the stream; the session goes on. Frames without an answer are given up. */
+  close() {
+    this.end(undefined);
+  }
+
+  transmit() {
+    while (this.isUp && !this.misnumbered && this.sent < Math.min(this.waiting.length, this.window)) {
+      const { frame, header } = this.waiting[this.sent];
+      const number = this.live ? undefined : this.session.frame + 1 + this.sent;
+      this.sent += 1;
+      this.socket?.send(JSON.stringify({ frame: number, ...header }));
+      this.socket?.send(frame);
+    }
+  }
+
+  /** @param {any} message */
+  receive(message) {
+    if (message.next !== undefined) return this.resume(message.next);
+    if (message.type) return this.refused(new Problem(message));
+    for (let count = message.skipped ?? 0; count > 0; count -= 1) this.take()?.resolve(undefined);
+    this.session.frame = message.frame;
+    this.session.box = message.box;
+    this.session.isDraining ||= message.draining === true;
+    const answered = this.take();
+    if (answered) this.kept.push({ ...answered, number: message.frame, resolve: () => undefined });
+    // Without a store there is nothing to go on with.
+    const checkpoint = message.checkpoint ?? Infinity;
+    this.kept = this.kept.filter(({ number }) => number > checkpoint).slice(-MOST_KEPT);
+    answered?.resolve(message);
+    this.transmit();
+  }
+
+  /** The oldest frame on its way. */
+  take() {
+    if (this.sent === 0) return undefined;
+    this.sent -= 1;
+    return this.waiting.shift();
+  }
+
+  /** @param {Problem} problem */
+  refused(problem) {
+    this.lastProblem = problem;
+    if (this.misnumbered > 0) {
+      this.misnumbered -= 1;
+      // All have come back: they are sent again with the numbers that they have now.
+      if (this.misnumbered === 0) this.sent = 0;
+    } else {
+      this.take()?.reject(problem);
+      if (!this.live) this.misnumbered = this.sent;
+    }
+    this.transmit();
+  }
+
+  /** The service expects frame `next`: it has those before it, and sends their answers.
+   * @param {number} next */
+  resume(next) {
+    const known = next - 1 - this.session.frame;
+    if (known > this.sent) {
+      const detail = "Another client has sent frames to this session.";
+      return this.end(new Problem({ type: "replaced", status: 409, detail }));
+    }
+    // Which of several live frames were skipped is not known, and newer ones come.
+    if (this.live) this.waiting.splice(0, this.sent - known).forEach((skipped) => skipped.resolve(undefined));
+    this.sent = known;
+    this.misnumbered = 0;
+    this.isUp = true;
+    this.wait = FIRST_PAUSE;
+    this.onLine(true);
+    this.transmit();
+  }
+
+  /** A replica has gone, and the store has no frames from `next` on: they are sent again before those that wait.
+   * @param {number} next */
+  goBack(next) {
+    if (next > this.session.frame) return;
+    const lost = this.live ? [] : this.kept.filter(({ number }) => number >= next);
+    this.waiting.unshift(...lost);
+    this.kept = this.kept.filter(({ number }) => number < next);
+    this.session.frame = next - 1;
+    this.sent = 0;
+  }
+
+  async connect() {
+    const { client, id, frame } = this.session;
+    try {
+      const token = await this.token();
+      if (this.isEnded) return;
+      const url = client.transport.at(`sessions/${id}/stream`, { from: frame + 1, drop: this.live ? "true" : undefined });
+      url.protocol = url.protocol.replace("http", "ws");
+      const socket = new client.WebSocket(url, token ? ["bagtrack", token] : ["bagtrack"]);
+      this.socket = socket;
+      socket.onmessage = (event) => this.receive(JSON.parse(event.data));
+      const down = (/** @type {number} */ code) => {
+        if (this.socket !== socket) return;
+        this.socket = undefined;
+        this.closed(code);
+      };
+      socket.onclose = (event) => down(event.code);
+      // Not every platform closes a socket that could not be opened.
+      socket.onerror = () => down(ABNORMAL);
+    } catch (error) {
+      this.end(/** @type {Error} */ (error));
+    }
+  }
+
+  /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
+  async token() {
+    const { key } = this.session.client.transport;
+    if (!key) return "";
+    return this.session.token().catch((error) => {
+      if (error instanceof Problem && error.slug === "forbidden") return key;
+      throw error;
+    });
+  }
+
+  /**
+   * @param {number} code
+   * @returns {Promise<void>}
+   */
+  async closed(code) {
+    if (this.isEnded) return;
+    if (code > OF_STATUS) return this.end(this.reason(code - OF_STATUS));
+    if (this.isUp) {
+      this.isUp = false;
+      this.downSince = Date.now();
+      this.onLine(false);
+    }
+    await pause(this.wait);
+    this.wait = Math.min(2 * this.wait, LONGEST_PAUSE);
+    // A page is not told why a stream cannot be opened; this call tells.
+    const { transport } = this.session.client;
+    const url = transport.at(`sessions/${this.session.id}`);
+    const seen = await transport.attempt("GET", url, {}).then((response) => response.json()).catch((error) => error);
+    const isLate = Date.now() - this.downSince > this.patience;
+    if (seen instanceof Error) {
+      const isOver = isLate || !(seen instanceof Problem && seen.isTemporary);
+      return isOver ? this.end(seen) : this.closed(code);
+    }
+    if (this.isEnded) return;
+    this.goBack(seen.frames);
+    await this.connect();
+  }
+
+  /** @param {number} status */
+  reason(status) {
+    if (this.lastProblem?.status === status) return this.lastProblem;
+    const detail = "A newer stream of this session has taken the place of this one.";
+    return new Problem(status === 409 ? { type: "replaced", status, detail } : { type: "", status });
+  }
+
+  /** @param {Error | undefined} problem */
+  end(problem) {
+    if (this.isEnded) return;
+    this.isEnded = true;
+    this.isUp = false;
+    this.socket?.close();
+    this.session.hold(undefined);
+    const left = this.waiting.splice(0);
+    left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
+    this.tellEnd(problem);
+  }
+}

@@ -1,0 +1,161 @@
+// The client against the program: the boxes must be those of the library.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { Client, Problem } from "../bagtrack.js";
+import { SEED, openLine, rounded, sampleClip, startService } from "./service.js";
+
+const clip = sampleClip();
+const options = { seed: SEED };
+/** @type {Awaited<ReturnType<typeof startService>>} */
+let service;
+before(async () => (service = await startService()));
+after(() => service.stop());
+
+/** @param {any[]} answers
+ * @param {number} [first] */
+function sameAsTheLibrary(answers, first = 1) {
+  const plain = answers.map(rounded);
+  assert.deepEqual(plain, clip.answers.slice(first, first + answers.length));
+}
+
+/** @param {unknown} slug */
+const problem = (slug) => (/** @type {unknown} */ error) => error instanceof Problem && error.slug === slug;
+
+test("frames one after the other get the library's boxes", async (context) => {
+  const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
+  const answers = [];
+  const started = performance.now();
+  for (const frame of clip.frames.slice(1)) answers.push(await session.track(frame));
+  const each = (performance.now() - started) / answers.length;
+  context.diagnostic(`track: ${answers.length} frames, ${each.toFixed(1)} ms each`);
+  sameAsTheLibrary(answers);
+  assert.equal((await session.read()).frames, clip.frames.length);
+  await session.end();
+  await session.end();
+  await assert.rejects(session.read(), problem("session-not-found"));
+});
+
+test("calls that are not waited for keep their order", async () => {
+  const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
+  const answers = await Promise.all(clip.frames.slice(1, 21).map((frame) => session.track(frame)));
+  sameAsTheLibrary(answers);
+  await session.end();
+});
+
+test("several frames a request, Blobs among them", async (context) => {
+  const session = await new Client(service.url).open(new Blob([clip.frames[0]]), clip.box, options);
+  const answers = [];
+  const started = performance.now();
+  for (let at = 1; at < 100; at += 20) {
+    const frames = clip.frames.slice(at, at + 20);
+    answers.push(...(await session.trackAll([new Blob([frames[0]]), ...frames.slice(1)])));
+  }
+  context.diagnostic(`trackAll: ${((performance.now() - started) / answers.length).toFixed(1)} ms a frame`);
+  sameAsTheLibrary(answers);
+  await session.end();
+});
+
+test("a damaged frame is refused, and those after it are tracked", async () => {
+  const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
+  const damaged = clip.frames[1].slice(0, 900);
+  const [refused, ...rest] = await Promise.allSettled([
+    session.track(damaged),
+    ...clip.frames.slice(1, 6).map((frame) => session.track(frame)),
+  ]);
+  assert.ok(refused.status === "rejected" && problem("frame-damaged")(refused.reason));
+  sameAsTheLibrary(rest.map((settled) => settled.status === "fulfilled" && settled.value));
+  await session.end();
+});
+
+test("a snapshot goes on under another id, a correction moves the box", async () => {
+  const client = new Client(service.url);
+  const session = await client.open(clip.frames[0], clip.box, options);
+  for (const frame of clip.frames.slice(1, 11)) await session.track(frame);
+  const restored = await client.restore(await session.snapshot());
+  assert.notEqual(restored.id, session.id);
+  const answers = [];
+  for (const frame of clip.frames.slice(11, 31)) answers.push(await restored.track(frame));
+  sameAsTheLibrary(answers, 11);
+  const box = { x: 20, y: 30, width: 40, height: 50 };
+  const corrected = await restored.correct(clip.frames[31], box);
+  assert.deepEqual(corrected.box, box);
+  assert.equal(corrected.frame, 31);
+  const attached = await client.attach(restored.id);
+  assert.deepEqual([attached.frame, attached.box], [31, box]);
+  const picture = new Uint8Array(await (await restored.bag()).arrayBuffer());
+  assert.equal(String.fromCharCode(...picture.slice(1, 4)), "PNG");
+});
+
+test("a line that breaks between and within requests loses nothing", async () => {
+  const line = await openLine(service.port);
+  const session = await new Client(line.url).open(clip.frames[0], clip.box, options);
+  const answers = [];
+  for (const [index, frame] of clip.frames.slice(1, 61).entries()) {
+    const answer = session.track(frame);
+    if (index % 7 === 3) setImmediate(() => line.cut());
+    if (index === 30) {
+      line.shut(true);
+      setTimeout(() => line.shut(false), 300);
+    }
+    answers.push(await answer);
+  }
+  sameAsTheLibrary(answers);
+  line.close();
+});
+
+test("a service that cannot be reached is a problem when patience ends", async () => {
+  const line = await openLine(service.port);
+  const session = await new Client(line.url, { patience: 500 }).open(clip.frames[0], clip.box, options);
+  line.shut(true);
+  line.cut();
+  const started = performance.now();
+  await assert.rejects(session.track(clip.frames[1]), problem("unreachable"));
+  assert.ok(performance.now() - started > 150);
+  line.shut(false);
+  sameAsTheLibrary([await session.track(clip.frames[1])]);
+  line.close();
+});
+
+test("a full service is asked again, when it says so", async () => {
+  const full = await startService(["--max-sessions", "1"]);
+  try {
+    const first = await new Client(full.url).open(clip.frames[0], clip.box, options);
+    const impatient = new Client(full.url, { patience: 1000 });
+    await assert.rejects(impatient.open(clip.frames[0], clip.box, options), problem("too-many-sessions"));
+    const second = new Client(full.url, { patience: 60_000 }).open(clip.frames[0], clip.box, options);
+    await first.end();
+    sameAsTheLibrary([await (await second).track(clip.frames[1])]);
+  } finally {
+    await full.stop();
+  }
+});
+
+test("a signal ends the waiting", async () => {
+  const line = await openLine(service.port);
+  line.shut(true);
+  const stop = new AbortController();
+  const opening = new Client(line.url).open(clip.frames[0], clip.box, { signal: stop.signal });
+  setTimeout(() => stop.abort(new Error("enough")), 50);
+  await assert.rejects(opening, /enough/);
+  line.close();
+});
+
+test("keys and session tokens", async () => {
+  const key = "0123456789abcdef";
+  const closed = await startService([], { BAGTRACK_API_KEYS: `page:${key}` });
+  try {
+    await assert.rejects(new Client(closed.url).open(clip.frames[0], clip.box), problem("unauthorized"));
+    const session = await new Client(closed.url, { key }).open(clip.frames[0], clip.box, options);
+    const page = await new Client(closed.url, { key: await session.token(600) }).attach(session.id);
+    sameAsTheLibrary([await page.track(clip.frames[1])]);
+    const token = page.stream();
+    sameAsTheLibrary([await token.track(clip.frames[2])], 2);
+    token.close();
+    const own = (await new Client(closed.url, { key }).attach(session.id)).stream();
+    sameAsTheLibrary([await own.track(clip.frames[3])], 3);
+    own.close();
+  } finally {
+    await closed.stop();
+  }
+});

@@ -1,0 +1,137 @@
+// Streams against the program.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { Client, Problem } from "../bagtrack.js";
+import { SEED, openLine, rounded, sampleClip, startService } from "./service.js";
+
+const clip = sampleClip();
+/** @type {Awaited<ReturnType<typeof startService>>} */
+let service;
+before(async () => (service = await startService()));
+after(() => service.stop());
+
+/** @param {string} [url] */
+const open = (url = service.url) => new Client(url).open(clip.frames[0], clip.box, { seed: SEED });
+
+/** @param {any[]} answers
+ * @param {number} [first] */
+function sameAsTheLibrary(answers, first = 1) {
+  const plain = answers.map(rounded);
+  assert.deepEqual(plain, clip.answers.slice(first, first + answers.length));
+}
+
+test("a stream answers a hundred frames as the library does", async (context) => {
+  const session = await open();
+  const stream = session.stream();
+  const started = performance.now();
+  const answers = await Promise.all(clip.frames.slice(1).map((frame) => stream.track(frame)));
+  context.diagnostic(`stream: ${answers.length} frames, ${((performance.now() - started) / 100).toFixed(1)} ms each`);
+  sameAsTheLibrary(answers);
+  await assert.rejects(session.track(clip.frames[1]), /has a stream/);
+  assert.throws(() => session.stream(), /has a stream/);
+  stream.close();
+  assert.equal(await stream.ended, undefined);
+  await assert.rejects(stream.track(clip.frames[1]), /has ended/);
+  assert.equal((await session.track(clip.frames[100])).frame, 101);
+});
+
+test("a stream takes up after broken lines", async () => {
+  const line = await openLine(service.port);
+  const session = await open(line.url);
+  const lines = /** @type {boolean[]} */ ([]);
+  const stream = session.stream({ onLine: (isUp) => lines.push(isUp) });
+  let count = 0;
+  const answers = clip.frames.slice(1).map(async (frame) => {
+    const answer = await stream.track(frame);
+    count += 1;
+    if (count % 25 === 10) line.cut();
+    return answer;
+  });
+  sameAsTheLibrary(await Promise.all(answers));
+  assert.ok(lines.filter((isUp) => !isUp).length >= 3, String(lines));
+  stream.close();
+  line.close();
+});
+
+test("a refused frame takes none of those behind it along", async () => {
+  const session = await open();
+  const stream = session.stream();
+  const damaged = clip.frames[3].slice(0, 900);
+  const order = [1, 2, 0, 3, 4, 0, 0, 5, 6, 7, 8, 9, 10, 11, 12];
+  const sent = order.map((index) => stream.track(index === 0 ? damaged : clip.frames[index]));
+  const settled = await Promise.allSettled(sent);
+  const refused = settled.filter(({ status }) => status === "rejected");
+  assert.equal(refused.length, 3);
+  for (const { reason } of /** @type {PromiseRejectedResult[]} */ (refused)) assert.equal(reason.slug, "frame-damaged");
+  sameAsTheLibrary(settled.flatMap((each) => (each.status === "fulfilled" ? [each.value] : [])));
+  stream.close();
+});
+
+test("a correction and what the tracker saw", async () => {
+  const session = await open();
+  const stream = session.stream();
+  const box = { x: 30, y: 40, width: 50, height: 60 };
+  const answers = await Promise.all([
+    stream.track(clip.frames[1], { see: true }),
+    stream.track(clip.frames[1], { box }),
+    stream.track(clip.frames[2]),
+  ]);
+  assert.ok(answers[0]?.particles?.length && answers[0].votes?.length);
+  assert.deepEqual([answers[1]?.frame, answers[1]?.box], [2, box]);
+  assert.equal(answers[2]?.frame, 3);
+  stream.close();
+});
+
+test("live frames are answered or skipped, each once and in order", async () => {
+  const line = await openLine(service.port);
+  const session = await open(line.url);
+  const stream = session.stream({ live: true });
+  const done = /** @type {number[]} */ ([]);
+  const sent = clip.frames.slice(1).map(async (frame, index) => {
+    const answer = await stream.track(frame);
+    done.push(index);
+    return answer;
+  });
+  await sent[0];
+  line.cut();
+  const answers = await Promise.all(sent);
+  const tracked = answers.filter((answer) => answer !== undefined);
+  assert.ok(tracked.length > 0 && tracked.length < 100, `${tracked.length}`);
+  assert.ok(answers.at(-1), "the newest is not skipped");
+  assert.deepEqual(tracked.map(({ frame }) => frame), tracked.map((_, index) => tracked[0].frame + index));
+  assert.equal(new Set(done).size, 100);
+  stream.close();
+  line.close();
+});
+
+test("the end of the session ends the stream", async () => {
+  const session = await open();
+  const stream = session.stream();
+  await stream.track(clip.frames[1]);
+  await session.end();
+  const late = stream.track(clip.frames[2]);
+  await assert.rejects(late, (error) => error instanceof Problem && error.slug === "session-not-found");
+  const problem = await stream.ended;
+  assert.ok(problem instanceof Problem && problem.slug === "session-not-found", String(problem));
+});
+
+test("a newer stream takes the place of an older one", async () => {
+  const session = await open();
+  const older = session.stream();
+  await older.track(clip.frames[1]);
+  const newer = (await new Client(service.url).attach(session.id)).stream();
+  sameAsTheLibrary([await newer.track(clip.frames[2])], 2);
+  const problem = await older.ended;
+  assert.ok(problem instanceof Problem && problem.slug === "replaced", String(problem));
+  newer.close();
+});
+
+test("a service that has gone ends the stream when patience ends", async () => {
+  const gone = await startService();
+  const session = await open(gone.url);
+  const stream = session.stream({ patience: 600 });
+  await stream.track(clip.frames[1]);
+  await gone.stop();
+  await assert.rejects(stream.track(clip.frames[2]), (error) => error instanceof Problem && error.slug === "unreachable");
+});

@@ -1,0 +1,63 @@
+import { Session } from "./session.js";
+import { Transport } from "./transport.js";
+export type Frame = Blob | ArrayBuffer | Uint8Array<ArrayBuffer>;
+export type OpenOptions = {
+    preset?: "robust" | "paper";
+    /**
+     * Seed of all random draws; a random one when left out.
+     */
+    seed?: number;
+    /**
+     * Parameters that are set otherwise than in the preset.
+     */
+    parameters?: Record<string, unknown>;
+    signal?: AbortSignal;
+};
+export declare class Client {
+    transport: Transport;
+    WebSocket: {
+        new (url: string | URL, protocols?: string | string[]): WebSocket;
+        prototype: WebSocket;
+        readonly CONNECTING: 0;
+        readonly OPEN: 1;
+        readonly CLOSING: 2;
+        readonly CLOSED: 3;
+    };
+    /**
+     * @param {string | URL} url Where the service is, with its base path, where it has one.
+     * @param {object} [options]
+     * @param {string} [options.key] An API key or a session token, where the service has keys.
+     * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
+     * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
+     */
+    constructor(url: string | URL, options?: {
+        key?: string;
+        patience?: number;
+        WebSocket?: typeof WebSocket;
+    });
+    /** The key that is sent with every call. */
+    set key(/** @type {string} */ key: string);
+    /**
+     * Opens a session. The client makes its id, so that asking twice opens one session.
+     * @param {Frame} frame The first frame.
+     * @param {import("./session.js").Box} box The target's box in it.
+     * @param {OpenOptions} [options]
+     * @returns {Promise<Session>}
+     */
+    open(frame: Frame, box: import("./session.js").Box, { preset, seed, parameters, signal }?: OpenOptions): Promise<Session>;
+    /**
+     * Opens a session that goes on where a snapshot was taken, here or at another instance with the same secret.
+     * @param {Frame} snapshot
+     * @param {AbortSignal} [signal]
+     * @returns {Promise<Session>}
+     */
+    restore(snapshot: Frame, signal?: AbortSignal): Promise<Session>;
+    /**
+     * A session that is open already, such as one that a page was given a token for.
+     * @param {string} id
+     * @returns {Promise<Session>}
+     */
+    attach(id: string): Promise<Session>;
+    /** @param {import("./transport.js").Request} request */
+    create(request: import("./transport.js").Request): Promise<Session>;
+}

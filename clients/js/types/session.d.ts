@@ -1,0 +1,136 @@
+import { FrameStream } from "./stream.js";
+export type Box = {
+    x: number;
+    y: number;
+    width: number;
+    height: number;
+};
+export type Answer = {
+    /**
+     * The number of the frame; the first of a session is 0.
+     */
+    frame: number;
+    box: Box;
+    /**
+     * The chance that the box overlaps the target by half or more.
+     */
+    score: number;
+    status: "tracking" | "uncertain" | "lost";
+};
+export type View = {
+    id: string;
+    frames: number;
+    answer: Answer;
+    image: {
+        width: number;
+        height: number;
+    };
+    parameters: Record<string, unknown>;
+    expires_at: string;
+};
+export type Frame = import("./client.js").Frame;
+export type Sent = {
+    number: number;
+    count: number;
+    make: (number: number) => Promise<Response>;
+};
+/** @param {Box} box */
+export declare function boxText({ x, y, width, height }: Box): string;
+export declare class Session {
+    client: import("./client.js").Client;
+    id: string;
+    frame: number;
+    box: Box;
+    /** Whether the service is about to end: take a snapshot, and restore it elsewhere. */
+    isDraining: boolean;
+    /** @type {Sent[]} What a service with a store may ask for again. */
+    kept: Sent[];
+    /** @type {Promise<unknown>} The requests before. */
+    before: Promise<unknown>;
+    /** @type {FrameStream | undefined} */
+    open: FrameStream | undefined;
+    /**
+     * @param {import("./client.js").Client} client
+     * @param {string} id
+     * @param {number} frame The number of its last frame.
+     * @param {Box} box The box of that frame.
+     * @param {Headers} headers Of the answer that told so.
+     */
+    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers);
+    /**
+     * Sends the next frame. Calls are made one after the other, in the order of `track`.
+     * @param {Frame} frame
+     * @param {AbortSignal} [signal]
+     * @returns {Promise<Answer>}
+     */
+    track(frame: Frame, signal?: AbortSignal): Promise<Answer>;
+    /**
+     * Sends several frames at once. If one is bad, none is taken.
+     * @param {Frame[]} frames
+     * @param {AbortSignal} [signal]
+     * @returns {Promise<Answer[]>}
+     */
+    trackAll(frames: Frame[], signal?: AbortSignal): Promise<Answer[]>;
+    /**
+     * Sends a frame as the next one with the right box in it. It may be one that was sent before.
+     * @param {Frame} frame
+     * @param {Box} box
+     * @param {AbortSignal} [signal]
+     * @returns {Promise<Answer>}
+     */
+    correct(frame: Frame, box: Box, signal?: AbortSignal): Promise<Answer>;
+    /** The session's state; the service does not count this as a frame.
+     * @returns {Promise<View>} */
+    read(): Promise<View>;
+    /** The whole session as bytes, for `client.restore`.
+     * @returns {Promise<Uint8Array<ArrayBuffer>>} */
+    snapshot(): Promise<Uint8Array<ArrayBuffer>>;
+    /** A picture (PNG) of what the tracker keeps of the target.
+     * @returns {Promise<Blob>} */
+    bag(): Promise<Blob>;
+    /** A token for this session alone, to be given to a page.
+     * @param {number} [seconds] How long it is good for (3600).
+     * @returns {Promise<string>} */
+    token(seconds?: number): Promise<string>;
+    /** Sends frames over a WebSocket, many at a time. Until it is closed no frames are sent otherwise.
+     * @param {import("./stream.js").StreamOptions} [options]
+     * @returns {FrameStream} */
+    stream(options?: import("./stream.js").StreamOptions): FrameStream;
+    /** @param {FrameStream | undefined} stream What sends this session's frames now. */
+    hold(stream: FrameStream | undefined): void;
+    /** Ends the session. */
+    end(): Promise<void>;
+    /**
+     * @param {string} method
+     * @param {string} path Below that of the session.
+     * @param {import("./transport.js").Request} [request]
+     */
+    call(method: string, path: string, request?: import("./transport.js").Request): Promise<Response>;
+    /**
+     * @param {string} method
+     * @param {string} path
+     * @param {Record<string, string | number>} query
+     * @param {BodyInit} body
+     * @param {AbortSignal} [signal]
+     */
+    post(method: string, path: string, query: Record<string, string | number>, body: BodyInit, signal?: AbortSignal): Promise<Response>;
+    /**
+     * Makes a request with the next frames after those before.
+     * @param {number} count
+     * @param {Sent["make"]} make
+     */
+    next(count: number, make: Sent["make"]): Promise<any>;
+    /**
+     * @param {number} count
+     * @param {Sent["make"]} make
+     */
+    send(count: number, make: Sent["make"]): Promise<any>;
+    /**
+     * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
+     * @param {unknown} error
+     * @param {Sent} sent
+     */
+    resend(error: unknown, sent: Sent): Promise<Response>;
+    /** @param {Headers} headers */
+    note(headers: Headers): void;
+}

@@ -1,0 +1,113 @@
+import { Problem } from "./problem.js";
+export type Seen = {
+    /**
+     * Centre x and y, width, weight; likeliest first.
+     */
+    particles?: number[][];
+    /**
+     * One for each entry of the bag.
+     */
+    votes?: number[];
+};
+export type StreamAnswer = import("./session.js").Answer & Seen;
+export type StreamOptions = {
+    /**
+     * Whether the newest frame wins: one that waits is skipped when a newer one comes.
+     */
+    live?: boolean;
+    /**
+     * Frames on their way at a time, 1 to 32 (8).
+     */
+    window?: number;
+    /**
+     * Milliseconds in which a broken line is opened again; as the client's when left out.
+     */
+    patience?: number;
+    /**
+     * Is told when the line breaks and when it is up again.
+     */
+    onLine?: (isUp: boolean) => void;
+};
+export type Waiting = {
+    frame: import("./client.js").Frame;
+    header: {
+        box?: import("./session.js").Box;
+        see?: boolean;
+    };
+    resolve: (answer: StreamAnswer | undefined) => void;
+    reject: (problem: unknown) => void;
+};
+export declare class FrameStream {
+    session: import("./session.js").Session;
+    live: boolean;
+    window: number;
+    patience: number;
+    onLine: (isUp: boolean) => void;
+    /** @type {Waiting[]} Oldest first. */
+    waiting: Waiting[];
+    /** @type {(Waiting & {number: number})[]} Answered frames that a service with a store may ask for again. */
+    kept: (Waiting & {
+        number: number;
+    })[];
+    /** How many of those that wait are on their way. */
+    sent: number;
+    /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
+    misnumbered: number;
+    /** @type {WebSocket | undefined} */
+    socket: WebSocket | undefined;
+    isUp: boolean;
+    isEnded: boolean;
+    wait: number;
+    /** When the line broke. */
+    downSince: number;
+    /** @type {Problem | undefined} */
+    lastProblem: Problem | undefined;
+    /** @type {(problem: Error | undefined) => void} */
+    tellEnd: (problem: Error | undefined) => void;
+    /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
+    ended: Promise<Error | undefined>;
+    /**
+     * @param {import("./session.js").Session} session
+     * @param {StreamOptions} [options]
+     */
+    constructor(session: import("./session.js").Session, options?: StreamOptions);
+    /**
+     * Sends the next frame. Many may be sent without waiting for their answers.
+     * @param {import("./client.js").Frame} frame
+     * @param {object} [header]
+     * @param {import("./session.js").Box} [header.box] The right box in this frame, which may be one that was sent before.
+     * @param {boolean} [header.see] Whether the answer shall tell what the tracker saw.
+     * @returns {Promise<StreamAnswer | undefined>} Nothing where the frame was skipped, in a live stream.
+     */
+    track(frame: import("./client.js").Frame, { box, see }?: {
+        box?: import("./session.js").Box;
+        see?: boolean;
+    }): Promise<StreamAnswer | undefined>;
+    /** Ends the stream; the session goes on. Frames without an answer are given up. */
+    close(): void;
+    transmit(): void;
+    /** @param {any} message */
+    receive(message: any): void;
+    /** The oldest frame on its way. */
+    take(): Waiting | undefined;
+    /** @param {Problem} problem */
+    refused(problem: Problem): void;
+    /** The service expects frame `next`: it has those before it, and sends their answers.
+     * @param {number} next */
+    resume(next: number): void;
+    /** A replica has gone, and the store has no frames from `next` on: they are sent again before those that wait.
+     * @param {number} next */
+    goBack(next: number): void;
+    connect(): Promise<void>;
+    /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
+    token(): Promise<string>;
+    /**
+     * @param {number} code
+     * @returns {Promise<void>}
+     */
+    closed(code: number): Promise<void>;
+    /** @param {number} status */
+    reason(status: number): Problem;
+    /** @param {Error | undefined} problem */
+    end(problem: Error | undefined): void;
+}
