@@ -1,0 +1,39 @@
+"""Follows an object through frames: in process (`Tracker`), or with a bagtrack service (`Client`, `AsyncClient`).
+
+All three have one interface, which users of OpenCV's trackers know: `init(frame, box)`, then `update(frame)` for each
+frame, which gives `(ok, box)`. Boxes are (x, y, width, height) in pixels of the frame, floats, 0-based.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from bagtrack._native import Tracker
+from bagtrack.answer import Answer, Box, Status
+from bagtrack.errors import ServiceError, ServiceUnavailable
+
+if TYPE_CHECKING:
+    from bagtrack.async_client import AsyncClient
+    from bagtrack.client import Client
+
+__all__ = [
+    "Answer",
+    "AsyncClient",
+    "Box",
+    "Client",
+    "ServiceError",
+    "ServiceUnavailable",
+    "Status",
+    "Tracker",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("AsyncClient", "Client"):
+        try:
+            from bagtrack import async_client, client
+        except ModuleNotFoundError as missing:
+            reason = f"bagtrack.{name} needs {missing.name}: pip install 'bagtrack[client]'"
+            raise ImportError(reason) from missing
+        return client.Client if name == "Client" else async_client.AsyncClient
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,129 @@
+"""The asynchronous client of a bagtrack service."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any, AsyncIterable, AsyncIterator, Iterable, Optional, Sequence, TypeVar, Union
+
+import httpx
+
+from bagtrack import transport
+from bagtrack.answer import Answer, Box, BoxLike
+from bagtrack.base_client import BaseClient, request_of
+from bagtrack.encoding import Frame
+from bagtrack.session import SNAPSHOT, four_numbers
+from bagtrack.steps import LineBroken, NextService, Pause, Reply, Request, Steps
+from bagtrack.stream import Give, NextFrame, Stream
+
+T = TypeVar("T")
+
+
+class AsyncClient(BaseClient):
+    """`Client` for asyncio. Used by one task at a time."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._http = httpx.AsyncClient(headers=self._headers, timeout=self._timeout)
+
+    __init__.__doc__ = BaseClient.__init__.__doc__
+
+    @classmethod
+    async def load(
+        cls, snapshot: bytes, url: Union[str, Sequence[str]], api_key: Optional[str] = None, **options: Any
+    ) -> AsyncClient:
+        """A client whose session goes on from what `save` gave."""
+        client = cls(url, api_key, **options)
+        await client._run(client._session.open({}, snapshot, SNAPSHOT))
+        return client
+
+    async def init(self, frame: Frame, box: BoxLike) -> None:
+        """As `Client.init`."""
+        await self._run(self._opening(frame, box))
+
+    async def update(self, frame: Frame) -> tuple[bool, Box]:
+        """As `Client.update`."""
+        answer = await self._run(self._session.advance(self._encode(frame)))
+        return answer.ok, answer.box
+
+    async def retarget(self, frame: Frame, box: BoxLike) -> None:
+        """As `Client.retarget`."""
+        await self._run(self._session.advance(self._encode(frame), four_numbers(box)))
+
+    async def track(
+        self, frames: Union[Iterable[Frame], AsyncIterable[Frame]], window: int = 8
+    ) -> AsyncIterator[Answer]:
+        """As `Client.track`."""
+        from bagtrack.sockets import AsyncSocket
+
+        source = frames if isinstance(frames, AsyncIterable) else each(frames)
+        source = source.__aiter__()
+        steps = Stream(self._session, window).run()
+        socket = AsyncSocket(self._services, self._headers, self._timeout)
+        result: Any = None
+        try:
+            while True:
+                try:
+                    step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
+                except StopIteration:
+                    return
+                result = None
+                if isinstance(step, Give):
+                    yield step.answer
+                elif isinstance(step, NextFrame):
+                    frame = await anext(source, None)
+                    result = None if frame is None else self._encode(frame)
+                else:
+                    try:
+                        performs = AsyncSocket.performs(step)
+                        result = await (socket.perform(step) if performs else self._perform(step))
+                    except LineBroken as broken:
+                        result = broken
+        finally:
+            await socket.close()
+
+    async def save(self) -> bytes:
+        """As `Client.save`."""
+        return await self._run(self._session.save())
+
+    async def close(self) -> None:
+        """As `Client.close`."""
+        await self._run(self._session.close())
+        await self._http.aclose()
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def _run(self, steps: Steps[T]) -> T:
+        result: Any = None
+        while True:
+            try:
+                step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
+            except StopIteration as end:
+                return end.value  # type: ignore[no-any-return]
+            try:
+                result = await self._perform(step)
+            except LineBroken as broken:
+                result = broken
+
+    async def _perform(self, step: Any) -> Optional[Reply]:
+        if isinstance(step, Pause):
+            await asyncio.sleep(step.seconds)
+            return None
+        if isinstance(step, NextService):
+            self._services.next()
+            return None
+        assert isinstance(step, Request)
+        try:
+            reply = await self._http.request(**request_of(step, self._services))
+        except httpx.TransportError as error:
+            raise LineBroken(str(error) or type(error).__name__) from error
+        return transport.reply(reply.status_code, reply.headers, reply.content)
+
+
+async def each(frames: Iterable[Frame]) -> AsyncIterator[Frame]:
+    """The frames of an ordinary iterable."""
+    for frame in frames:
+        yield frame

@@ -1,0 +1,104 @@
+"""What the blocking and the asynchronous client have in common."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence, Union
+
+from bagtrack import transport
+from bagtrack.answer import Answer, Box, BoxLike, Status
+from bagtrack.encoding import Encoding, Frame, encode
+from bagtrack.session import Session, four_numbers, query_box, settings
+from bagtrack.steps import Request, Steps
+from bagtrack.transport import Services
+
+IMAGE = "application/octet-stream"
+
+
+class BaseClient:
+    """What a client knows of its session."""
+
+    def __init__(
+        self,
+        url: Union[str, Sequence[str]],
+        api_key: Optional[str] = None,
+        *,
+        preset: str = "robust",
+        seed: Optional[int] = None,
+        encoding: Encoding = "jpeg",
+        quality: int = 90,
+        snapshot_every: int = 30,
+        retry_for: float = 60.0,
+        timeout: float = 15.0,
+        **params: Any,
+    ) -> None:
+        """A client for one target.
+
+        `url` is the service's address, or several where a session may go on: the next one is taken when one gives no
+        answer or is about to end. Arrays are sent as JPEG of this `quality`, or as PNG, which changes no pixel; bytes
+        are sent as they are. Every `snapshot_every` frames the client takes a snapshot and keeps the frames after it:
+        when the service loses the session, the client opens it again and sends them again, so that the boxes are the
+        same as ever. 0: never. A service with a store needs none, and none are taken. `retry_for` is the time in
+        seconds for which a request is sent again after a broken line, 429 or 503; `timeout` is that of one request.
+        `preset`, `seed` and `params` are those of `Tracker`; without a seed the service draws one.
+        """
+        if snapshot_every < 0:
+            raise ValueError("snapshot_every is at least 0")
+        self._services = Services(url)
+        self._headers = transport.authorization(api_key)
+        self._settings = settings(preset, seed, params)
+        self._encoding: Encoding = encoding
+        self._quality = quality
+        self._timeout = timeout
+        self._session = Session(snapshot_every, retry_for)
+
+    @property
+    def id(self) -> Optional[str]:
+        """The session's id at the service; it changes when the session moves. None without a session."""
+        return self._session.id
+
+    @property
+    def box(self) -> Box:
+        """The last answer."""
+        return self.answer.box
+
+    @property
+    def score(self) -> float:
+        """The chance, from 0 to 1, that the box overlaps the target by half or more."""
+        return self.answer.score
+
+    @property
+    def status(self) -> Status:
+        """What the score and its history mean."""
+        return self.answer.status
+
+    @property
+    def frame(self) -> int:
+        """The number of the last frame; the first is 0."""
+        return self.answer.frame
+
+    @property
+    def answer(self) -> Answer:
+        """All that was said of the last frame. `RuntimeError` before `init`."""
+        if self._session.answer is None:
+            raise RuntimeError("the client has no target yet: call init(frame, box) first")
+        return self._session.answer
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """All parameters by their names, as the service says them."""
+        return dict(self._session.params)
+
+    def _encode(self, frame: Frame) -> bytes:
+        return encode(frame, self._encoding, self._quality)
+
+    def _opening(self, frame: Frame, box: BoxLike) -> Steps[None]:
+        query = {**self._settings, "box": query_box(four_numbers(box))}
+        return self._session.open(query, self._encode(frame), IMAGE)
+
+
+def request_of(step: Request, services: Services) -> dict[str, Any]:
+    """A request in the words of httpx."""
+    options: dict[str, Any] = {"method": step.method, "url": services.address(step.path), "params": dict(step.query)}
+    if step.body:
+        options.update(content=step.body, headers={"Content-Type": step.media_type})
+    return options

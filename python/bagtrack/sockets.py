@@ -1,0 +1,121 @@
+"""The WebSockets of streams, blocking and asynchronous."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import ExitStack, suppress
+from typing import Any, Optional, Union
+
+import websockets.asyncio.client
+import websockets.sync.client
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+
+from bagtrack import transport
+from bagtrack.steps import LineBroken
+from bagtrack.stream import Connect, Disconnect, Receive, Send
+from bagtrack.transport import Services
+
+FAILURES = (WebSocketException, OSError, TimeoutError, EOFError)
+
+
+class BaseSocket:
+    """How to connect, and what errors mean."""
+
+    def __init__(self, services: Services, headers: dict[str, str], timeout: float) -> None:
+        self._services = services
+        self._timeout = timeout
+        # JPEGs are compressed already; answers are short.
+        self._options: dict[str, Any] = {
+            "additional_headers": headers,
+            "compression": None,
+            "open_timeout": timeout,
+            "max_size": 1 << 20,
+        }
+
+    @staticmethod
+    def performs(step: object) -> bool:
+        """Whether it is a step of the socket."""
+        return isinstance(step, (Connect, Disconnect, Send, Receive))
+
+    def _address(self, step: Connect) -> str:
+        return f"{self._services.socket_address(step.path)}?from={step.first}"
+
+    @staticmethod
+    def _document(message: Union[str, bytes]) -> dict[str, Any]:
+        document = transport.parse(message)
+        if not isinstance(document, dict) or not document:
+            raise LineBroken(f"the service sent a message that is no JSON object: {message!r}")
+        return document
+
+    @staticmethod
+    def _broken(error: BaseException) -> LineBroken:
+        if isinstance(error, InvalidStatus):
+            return transport.refused(error.response.status_code, error.response.body or b"{}")
+        if isinstance(error, ConnectionClosed) and error.rcvd is not None:
+            return transport.closed(error.rcvd.code, error.rcvd.reason)
+        return LineBroken(str(error) or type(error).__name__)
+
+
+class Socket(BaseSocket):
+    """A blocking WebSocket, opened again and again."""
+
+    _socket: Optional[websockets.sync.client.ClientConnection] = None
+    _lifetime: Optional[ExitStack] = None
+
+    def perform(self, step: Any) -> Optional[dict[str, Any]]:
+        """Takes a step; the document that came, where it waits for one. `LineBroken`."""
+        try:
+            if isinstance(step, Connect):
+                self._lifetime = ExitStack()
+                connection = websockets.sync.client.connect(self._address(step), **self._options)
+                self._socket = self._lifetime.enter_context(connection)
+                return self._document(self._socket.recv(self._timeout))
+            if isinstance(step, Disconnect):
+                self.close()
+            elif self._socket is None:
+                raise LineBroken("the stream is not open")
+            elif isinstance(step, Send):
+                self._socket.send(step.message)
+            else:
+                return self._document(self._socket.recv(self._timeout))
+        except FAILURES as error:
+            raise self._broken(error) from error
+        return None
+
+    def close(self) -> None:
+        """Closes the line, if there is one."""
+        lifetime, self._socket, self._lifetime = self._lifetime, None, None
+        if lifetime is not None:
+            with suppress(*FAILURES):
+                lifetime.close()
+
+
+class AsyncSocket(BaseSocket):
+    """`Socket` for asyncio."""
+
+    _socket: Optional[websockets.asyncio.client.ClientConnection] = None
+
+    async def perform(self, step: Any) -> Optional[dict[str, Any]]:
+        """As `Socket.perform`."""
+        try:
+            if isinstance(step, Connect):
+                self._socket = await websockets.asyncio.client.connect(self._address(step), **self._options)
+                return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
+            if isinstance(step, Disconnect):
+                await self.close()
+            elif self._socket is None:
+                raise LineBroken("the stream is not open")
+            elif isinstance(step, Send):
+                await self._socket.send(step.message)
+            else:
+                return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
+        except FAILURES as error:
+            raise self._broken(error) from error
+        return None
+
+    async def close(self) -> None:
+        """Closes the line, if there is one."""
+        socket, self._socket = self._socket, None
+        if socket is not None:
+            with suppress(*FAILURES):
+                await socket.close()

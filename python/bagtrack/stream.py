@@ -1,0 +1,167 @@
+"""Many frames over a WebSocket, several of them on their way at once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Optional
+
+from bagtrack.answer import Answer
+from bagtrack.errors import ServiceError, ServiceUnavailable
+from bagtrack.session import GONE, Session, Upload
+from bagtrack.steps import LineBroken, NextService, Pause, Reply, Steps
+
+
+@dataclass(frozen=True)
+class Connect:
+    """Open the session's stream at this path."""
+
+    path: str
+    first: int
+    """The first frame whose answer is wanted."""
+
+
+@dataclass(frozen=True)
+class Disconnect:
+    """Close the stream."""
+
+
+@dataclass(frozen=True)
+class Send:
+    """Send a message: text or bytes."""
+
+    message: Any
+
+
+@dataclass(frozen=True)
+class Receive:
+    """Wait for a message, which is a JSON document."""
+
+
+@dataclass(frozen=True)
+class NextFrame:
+    """The caller's next frame, as bytes; None after the last one."""
+
+
+@dataclass(frozen=True)
+class Give:
+    """Give the caller an answer."""
+
+    answer: Answer
+
+
+class Stream:
+    """The frames of a caller through a session's stream. `run` is a generator of steps."""
+
+    def __init__(self, session: Session, window: int) -> None:
+        self._session = session
+        self._window = window
+        self._sent = 0
+        """The last frame that is on its way or answered."""
+        self._ended = False
+        self._tries = 0
+
+    def run(self) -> Steps[None]:
+        """Sends frames and gives their answers, until there are no more frames."""
+        session = self._session
+        while not (self._ended and self._answered() + 1 == session.next_number()):
+            try:
+                yield from self._connect()
+                yield from self._exchange()
+                yield Disconnect()
+            except LineBroken as broken:
+                yield Disconnect()
+                yield from self._mend(broken)
+
+    def _answered(self) -> int:
+        return self._session.answer.frame if self._session.answer else 0
+
+    def _connect(self) -> Steps[None]:
+        first = self._answered() + 1
+        hello = yield Connect(self._session.path("/stream"), first)
+        # The answers to the frames before this one come of themselves.
+        self._sent = hello["next"] - 1
+        self._session.at = self._sent
+
+    def _exchange(self) -> Steps[None]:
+        """Sends and receives, until the frames have ended or the session is to be looked after."""
+        session = self._session
+        reply: Optional[Reply] = None
+        while True:
+            if reply is None and self._sent - self._answered() < self._window:
+                upload = yield from self._next_upload()
+                if upload is not None:
+                    self._sent += 1
+                    header: dict[str, Any] = {"frame": self._sent}
+                    if upload.box is not None:
+                        header["box"] = upload.box
+                    yield Send(json.dumps(header))
+                    yield Send(upload.body)
+                    continue
+            if self._sent == self._answered():
+                if reply is None:
+                    return
+                # Nothing is on its way, so the snapshot is of the last answer.
+                before = session.id
+                yield from session.look_after(reply)
+                reply = None
+                if session.id != before:
+                    return
+                continue
+            document = yield Receive()
+            if "type" in document:
+                self._refuse(document)
+            self._tries = 0
+            session.answer = Answer.parse(document)
+            session.at = max(session.at, session.answer.frame)
+            if session.wants_care(document):
+                reply = as_reply(document)
+            yield Give(session.answer)
+
+    def _next_upload(self) -> Steps[Optional[Upload]]:
+        number = self._sent + 1
+        upload = self._session.kept(number)
+        if upload is None and not self._ended:
+            body = yield NextFrame()
+            self._ended = body is None
+            if body is not None:
+                upload = Upload(body)
+                self._session.keep(number, upload)
+        return upload
+
+    def _refuse(self, problem: dict[str, Any]) -> None:
+        if problem.get("status") in (429, 503):
+            raise LineBroken(problem.get("detail", ""), problem["status"])
+        self._session.drop_refused()
+        raise ServiceError(problem.get("status", 0), problem)
+
+    def _mend(self, broken: LineBroken) -> Steps[None]:
+        """Makes the session ready for the next connection."""
+        session, answered = self._session, self._answered()
+        self._tries += 1
+        if broken.status in GONE:
+            yield from session.restore()
+            if session.at < answered:
+                yield from session.catch_up(answered)
+            return
+        if broken.status == 409 and broken.document.get("expected_frame", answered + 1) <= answered:
+            # The service is at its last checkpoint.
+            session.at = broken.document["expected_frame"] - 1
+            yield from session.catch_up(answered)
+            return
+        if broken.status and broken.status not in (429, 502, 503, 504):
+            raise ServiceError(broken.status, broken.document)
+        if self._tries > 1:
+            yield NextService()
+        pause = min(0.05 * 2.0**self._tries, 2.0)
+        if self._tries * pause > session.retry_for:
+            raise ServiceUnavailable(f"the stream breaks again and again: {broken}") from broken
+        yield Pause(pause)
+
+
+def as_reply(document: dict[str, Any]) -> Reply:
+    """An answer of a stream with what it says of the service as headers."""
+    headers = {"draining": "true"} if document.get("draining") else {}
+    if "checkpoint" in document:
+        headers["checkpoint"] = str(document["checkpoint"])
+    return Reply(200, headers, b"", document)

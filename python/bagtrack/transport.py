@@ -1,0 +1,65 @@
+"""What both clients need of HTTP: addresses, headers, replies."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Mapping, Sequence, Union
+
+from bagtrack.steps import LineBroken, Reply
+
+
+class Services:
+    """The addresses of a service, one of which is in use."""
+
+    def __init__(self, url: Union[str, Sequence[str]]) -> None:
+        urls = [url] if isinstance(url, str) else list(url)
+        if not urls:
+            raise ValueError("there is no address of a service")
+        self._urls = [address.rstrip("/") for address in urls]
+        self._used = 0
+
+    def address(self, path: str) -> str:
+        """The address of a path."""
+        return self._urls[self._used] + path
+
+    def socket_address(self, path: str) -> str:
+        """The address of a stream."""
+        address = self.address(path)
+        return "ws" + address.removeprefix("http")
+
+    def next(self) -> None:
+        """Goes on to the next address."""
+        self._used = (self._used + 1) % len(self._urls)
+
+
+def authorization(api_key: Union[str, None]) -> dict[str, str]:
+    """The headers that say who calls."""
+    return {} if api_key is None else {"Authorization": f"Bearer {api_key}"}
+
+
+def reply(status: int, headers: Mapping[str, str], body: bytes) -> Reply:
+    """A reply, with its body read as JSON where it is that."""
+    document = parse(body) if "json" in headers.get("content-type", "") else {}
+    return Reply(status, {name.lower(): value for name, value in headers.items()}, body, document)
+
+
+def parse(text: Union[str, bytes, bytearray]) -> Any:
+    """A JSON document; an empty object where it cannot be read."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return {}
+
+
+def refused(status: int, body: Union[bytes, bytearray]) -> LineBroken:
+    """A stream that was refused at its handshake."""
+    document = parse(body)
+    return LineBroken(document.get("detail", f"the service answered {status}"), status, document)
+
+
+def closed(code: Union[int, None], reason: str) -> LineBroken:
+    """A stream that was closed. The code is 4000 and the status of a problem, where there was one."""
+    status = (code or 0) - 4000
+    # 4409: another stream of the session has taken this one's place.
+    is_problem = status > 0 and status != 409
+    return LineBroken(f"the stream was closed ({code} {reason})", status if is_problem else 0)

@@ -1,0 +1,16 @@
+//! The tracker as a Python class: `bagtrack.Tracker`.
+//!
+//! In: NumPy arrays and boxes of four numbers. Out: boxes as tuples. Whatever the tracker refuses is a `ValueError`
+//! with the tracker's words, and changes nothing.
+
+mod frame;
+mod params;
+mod target;
+mod tracker;
+
+/// The module `bagtrack._native`.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::tracker::PyTracker;
+}

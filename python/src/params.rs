@@ -1,0 +1,101 @@
+//! Keyword arguments to the tracker's parameters.
+
+use bagtrack::tracker::{Params, Preset};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict};
+use serde_json::{Map, Value};
+
+/// Seeds drawn here are below this, so that JSON numbers hold them exactly in every language.
+const SEED_END: u64 = 1 << 53;
+
+/// The parameters of `preset` with single ones set otherwise. Without any seed one is drawn from Python's `random`.
+///
+/// # Errors
+/// There is no such preset or parameter, or a value is of the wrong type or out of its range.
+pub fn params(
+    preset: &str,
+    seed: Option<u64>,
+    single: Option<&Bound<'_, PyDict>>,
+    py: Python<'_>,
+) -> PyResult<Params> {
+    let preset: Preset = serde_json::from_value(preset.into()).map_err(|_| {
+        PyValueError::new_err(format!("the preset is robust or paper, not {preset:?}"))
+    })?;
+    let mut params = preset.params();
+    for (name, value) in single.into_iter().flatten() {
+        params = with(&params, name.extract()?, &value)?;
+    }
+    params.seed = match seed {
+        Some(seed) => seed,
+        None => py
+            .import("random")?
+            .call_method1("randrange", (SEED_END,))?
+            .extract()?,
+    };
+    params
+        .validate()
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(params)
+}
+
+/// Each parameter's value by its name.
+pub fn by_name(params: &Params, py: Python<'_>) -> PyResult<Py<PyDict>> {
+    let dict = PyDict::new(py);
+    for (name, value) in fields(params) {
+        match value {
+            Value::Bool(value) => dict.set_item(name, value)?,
+            Value::String(value) => dict.set_item(name, value)?,
+            Value::Number(value) => match value.as_u64() {
+                Some(whole) => dict.set_item(name, whole)?,
+                None => dict.set_item(name, value.as_f64())?,
+            },
+            other => unreachable!("a parameter is a number, a truth value or a name, not {other}"),
+        }
+    }
+    Ok(dict.unbind())
+}
+
+fn with(params: &Params, name: String, value: &Bound<'_, PyAny>) -> PyResult<Params> {
+    let mut fields = fields(params);
+    if !fields.contains_key(&name) {
+        let known: Vec<&str> = Params::TABLE.iter().map(|row| row.name).collect();
+        return Err(PyTypeError::new_err(format!(
+            "there is no parameter {name}; the parameters are {}",
+            known.join(", ")
+        )));
+    }
+    fields.insert(name.clone(), json(value)?);
+    serde_json::from_value(Value::Object(fields)).map_err(|error| {
+        let value = value
+            .repr()
+            .map_or_else(|_| "that".into(), |it| it.to_string());
+        PyValueError::new_err(format!("parameter {name} cannot be {value}: {error}"))
+    })
+}
+
+fn fields(params: &Params) -> Map<String, Value> {
+    match serde_json::to_value(params) {
+        Ok(Value::Object(fields)) => fields,
+        _ => unreachable!("the parameters are a struct of numbers, truth values and names"),
+    }
+}
+
+/// A number, truth value or text. Whole numbers may be given as floats; NumPy's numbers are taken, too.
+fn json(value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if let Ok(truth) = value.cast::<PyBool>() {
+        return Ok(truth.is_true().into());
+    }
+    if let Ok(text) = value.extract::<String>() {
+        return Ok(text.into());
+    }
+    if let Ok(whole) = value.extract::<u64>() {
+        return Ok(whole.into());
+    }
+    let number: f64 = value.extract()?;
+    let is_whole = number.fract() == 0.0 && (0.0..=SEED_END as f64).contains(&number);
+    Ok(match is_whole {
+        true => (number as u64).into(),
+        false => number.into(),
+    })
+}

@@ -1,0 +1,30 @@
+//! Boxes: four numbers in Python, a rectangle in Rust.
+
+use bagtrack::tracker::Rect;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// x, y, width and height in pixels of the frame, as OpenCV has them.
+pub type Numbers = (f64, f64, f64, f64);
+
+/// The rectangle of a sequence of four numbers.
+///
+/// # Errors
+/// Anything else.
+pub fn rect(object: &Bound<'_, PyAny>) -> PyResult<Rect> {
+    let numbers = object.try_iter().and_then(|items| {
+        let items: PyResult<Vec<f64>> = items.map(|item| item?.extract()).collect();
+        items
+    });
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) => Ok(Rect::new(x, y, width, height)),
+        _ => Err(PyValueError::new_err(
+            "a box is four numbers: x, y, width, height",
+        )),
+    }
+}
+
+/// The numbers of a rectangle.
+pub fn numbers(rect: &Rect) -> Numbers {
+    (rect.x, rect.y, rect.width, rect.height)
+}

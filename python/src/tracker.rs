@@ -1,0 +1,168 @@
+//! The class `bagtrack.Tracker`.
+
+use super::frame::frame;
+use super::params::{by_name, params};
+use super::target::{Numbers, numbers, rect};
+use bagtrack::tracker::{Estimate, Params, Status, Tracker, TrackerError};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyType};
+use std::sync::{Mutex, MutexGuard};
+
+/// Follows one object through frames, in this process.
+#[pyclass(name = "Tracker", module = "bagtrack", frozen)]
+pub struct PyTracker {
+    params: Params,
+    /// None before `init`.
+    tracker: Mutex<Option<Tracker>>,
+}
+
+fn value_error(error: TrackerError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+impl PyTracker {
+    /// The tracker, once no other thread is at it.
+    fn lock(&self) -> PyResult<MutexGuard<'_, Option<Tracker>>> {
+        let poisoned = |_| PyRuntimeError::new_err("an earlier call failed; make a new tracker");
+        self.tracker.lock().map_err(poisoned)
+    }
+
+    /// Changes the tracker, or leaves it as it was, while other threads of Python go on.
+    fn change<T: Send>(
+        &self,
+        py: Python<'_>,
+        change: impl FnOnce(&mut Tracker) -> Result<T, TrackerError> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| match self.lock()?.as_mut() {
+            Some(tracker) => change(tracker).map_err(value_error),
+            None => Err(before_init()),
+        })
+    }
+
+    fn estimate(&self, py: Python<'_>) -> PyResult<Estimate> {
+        self.change(py, |tracker| Ok(tracker.estimate()))
+    }
+}
+
+fn before_init() -> PyErr {
+    PyRuntimeError::new_err("the tracker has no target yet: call init(frame, box) first")
+}
+
+#[pymethods]
+impl PyTracker {
+    #[new]
+    #[pyo3(signature = (preset = "robust", seed = None, **params))]
+    fn new(
+        py: Python<'_>,
+        preset: &str,
+        seed: Option<u64>,
+        params: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            params: self::params(preset, seed, params, py)?,
+            tracker: Mutex::new(None),
+        })
+    }
+
+    /// Starts on `frame` with the target in `box`; whatever was followed before is forgotten.
+    fn init(
+        &self,
+        py: Python<'_>,
+        frame: &Bound<'_, PyAny>,
+        r#box: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let (frame, target) = (self::frame(frame)?, rect(r#box)?);
+        py.detach(|| {
+            let tracker = Tracker::new(&frame, target, self.params.clone()).map_err(value_error)?;
+            *self.lock()? = Some(tracker);
+            Ok(())
+        })
+    }
+
+    /// Finds the target in the next frame: `(ok, box)`. `ok` is False where the target is lost; `box` is the best guess
+    /// then.
+    fn update(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<(bool, Numbers)> {
+        let frame = self::frame(frame)?;
+        let estimate = self.change(py, |tracker| tracker.step(&frame))?;
+        Ok((estimate.status != Status::Lost, numbers(&estimate.target)))
+    }
+
+    /// The user corrects the box: `frame` counts as the next one, with `box` as its answer.
+    fn retarget(
+        &self,
+        py: Python<'_>,
+        frame: &Bound<'_, PyAny>,
+        r#box: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let (frame, target) = (self::frame(frame)?, rect(r#box)?);
+        self.change(py, |tracker| tracker.retarget(&frame, target))?;
+        Ok(())
+    }
+
+    /// The last answer: (x, y, width, height).
+    #[getter]
+    fn r#box(&self, py: Python<'_>) -> PyResult<Numbers> {
+        Ok(numbers(&self.estimate(py)?.target))
+    }
+
+    /// The chance, from 0 to 1, that the box overlaps the target by half or more.
+    #[getter]
+    fn score(&self, py: Python<'_>) -> PyResult<f64> {
+        let score = self.estimate(py)?.score;
+        // The shortest decimal that means this score, as the service sends it.
+        let decimal = score.to_string().parse();
+        Ok(decimal.expect("a finite number is written so that it can be read"))
+    }
+
+    /// "tracking", "uncertain" or "lost".
+    #[getter]
+    fn status(&self, py: Python<'_>) -> PyResult<&'static str> {
+        Ok(match self.estimate(py)?.status {
+            Status::Tracking => "tracking",
+            Status::Uncertain => "uncertain",
+            Status::Lost => "lost",
+        })
+    }
+
+    /// The number of the last frame; the first is 0.
+    #[getter]
+    fn frame(&self, py: Python<'_>) -> PyResult<u64> {
+        Ok(self.estimate(py)?.frame)
+    }
+
+    /// All parameters by their names.
+    #[getter]
+    fn params(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
+        by_name(&self.params, py)
+    }
+
+    /// The whole state as bytes.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let snapshot = self.change(py, |tracker| Ok(tracker.snapshot()))?;
+        Ok(PyBytes::new(py, &snapshot))
+    }
+
+    /// A tracker that goes on from what `save` gave, bit for bit.
+    #[classmethod]
+    fn load(_: &Bound<'_, PyType>, py: Python<'_>, snapshot: &[u8]) -> PyResult<Self> {
+        let tracker = py
+            .detach(|| Tracker::restore(snapshot))
+            .map_err(value_error)?;
+        Ok(Self {
+            params: tracker.params().clone(),
+            tracker: Mutex::new(Some(tracker)),
+        })
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        match self.estimate(py) {
+            Ok(estimate) => format!(
+                "<bagtrack.Tracker frame={} box={:?}>",
+                estimate.frame,
+                numbers(&estimate.target)
+            ),
+            Err(_) => "<bagtrack.Tracker without a target>".to_owned(),
+        }
+    }
+}

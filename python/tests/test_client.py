@@ -1,0 +1,278 @@
+"""The clients against the real server: the same boxes as the library's, whatever happens to the line."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import bagtrack
+from conftest import SEED, Clip, Server, to_hundredths
+from lossy_line import LossyLine
+
+StartServer = Callable[..., Server]
+DURABLE = ("--shutdown-delay", "60s")
+
+
+def follow(client: bagtrack.Client, clip: Clip, before: dict[int, Callable[[], object]] | None = None) -> list:
+    """The boxes of all frames; `before` has what happens before a frame is sent."""
+    bodies = [file.read_bytes() for file in clip.files]
+    client.init(bodies[0], clip.box)
+    boxes = [client.box]
+    for number, body in enumerate(bodies[1:], 1):
+        (before or {}).get(number, lambda: None)()
+        ok, box = client.update(body)
+        assert (ok, box, client.frame) == (client.status != "lost", client.box, number)
+        boxes.append(box)
+    return boxes
+
+
+def test_a_hundred_frames_get_the_librarys_answers(start_server: StartServer, clip: Clip) -> None:
+    with bagtrack.Client(start_server().url, seed=SEED) as client:
+        assert follow(client, clip) == clip.answered()
+        last = clip.expected[-1]
+        assert (client.score, client.status, client.frame) == (round(last["score"], 3), last["status"], last["frame"])
+        assert client.params["seed"] == SEED
+
+
+def test_arrays_are_sent_without_loss_as_png_and_with_some_as_jpeg(start_server: StartServer, clip: Clip) -> None:
+    url = start_server().url
+    frames = clip.frames()[:20]
+    boxes = {}
+    for encoding in ("png", "jpeg"):
+        with bagtrack.Client(url, seed=SEED, encoding=encoding) as client:
+            client.init(frames[0], clip.box)
+            boxes[encoding] = [client.update(frame)[1] for frame in frames[1:]]
+    assert boxes["png"] == clip.answered()[1:20]
+    difference = np.abs(np.array(boxes["jpeg"]) - np.array(boxes["png"])).max()
+    assert 0 < difference < 3
+
+
+def test_a_killed_server_that_starts_again_goes_on_from_the_snapshot(start_server: StartServer, clip: Clip) -> None:
+    server = start_server()
+
+    def kill_and_start_again() -> None:
+        server.kill()
+        server.start_again()
+
+    with bagtrack.Client(server.url, seed=SEED, snapshot_every=20) as client:
+        # Once with only the first frame to begin from, once from a snapshot that is some frames old.
+        boxes = follow(client, clip, {7: kill_and_start_again, 55: kill_and_start_again})
+    assert boxes == clip.answered()
+
+
+def test_a_seed_that_the_service_drew_is_kept_when_it_is_killed(start_server: StartServer, clip: Clip) -> None:
+    server = start_server()
+
+    def kill_and_start_again() -> None:
+        server.kill()
+        server.start_again()
+
+    with bagtrack.Client(server.url) as client:
+        boxes = follow(client, clip, {7: kill_and_start_again})
+        tracker = bagtrack.Tracker(seed=client.params["seed"])
+    frames = clip.frames()
+    tracker.init(frames[0], clip.box)
+    assert boxes[1:] == [to_hundredths(tracker.update(frame)[1]) for frame in frames[1:]]
+
+
+def test_a_frame_whose_answer_was_lost_is_not_tracked_twice(start_server: StartServer, clip: Clip) -> None:
+    """The line breaks after the service has answered, before the answer has come."""
+    with LossyLine(start_server().port, loses={5, 6, 40}) as line:
+        with bagtrack.Client(line.url, seed=SEED) as client:
+            assert follow(client, clip) == clip.answered()
+        assert line.lost == 3
+
+
+def test_without_snapshots_a_lost_session_is_said(start_server: StartServer, clip: Clip) -> None:
+    server = start_server()
+    client = bagtrack.Client(server.url, seed=SEED, snapshot_every=0)
+    body = clip.files[0].read_bytes()
+    client.init(body, clip.box)
+    client.update(body)
+    server.kill()
+    server.start_again()
+    with pytest.raises(bagtrack.ServiceUnavailable, match="lost the session"):
+        client.update(body)
+
+
+def test_a_client_goes_to_another_service_when_one_drains(start_server: StartServer, clip: Clip) -> None:
+    first, second = start_server(*DURABLE), start_server()
+    with bagtrack.Client([first.url, second.url], seed=SEED, snapshot_every=0) as client:
+        boxes = follow(client, clip, {30: first.drain, 60: first.kill})
+    assert boxes == clip.answered()
+
+
+def test_a_client_goes_on_at_a_single_service_that_drains_and_starts_again(
+    start_server: StartServer, clip: Clip
+) -> None:
+    server = start_server(*DURABLE)
+
+    def start_again() -> None:
+        server.kill()
+        server.start_again()
+
+    with bagtrack.Client(server.url, seed=SEED, snapshot_every=50) as client:
+        boxes = follow(client, clip, {30: server.drain, 40: start_again})
+    assert boxes == clip.answered()
+
+
+def test_a_server_that_is_away_for_a_while_is_waited_for_and_then_given_up(
+    start_server: StartServer, clip: Clip
+) -> None:
+    server = start_server()
+    bodies = [file.read_bytes() for file in clip.files]
+    client = bagtrack.Client(server.url, seed=SEED, retry_for=0.3)
+    client.init(bodies[0], clip.box)
+    server.kill()
+    with pytest.raises(bagtrack.ServiceUnavailable, match="no answer within 0.3 s"):
+        client.update(bodies[1])
+    server.start_again()
+    # The frame without an answer is sent before the next one.
+    assert client.update(bodies[2])[1] == clip.answered()[2]
+    assert client.frame == 2
+
+
+def test_refusals_are_told_and_change_nothing(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client(start_server().url, seed=SEED) as client:
+        with pytest.raises(RuntimeError, match=r"call init\(frame, box\) first"):
+            client.update(bodies[0])
+        with pytest.raises(bagtrack.ServiceError) as refused:
+            client.init(bodies[0], (0, 0, 1, 1))
+        assert (refused.value.status, refused.value.kind) == (422, "invalid-box")
+        with pytest.raises(ValueError, match="a box is four numbers"):
+            client.init(bodies[0], (1, 2, 3))
+        client.init(bodies[0], clip.box)
+        with pytest.raises(bagtrack.ServiceError, match="cannot be decoded") as refused:
+            client.update(bodies[1][:-20])
+        assert refused.value.kind == "frame-damaged"
+        with pytest.raises(ValueError, match="dtype uint8"):
+            client.update(np.zeros((240, 320)))
+        assert [client.update(body)[1] for body in bodies[1:5]] == clip.answered()[1:5]
+        client.retarget(bodies[5], (100, 80, 40, 30))
+        assert client.answer == bagtrack.Answer(5, (100, 80, 40, 30), 1.0, "tracking")
+
+
+def test_a_key_is_sent(start_server: StartServer, clip: Clip, tmp_path) -> None:
+    keys = tmp_path / "keys"
+    keys.write_text("somebody:a-key-of-sufficient-length-for-tests\n")
+    url = start_server("--api-keys-file", str(keys)).url
+    body = clip.files[0].read_bytes()
+    with pytest.raises(bagtrack.ServiceError) as refused:
+        bagtrack.Client(url).init(body, clip.box)
+    assert refused.value.kind == "unauthorized"
+    with bagtrack.Client(url, "a-key-of-sufficient-length-for-tests", seed=SEED) as client:
+        bodies = [file.read_bytes() for file in clip.files[:10]]
+        client.init(bodies[0], clip.box)
+        assert [answer.box for answer in client.track(bodies[1:])] == clip.answered()[1:10]
+
+
+def test_a_saved_session_goes_on_elsewhere(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client(start_server().url, seed=SEED) as client:
+        client.init(bodies[0], clip.box)
+        for body in bodies[1:30]:
+            client.update(body)
+        with bagtrack.Client.load(client.save(), start_server().url) as other:
+            assert other.answer == client.answer
+            assert [other.update(body)[1] for body in bodies[30:40]] == clip.answered()[30:40]
+
+
+def test_a_stream_gives_the_librarys_answers(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    for window in (1, 8, 32):
+        with bagtrack.Client(start_server().url, seed=SEED, snapshot_every=10) as client:
+            client.init(bodies[0], clip.box)
+            answers = list(client.track(bodies[1:60], window))
+            assert [answer.frame for answer in answers] == list(range(1, 60))
+            assert [answer.box for answer in answers] == clip.answered()[1:60]
+            # Posts and a second stream go on from there.
+            assert client.update(bodies[60])[1] == clip.answered()[60]
+            assert [answer.box for answer in client.track(bodies[61:])] == clip.answered()[61:]
+
+
+@pytest.mark.parametrize("snapshot_every", [5, 20, 1000])
+def test_a_stream_survives_a_killed_server(start_server: StartServer, clip: Clip, snapshot_every: int) -> None:
+    server = start_server()
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client(server.url, seed=SEED, snapshot_every=snapshot_every) as client:
+        client.init(bodies[0], clip.box)
+        boxes = []
+        for answer in client.track(bodies[1:]):
+            boxes.append(answer.box)
+            if answer.frame in (25, 70):
+                server.kill()
+                server.start_again()
+    assert boxes == clip.answered()[1:]
+
+
+def test_a_stream_goes_on_after_a_broken_line_and_tracks_no_frame_twice(
+    start_server: StartServer, clip: Clip
+) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    with LossyLine(start_server().port, loses=set()) as line:
+        with bagtrack.Client(line.url, seed=SEED) as client:
+            client.init(bodies[0], clip.box)
+            first, boxes = client.id, []
+            for answer in client.track(bodies[1:]):
+                boxes.append(answer.box)
+                if answer.frame in (3, 25, 26, 70):
+                    line.cut()
+            # The service still had the session: nothing was opened anew.
+            assert (boxes, client.id) == (clip.answered()[1:], first)
+
+
+def test_a_stream_moves_when_the_service_drains(start_server: StartServer, clip: Clip) -> None:
+    first, second = start_server(*DURABLE), start_server()
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client([first.url, second.url], seed=SEED) as client:
+        client.init(bodies[0], clip.box)
+        boxes = []
+        for answer in client.track(bodies[1:]):
+            boxes.append(answer.box)
+            if answer.frame == 30:
+                first.drain()
+            if answer.frame == 70:
+                first.kill()
+    assert boxes == clip.answered()[1:]
+
+
+def test_a_stream_tells_of_a_bad_frame_and_the_session_goes_on(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client(start_server().url, seed=SEED) as client:
+        client.init(bodies[0], clip.box)
+        boxes = []
+        with pytest.raises(bagtrack.ServiceError, match="cannot be decoded"):
+            for answer in client.track([*bodies[1:10], bodies[10][:-20], *bodies[11:20]]):
+                boxes.append(answer.box)
+        assert boxes == clip.answered()[1:10]
+        assert [answer.box for answer in client.track(bodies[10:20])] == clip.answered()[10:20]
+
+
+def test_the_asynchronous_client_does_the_same(start_server: StartServer, clip: Clip) -> None:
+    first, second = start_server(), start_server()
+    bodies = [file.read_bytes() for file in clip.files]
+
+    async def follow_one() -> list:
+        async with bagtrack.AsyncClient([first.url, second.url], seed=SEED, snapshot_every=20) as client:
+            await client.init(bodies[0], clip.box)
+            boxes = [client.box]
+            for body in bodies[1:40]:
+                boxes.append((await client.update(body))[1])
+            if first.process.poll() is None:
+                first.kill()
+            async for answer in client.track(bodies[40:70]):
+                boxes.append(answer.box)
+            other = await bagtrack.AsyncClient.load(await client.save(), second.url)
+            async with other:
+                for body in bodies[70:]:
+                    boxes.append((await other.update(body))[1])
+            return boxes
+
+    async def follow_two() -> list:
+        return await asyncio.gather(follow_one(), follow_one())
+
+    assert asyncio.run(follow_two()) == [clip.answered()] * 2
