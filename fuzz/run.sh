@@ -12,7 +12,8 @@ targets=("$@")
 # The threads of the service live as long as the process, and what they keep is no leak. The soak looks for leaks.
 export ASAN_OPTIONS=detect_leaks=0
 
-cargo +nightly run --bin seeds
+# Without sockets the service is there for fuzzing only.
+RUSTFLAGS="--cfg fuzzing" cargo +nightly run --target-dir target/seeds --bin seeds
 for target in "${targets[@]}"; do
     mkdir -p "corpus/$target"
     cargo +nightly fuzz run --fuzz-dir . "$target" -- \

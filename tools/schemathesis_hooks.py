@@ -14,6 +14,7 @@ import zlib
 import requests
 import schemathesis
 from hypothesis import strategies as st
+from schemathesis import GenerationMode
 from schemathesis.transport.serialization import Binary
 
 WIDTH, HEIGHT = 64, 48
@@ -48,7 +49,10 @@ def snapshot():
     return requests.get(f"{URL}{created.headers['location']}/snapshot", timeout=60).content
 
 
-for kind in ["image/png", "image/jpeg", "image/webp"]:
+# The service looks at the bytes: a picture is taken for any of these.
+KINDS = ["image/png", "image/jpeg", "image/webp", "image/gif", "application/octet-stream"]
+KINDS += ["video/mp4", "video/webm", "video/x-motion-jpeg"]
+for kind in KINDS:
     schemathesis.openapi.media_type(kind, st.sampled_from(PICTURES))
 # The parts of forms.
 schemathesis.openapi.format("binary", st.sampled_from(PICTURES).map(Binary))
@@ -65,7 +69,12 @@ def text_of(box):
 
 
 schemathesis.openapi.format("box", st.integers(0, 99).map(lambda number: text_of(box(number))))
+schemathesis.openapi.format("boxes", st.just("20,15,16,12;30,20,12,10"))
 schemathesis.openapi.format("json", st.sampled_from(["{}", '{"particles": 80}', '{"seed": 7, "sigma": 0.3}']))
+
+
+def path_takes_several(case):
+    return case.operation.path in ("/track", "/sessions/{id}/frames")
 
 
 @schemathesis.hook
@@ -81,24 +90,56 @@ def before_call(context, case, kwargs):
         case.headers["Idempotency-Key"] = str(uuid.uuid4())
     body = case.body if isinstance(case.body, dict) else None
     if body is not None and media_type == "application/json":
-        if isinstance(body.get("box"), (dict, list)):
+        if body.get("box") is not None:
             body["box"] = box(count)
-        if body.get("params") is not None:
+        if body.get("parameters") is not None:
             # Each value is in its range; large ones can be too much together.
-            body["params"] = {name: body["params"][name] for name in ("seed",) if name in body["params"]}
+            body["parameters"] = {name: body["parameters"][name] for name in ("seed",) if name in body["parameters"]}
         picture = base64.b64encode(PICTURES[count % len(PICTURES)]).decode()
         if body.get("frame") is not None:
             body["frame"] = picture
         if body.get("frames") is not None:
             body["frames"] = [picture for _ in body["frames"]]
+        if path_takes_several(case) and body.get("frame") is None and not body.get("frames"):
+            # One of the two has to be there.
+            body["frame"] = picture
+    path, method = case.operation.path, case.method.upper()
+    if path == "/integrations/cvat" and body is not None:
+        # Tracks begin: no text is a state, and there has to be a target, which lies on the picture.
+        body["image"] = base64.b64encode(PICTURES[count % len(PICTURES)]).decode()
+        body["shapes"] = [[20, 15, 36, 27] for _ in (body.get("shapes") or [None])[:3]]
+        body["states"] = []
+    # A target may be named where there are several; one frame alone is drawn.
+    for name in ["target", "draw"]:
+        query.pop(name, None)
+        if body is not None and name in body:
+            body.pop(name)
+    # Boxes stand in place of a box.
+    if body is not None:
+        body.pop("boxes", None)
+    if "box" in query or (body and body.get("box")):
+        query.pop("boxes", None)
+    elif "boxes" in query:
+        query["boxes"] = "20,15,16,12;30,20,12,10"
+    if path == "/sessions/{id}/target":
+        query["target"] = 0
+        case.query = query
+    if (path, method) == ("/sessions/{id}", "PUT"):
+        # An id belongs to one request.
+        case.path_parameters["id"] = str(uuid.uuid4())
+    if path == "/track" and body is not None:
+        # A track begins: no picture is a snapshot, and a snapshot holds all settings.
+        body.pop("snapshot", None)
     if media_type == "application/vnd.bagtrack.snapshot":
         # It holds all settings.
         query.clear()
-    elif case.operation.path in ("/sessions", "/sessions/{id}/target") and case.method.upper() in ("POST", "PUT"):
+    elif path in ("/sessions", "/sessions/{id}", "/sessions/{id}/target", "/track") and method in ("POST", "PUT"):
         # The box may be in the query or in the body, and has to be in one of them.
-        if "box" not in query and not (body and body.get("box")):
+        if not {"box", "boxes"} & query.keys() and not (body and body.get("box")):
             query["box"] = text_of(box(count))
             case.query = query
+    # schemathesis judges a changed request again, and takes the pictures of a form for no text.
+    case.meta.generation.mode = GenerationMode.POSITIVE
 
 
 before_call.count = 0

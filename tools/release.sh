@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Makes what a release has, in target/release-files/: the crates, the Python wheel, the container image where docker or
+# podman is, the bill of materials, and SHA256SUMS. Needs a clean checkout, and Python 3 with venv for the wheel.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+version=$(sed -n 's/^version = "\(.*\)"$/\1/p;T;q' Cargo.toml)
+files=target/release-files
+rm -rf "$files"
+mkdir -p "$files"
+
+cargo package --locked --package bagtrack --package bagtrack-client
+cp "target/package/bagtrack-$version.crate" "target/package/bagtrack-client-$version.crate" "$files"
+
+[ -x target/python/bin/pip ] || python3 -m venv target/python
+target/python/bin/pip install --quiet --disable-pip-version-check "maturin>=1.9,<2"
+target/python/bin/maturin build --quiet --release --locked --manifest-path python/Cargo.toml --out "$files"
+
+builder=$(command -v docker || command -v podman || true)
+if [ -n "$builder" ]; then
+    "$builder" build --file docker/Dockerfile --tag "bagtrack:$version" \
+        --build-arg "VERSION=$version" --build-arg "REVISION=$(git rev-parse HEAD)" .
+    "$builder" save "bagtrack:$version" | gzip >"$files/bagtrack-$version-image.tar.gz"
+else
+    echo "Left out, for want of docker or podman: the image"
+fi
+
+tools/supply_chain.sh
+cp target/bagtrack.cdx.json "$files/bagtrack-$version.cdx.json"
+
+(cd "$files" && sha256sum -- * >SHA256SUMS && cat SHA256SUMS)

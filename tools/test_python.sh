@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Builds the Python package's wheel, installs it, and runs its tests: `tools/test_python.sh [PYTEST OPTIONS]`.
+#
+# Takes the server of $BAGTRACK, or target/debug/bagtrack. Makes Python environments in target/python and
+# target/python-label-studio: the package for Label Studio's backends needs old versions of what others need new. A tool
+# whose package cannot be had is left out, with a line that says so. Real clips come from $BAGTRACK_SEQUENCES.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+environment=target/python
+label_studio=target/python-label-studio
+export BAGTRACK=${BAGTRACK:-target/debug/bagtrack}
+export MPLBACKEND=agg
+
+# Makes an environment, where it is not there yet, with these packages.
+environment_with() {
+    local folder=$1
+    shift
+    [ -x "$folder/bin/pip" ] || python3 -m venv "$folder"
+    "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"
+}
+
+environment_with "$environment" "maturin>=1.9,<2" "mypy>=1.11" "numpy>=1.21" "pytest>=8" "httpx>=0.27" \
+    "websockets>=13" "pillow>=9" "opencv-python-headless>=4.5"
+# attributee 0.1.10 is not what vot-toolkit 0.9 was made for.
+for packages in "got10k==0.1.3" "vot-toolkit==0.9.0 vot-trax>=4 attributee==0.1.9" "cvat-sdk>=2.20 cvat-cli>=2.20" \
+    "nuclio-sdk>=0.5"; do
+    # shellcheck disable=SC2086
+    environment_with "$environment" $packages || echo "Left out, for want of its package: $packages"
+done
+
+cargo clippy --locked --release -p bagtrack-python -- -D warnings
+rm -rf target/wheels
+"$environment/bin/maturin" build --quiet --release --locked --manifest-path python/Cargo.toml --out target/wheels
+"$environment/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/wheels/*.whl
+
+(cd python && "../$environment/bin/mypy" bagtrack)
+"$environment/bin/python" -m pytest --quiet -rs python/tests --ignore python/tests/test_label_studio.py "$@"
+
+if environment_with "$label_studio" "label-studio-ml==1.0.9" redis rq "setuptools<81" "numpy>=1.21" "pytest>=8" \
+    "pillow>=9" "opencv-python-headless>=4.5"; then
+    "$label_studio/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/wheels/*.whl
+    "$label_studio/bin/python" -m pytest --quiet -rs --disable-warnings python/tests/test_label_studio.py
+else
+    echo "Left out, for want of its package: label-studio-ml"
+fi
