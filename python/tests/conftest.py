@@ -11,7 +11,9 @@ import os
 import re
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,6 +58,14 @@ def read(file: Path) -> np.ndarray:
     if image.mode == "L":
         return np.asarray(image)
     return np.ascontiguousarray(np.asarray(image.convert("RGB"))[:, :, ::-1])
+
+
+@contextmanager
+def clock(what: str, frames: int) -> Iterator[None]:
+    """Prints how long each frame took; pytest's option -s shows it."""
+    started = time.perf_counter()
+    yield
+    print(f"{what}: {1000 * (time.perf_counter() - started) / frames:.2f} ms a frame")
 
 
 def box_of(document: dict) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bagtrack
-from conftest import SEED, Clip, Server, to_hundredths
+from conftest import SEED, Clip, Server, clock, to_hundredths
 from lossy_line import LossyLine
 
 StartServer = Callable[..., Server]
@@ -21,11 +21,12 @@ def follow(client: bagtrack.Client, clip: Clip, before: dict[int, Callable[[], o
     bodies = [file.read_bytes() for file in clip.files]
     client.init(bodies[0], clip.box)
     boxes = [client.box]
-    for number, body in enumerate(bodies[1:], 1):
-        (before or {}).get(number, lambda: None)()
-        ok, box = client.update(body)
-        assert (ok, box, client.frame) == (client.status != "lost", client.box, number)
-        boxes.append(box)
+    with clock("Client.update", len(bodies) - 1):
+        for number, body in enumerate(bodies[1:], 1):
+            (before or {}).get(number, lambda: None)()
+            ok, box = client.update(body)
+            assert (ok, box, client.frame) == (client.status != "lost", client.box, number)
+            boxes.append(box)
     return boxes
 
 
@@ -186,7 +187,8 @@ def test_a_stream_gives_the_librarys_answers(start_server: StartServer, clip: Cl
     for window in (1, 8, 32):
         with bagtrack.Client(start_server().url, seed=SEED, snapshot_every=10) as client:
             client.init(bodies[0], clip.box)
-            answers = list(client.track(bodies[1:60], window))
+            with clock(f"Client.track, window {window}", 59):
+                answers = list(client.track(bodies[1:60], window))
             assert [answer.frame for answer in answers] == list(range(1, 60))
             assert [answer.box for answer in answers] == clip.answered()[1:60]
             # Posts and a second stream go on from there.

@@ -16,7 +16,7 @@ from cvat_cli._internal import agent_driver_tracking  # noqa: E402
 from cvat_cli._internal.common import FunctionLoader  # noqa: E402
 
 import bagtrack  # noqa: E402
-from conftest import SEED, Clip  # noqa: E402
+from conftest import SEED, Clip, clock  # noqa: E402
 
 
 def corners(box: tuple) -> list[float]:
@@ -51,10 +51,11 @@ def test_the_agent_gets_the_boxes_of_the_tracker(agent, clip: Clip) -> None:
     states = agent._worker_job_init_tracking(1, images[0], [shape, other])
     assert len(states) == 2
     found = []
-    for image in images[1:]:
-        answer, _ = agent._worker_job_track(1, image, states)
-        assert answer.type == "rectangle"
-        found.append(answer.points)
+    with clock("cvat-sdk, two shapes of which one is followed", len(images) - 1):
+        for image in images[1:]:
+            answer, _ = agent._worker_job_track(1, image, states)
+            assert answer.type == "rectangle"
+            found.append(answer.points)
     assert found == [corners(tracker.update(frame)[1]) for frame in clip.frames()[1:]]
 
 

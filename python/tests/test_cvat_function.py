@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("nuclio_sdk", reason="the package nuclio-sdk cannot be had", exc_type=ImportError)
 
 import nuclio_sdk  # noqa: E402
-from conftest import ROOT, SEED, Clip, Server  # noqa: E402
+from conftest import ROOT, SEED, Clip, Server, clock  # noqa: E402
 
 
 def load():
@@ -53,14 +53,15 @@ def test_shapes_get_the_boxes_of_the_library(
     first = call(clip.files[0], [corners(clip.box), corners(clip.box)], [])
     assert first.status_code == 200
     states = json.loads(first.body)["states"]
-    for file, expected in zip(clip.files[1:], clip.boxes()[1:]):
-        answer = call(file, [None, None], states)
-        assert answer.content_type == "application/json"
-        answer = json.loads(answer.body)
-        for shape in answer["shapes"]:
-            assert shape == pytest.approx(corners(expected), abs=0.0051)
-        # What CVAT signs and sends back is the state as JSON.
-        states = json.loads(json.dumps(answer["states"], separators=(",", ":")))
+    with clock("nuclio-sdk, two shapes", len(clip.files) - 1):
+        for file, expected in zip(clip.files[1:], clip.boxes()[1:]):
+            answer = call(file, [None, None], states)
+            assert answer.content_type == "application/json"
+            answer = json.loads(answer.body)
+            for shape in answer["shapes"]:
+                assert shape == pytest.approx(corners(expected), abs=0.0051)
+            # What CVAT signs and sends back is the state as JSON.
+            states = json.loads(json.dumps(answer["states"], separators=(",", ":")))
 
 
 def test_a_refusal_and_a_service_that_is_away_reach_cvat(

@@ -14,7 +14,7 @@ from label_studio_ml.api import init_app  # noqa: E402
 
 import bagtrack  # noqa: E402
 from bagtrack.adapters.label_studio import BagTrack  # noqa: E402
-from conftest import SEED, Clip  # noqa: E402
+from conftest import SEED, Clip, clock  # noqa: E402
 
 CONFIG = """
 <View>
@@ -81,7 +81,9 @@ def test_a_box_goes_on_through_the_video(clip: Clip, video: Path, tmp_path: Path
     # One object from the first frame on; one that somebody drew in frame 5 and corrected in frame 11.
     one = [drawn(1, clip.box, size)]
     two = [drawn(11, clip.boxes()[10], size), drawn(5, clip.boxes()[4], size)]
-    [result] = predict(video, tmp_path, {"result": [region(one), {"type": "labels"}, region(two, "two")]})
+    drawn_regions = {"result": [region(one), {"type": "labels"}, region(two, "two")]}
+    with clock("label-studio-ml, two regions", len(frames)):
+        [result] = predict(video, tmp_path, drawn_regions)
     tracks = {it["id"]: it["value"]["sequence"] for it in result["result"]}
     assert [item["frame"] for item in tracks["one"]] == list(range(1, 101))
     assert [item["frame"] for item in tracks["two"]] == [5, *range(11, 101)]

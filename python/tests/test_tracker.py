@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 import bagtrack
-from conftest import SEED, Clip
+from conftest import SEED, Clip, clock
 
 
 def follow(clip: Clip, tracker: bagtrack.Tracker) -> list[tuple]:
     first, *others = clip.frames()
     tracker.init(first, clip.box)
     answers = [(tracker.frame, tracker.box, tracker.score, tracker.status)]
-    for frame in others:
-        ok, box = tracker.update(frame)
-        assert (ok, box) == (tracker.status != "lost", tracker.box)
-        answers.append((tracker.frame, tracker.box, tracker.score, tracker.status))
+    with clock("Tracker.update", len(others)):
+        for frame in others:
+            ok, box = tracker.update(frame)
+            assert (ok, box) == (tracker.status != "lost", tracker.box)
+            answers.append((tracker.frame, tracker.box, tracker.score, tracker.status))
     return answers
 
 

@@ -15,7 +15,7 @@ from vot.dataset import load_sequence  # noqa: E402
 from vot.tracker import ObjectStatus, Registry  # noqa: E402
 
 import bagtrack  # noqa: E402
-from conftest import SEED, Clip  # noqa: E402
+from conftest import SEED, Clip, clock  # noqa: E402
 
 
 @pytest.fixture
@@ -66,11 +66,12 @@ def test_the_toolkits_runtime_gets_the_boxes_of_the_tracker(registry: Path, clip
     try:
         new = [ObjectStatus(sequence.object(name, 0), {}) for name in ("a", "b")]
         states, _ = runtime.initialize(sequence.frame(0), new)
-        for number in range(1, len(sequence)):
-            states, _ = runtime.update(sequence.frame(number))
+        with clock("vot-toolkit over TraX, two objects", len(sequence) - 1):
+            found = [runtime.update(sequence.frame(number))[0] for number in range(1, len(sequence))]
+        for number, states in enumerate(found, 1):
             for state, tracker in zip(states, trackers, strict=True):
                 _, box = tracker.update(frames[number])
-                found = state.region
-                np.testing.assert_allclose([found.x, found.y, found.width, found.height], box, atol=1e-3)
+                region = state.region
+                np.testing.assert_allclose([region.x, region.y, region.width, region.height], box, atol=1e-3)
     finally:
         runtime.stop()
