@@ -25,9 +25,7 @@ fn shapes(which: &str, what: &str) -> Array {
         .min_items(Some(4))
         .max_items(Some(4))
         .description(Some(what));
-    let shapes = ArrayBuilder::new()
-        .items(corners)
-        .description(Some(which));
+    let shapes = ArrayBuilder::new().items(corners).description(Some(which));
     shapes.max_items(Some(MAX_SHAPES)).build()
 }
 

@@ -53,23 +53,30 @@ impl PartialSchema for ParametersText {
 
 /// A row of the table, with the value that the parameter has when it is left out.
 fn param(row: &Parameter, default: Option<Value>) -> Schema {
-    let (schema_type, number): (Type, fn(f64) -> Number) = match row.kind {
-        "bool" => (Type::Boolean, Number::Float),
-        "f64" => (Type::Number, Number::Float),
-        // The bounds are whole numbers in the table.
-        "u32" | "u64" => (Type::Integer, |bound| Number::Int(bound as isize)),
-        _ => (Type::String, Number::Float),
-    };
-    let range = match row.kind {
-        "u64" => (Some(0.0), None),
-        _ => row.range.unzip(),
+    // The bounds of whole numbers are whole in the table.
+    let whole = |bound| Number::Int(bound as isize);
+    let (least, greatest) = row.range.unzip();
+    let (schema_type, minimum, maximum) = match row.kind {
+        "f64" => (
+            Type::Number,
+            least.map(Number::Float),
+            greatest.map(Number::Float),
+        ),
+        "u32" => (Type::Integer, least.map(whole), greatest.map(whole)),
+        "u64" => (
+            Type::Integer,
+            Some(Number::UInt(0)),
+            Some(Number::UInt(usize::MAX)),
+        ),
+        "bool" => (Type::Boolean, None, None),
+        _ => (Type::String, None, None),
     };
     let choices = (!row.choices.is_empty()).then_some(row.choices.iter().copied());
     let schema = ObjectBuilder::new()
         .schema_type(schema_type)
         .description(Some(row.description.trim()))
-        .minimum(range.0.map(number))
-        .maximum(range.1.map(number))
+        .minimum(minimum)
+        .maximum(maximum)
         .enum_values(choices)
         .default(default);
     schema.build().into()
