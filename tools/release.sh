@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes what a release has, in target/release-files/: the crates, the Python wheel, the container image where docker or
-# podman is, the bill of materials, and SHA256SUMS. Needs a clean checkout, and Python 3 with venv for the wheel.
+# podman runs, the bill of materials, and SHA256SUMS. Needs a clean checkout, and Python 3 with venv for the wheel.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -16,13 +16,17 @@ cp "target/package/bagtrack-$version.crate" "target/package/bagtrack-client-$ver
 target/python/bin/pip install --quiet --disable-pip-version-check "maturin>=1.9,<2"
 target/python/bin/maturin build --quiet --release --locked --manifest-path python/Cargo.toml --out "$files"
 
-builder=$(command -v docker || command -v podman || true)
+builder=
+for program in docker podman; do
+    # A client alone builds nothing.
+    if [ -z "$builder" ] && "$program" info >/dev/null 2>&1; then builder=$program; fi
+done
 if [ -n "$builder" ]; then
     "$builder" build --file docker/Dockerfile --tag "bagtrack:$version" \
         --build-arg "VERSION=$version" --build-arg "REVISION=$(git rev-parse HEAD)" .
     "$builder" save "bagtrack:$version" | gzip >"$files/bagtrack-$version-image.tar.gz"
 else
-    echo "Left out, for want of docker or podman: the image"
+    echo "Left out, for want of docker or podman, running: the image"
 fi
 
 tools/supply_chain.sh
