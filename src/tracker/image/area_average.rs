@@ -6,13 +6,6 @@
 
 use pulp::{Arch, Simd};
 
-/// How one source pixel is shared between target pixel `target` and the next one, in units of `1 / T`.
-struct Share {
-    target: usize,
-    first: u32,
-    second: u32,
-}
-
 /// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
 /// `1 / T`.
 struct Cell {
@@ -39,24 +32,6 @@ fn cells(source: u32, target: u32) -> Vec<Cell> {
         .collect()
 }
 
-/// How each source pixel is shared among the target pixels, `target <= source`.
-fn shares(source: u32, target: u32) -> Vec<Share> {
-    (0..u64::from(source))
-        .map(|index| {
-            let (source, target) = (u64::from(source), u64::from(target));
-            let begin = index * target;
-            let owner = begin / source;
-            let edge = (owner + 1) * source;
-            let first = target.min(edge - begin);
-            Share {
-                target: owner as usize,
-                first: first as u32,
-                second: (target - first) as u32,
-            }
-        })
-        .collect()
-}
-
 /// The area average of `luma` (`source` = width, height, row by row) on a grid of `target` = width, height. No target
 /// side is longer than its source side. The averages are appended to `out`.
 #[pulp::with_simd(area_average = Arch::new())]
@@ -70,33 +45,32 @@ pub(crate) fn area_average_simd<S: Simd>(
 ) {
     let is_whole = source.0.is_multiple_of(target.0);
     let columns = cells(source.0, target.0);
-    let rows = shares(source.1, target.1);
+    let width = source.0 as usize;
     out.reserve_exact(target.0 as usize * target.1 as usize);
     // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
     // source height; 255 times that stays far below 2^32 for any image that fits into memory.
-    let mut sums = vec![0_u32; source.0 as usize];
-    let mut next_sums = vec![0_u32; source.0 as usize];
-    for (index, row) in luma.chunks_exact(source.0 as usize).enumerate() {
-        let share = &rows[index];
-        for (sum, &value) in sums.iter_mut().zip(row) {
-            *sum += u32::from(value) * share.first;
-        }
-        if share.second > 0 {
-            for (sum, &value) in next_sums.iter_mut().zip(row) {
-                *sum += u32::from(value) * share.second;
+    let mut sums = vec![0_u32; width];
+    for cell in cells(source.1, target.1) {
+        sums.fill(0);
+        let first = cell.begin - usize::from(cell.before > 0);
+        let end = cell.end + usize::from(cell.after > 0);
+        let rows = luma.chunks_exact(width).enumerate();
+        for (index, row) in rows.take(end).skip(first) {
+            let share = match index {
+                _ if index < cell.begin => cell.before,
+                _ if index >= cell.end => cell.after,
+                _ => target.1,
+            };
+            for (sum, &value) in sums.iter_mut().zip(row) {
+                *sum += u32::from(value) * share;
             }
         }
-        let next = rows.get(index + 1);
-        if next.is_none_or(|next| next.target > share.target) {
-            match source.0 / target.0 {
-                2 if is_whole => average_whole::<2>(&sums, source.1, out),
-                3 if is_whole => average_whole::<3>(&sums, source.1, out),
-                4 if is_whole => average_whole::<4>(&sums, source.1, out),
-                6 if is_whole => average_whole::<6>(&sums, source.1, out),
-                _ => average_row(&sums, &columns, source, target.0, out),
-            }
-            std::mem::swap(&mut sums, &mut next_sums);
-            next_sums.fill(0);
+        match source.0 / target.0 {
+            2 if is_whole => average_whole::<2>(&sums, source.1, out),
+            3 if is_whole => average_whole::<3>(&sums, source.1, out),
+            4 if is_whole => average_whole::<4>(&sums, source.1, out),
+            6 if is_whole => average_whole::<6>(&sums, source.1, out),
+            _ => average_row(&sums, &columns, source, target.0, out),
         }
     }
 }

@@ -36,12 +36,7 @@ impl Rect {
 
     /// The same box in pixels that are `downsample` times as large.
     pub(crate) fn in_pixels_of(&self, downsample: f64) -> Self {
-        Self::new(
-            self.x / downsample,
-            self.y / downsample,
-            self.width / downsample,
-            self.height / downsample,
-        )
+        self.scaled(1.0 / downsample, 1.0 / downsample)
     }
 
     /// The centre `(x, y)`, in pixels.

@@ -24,7 +24,7 @@ pub(crate) trait Element: Copy + Default + AddAssign + Mul<Output = Self> {
 }
 
 macro_rules! element {
-    ($number:ty, $lanes:ident, $as_simd:ident, $splat:ident, $multiply_add:ident, $sum:ident) => {
+    ($number:ty: $lanes:ident $as_simd:ident $splat:ident $multiply_add:ident $sum:ident) => {
         impl Element for $number {
             type Lanes<S: Simd> = S::$lanes;
 
@@ -56,19 +56,5 @@ macro_rules! element {
     };
 }
 
-element!(
-    f32,
-    f32s,
-    as_simd_f32s,
-    splat_f32s,
-    mul_add_e_f32s,
-    reduce_sum_f32s
-);
-element!(
-    f64,
-    f64s,
-    as_simd_f64s,
-    splat_f64s,
-    mul_add_e_f64s,
-    reduce_sum_f64s
-);
+element!(f32: f32s as_simd_f32s splat_f32s mul_add_e_f32s reduce_sum_f32s);
+element!(f64: f64s as_simd_f64s splat_f64s mul_add_e_f64s reduce_sum_f64s);

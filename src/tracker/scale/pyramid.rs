@@ -9,8 +9,7 @@ use std::sync::LazyLock;
 
 use pulp::Simd;
 
-use crate::tracker::linalg::combinations;
-use crate::tracker::linalg::vector_ops;
+use crate::tracker::linalg::{combinations, vector_ops};
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::Params;
 
