@@ -21,9 +21,6 @@ use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
 use crate::tracker::weights::likelihood::{self, Likelihoods};
 
-/// P at most.
-const MAX_HISTORY: usize = 10;
-
 /// Subtracts `mean` (nothing, where it is empty) from `vectors` of length `len`, and appends their squared lengths.
 #[pulp::with_simd(center = Arch::new())]
 #[inline(always)]
@@ -53,7 +50,7 @@ pub(crate) struct Candidates {
     /// What the discriminant says of them.
     pub samples: TrainingSamples,
     point_distance: PointDistance,
-    evaluation: Option<(Params, Evaluation)>,
+    evaluation: Evaluation,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
     likelihoods: Likelihoods,
@@ -82,26 +79,9 @@ impl Candidates {
             self.point_distance
                 .load(&state.bag, &state.background, queries, params);
         } else {
-            self.printed_evaluation(params)
-                .set_bag(state.bag.subspaces());
+            self.evaluation.prepare(params);
+            self.evaluation.set_bag(state.bag.subspaces());
         }
-    }
-
-    /// The printed evaluation for `params`; the last one where only the seed differs.
-    fn printed_evaluation(&mut self, params: &Params) -> &mut Evaluation {
-        let is_the_same = |(last, _): &(Params, Evaluation)| {
-            let seed = last.seed;
-            *last
-                == Params {
-                    seed,
-                    ..params.clone()
-                }
-        };
-        if !self.evaluation.as_ref().is_some_and(is_the_same) {
-            self.evaluation = None;
-        }
-        let make = || (params.clone(), Evaluation::new(params));
-        &mut self.evaluation.get_or_insert_with(make).1
     }
 
     /// The feature vectors of the particles that were described.
@@ -158,15 +138,8 @@ impl Candidates {
         if state.discriminant.is_on() {
             self.samples.score_vectors(vectors);
         }
-        let Some((_, evaluation)) = &mut self.evaluation else {
-            return;
-        };
-        let mut history = [&[][..]; MAX_HISTORY];
-        for (slice, vector) in history.iter_mut().zip(&state.history.exact) {
-            *slice = vector;
-        }
-        let history = &history[..state.history.exact.len()];
-        let distances = evaluation.compute_distances(vectors, history);
+        let history = state.history.exact.iter().map(Vec::as_slice);
+        let distances = self.evaluation.distances(vectors, history);
         self.distances.extend_from_slice(distances);
     }
 
@@ -198,7 +171,7 @@ impl Candidates {
         }
         let pinned = (params.pinned_entries(), params.pinned_weight);
         let distances = &self.distances[first * self.entries()..];
-        self.likelihoods.weigh(distances, sigma, pinned, weights);
+        likelihood::weigh(&mut self.likelihoods, distances, sigma, pinned, weights);
     }
 
     /// Forgets all particles but the first `count`.

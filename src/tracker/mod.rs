@@ -84,3 +84,4 @@ pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
 pub use seen::Seen;
 pub use tracker::Tracker;
+pub use weights::likelihood::{Likelihoods, arg_max, weigh};

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use bagtrack::tracker::{AffineSubspace, Evaluation, Params, RANK_TOLERANCE};
+use bagtrack::tracker::{AffineSubspace, Evaluation, Likelihoods, Params, RANK_TOLERANCE, weigh};
 use nalgebra::{DMatrix, DVector};
 
 /// An affine subspace (equation 1).
@@ -154,21 +154,56 @@ pub fn evaluate(
     }
 }
 
-/// The shipped evaluation of the same.
+/// The shipped evaluation of the same, as `Tracker::step` does it.
+pub struct Shipped {
+    evaluation: Evaluation,
+    likelihoods: Likelihoods,
+    sigma: f64,
+    /// For each candidate, the distance to each entry.
+    distances: Vec<f64>,
+    pub weights: Vec<f64>,
+}
+
+impl Shipped {
+    /// From feature vectors, one after the other, to weights.
+    pub fn compute(&mut self, candidates: &[f32], history: &[&[f32]]) {
+        let distances = self
+            .evaluation
+            .distances(candidates, history.iter().copied());
+        self.distances.clear();
+        self.distances.extend_from_slice(distances);
+        self.weights.fill(0.0);
+        weigh(
+            &mut self.likelihoods,
+            &self.distances,
+            self.sigma,
+            (0, 1.0),
+            &mut self.weights,
+        );
+    }
+}
+
+/// The shipped evaluation of these candidates.
 pub fn shipped(
     candidates: &[Vec<f32>],
     history: &[&[f32]],
     bag: &[AffineSubspace],
     params: &Params,
-) -> Evaluation {
-    let mut evaluation = Evaluation::new(params);
-    evaluation.set_bag(bag.iter());
-    evaluation.compute(&candidates.concat(), history);
-    evaluation
+) -> Shipped {
+    let mut shipped = Shipped {
+        evaluation: Evaluation::new(params),
+        likelihoods: Likelihoods::default(),
+        sigma: params.sigma,
+        distances: Vec::new(),
+        weights: vec![0.0; candidates.len()],
+    };
+    shipped.evaluation.set_bag(bag.iter());
+    shipped.compute(&candidates.concat(), history);
+    shipped
 }
 
 /// The greatest differences between both: of distances, of likelihoods, of weights.
-pub fn differences(shipped: &Evaluation, textbook: &Answer) -> [f64; 3] {
+pub fn differences(shipped: &Shipped, textbook: &Answer) -> [f64; 3] {
     let mut greatest = [0.0_f64; 3];
     let mut note = |which: usize, a: f64, b: f64| {
         assert!(a.is_finite() && b.is_finite(), "{a} against {b}");
@@ -176,14 +211,12 @@ pub fn differences(shipped: &Evaluation, textbook: &Answer) -> [f64; 3] {
     };
     for (index, row) in textbook.distances.iter().enumerate() {
         for (k, &distance) in row.iter().enumerate() {
-            note(0, shipped.distances(index)[k], distance);
-            note(
-                1,
-                shipped.likelihoods(index)[k],
-                textbook.likelihoods[index][k],
-            );
+            let at = index * row.len() + k;
+            note(0, shipped.distances[at], distance);
+            let likelihood = shipped.likelihoods.normalized()[at];
+            note(1, likelihood, textbook.likelihoods[index][k]);
         }
-        note(2, shipped.weights()[index], textbook.weights[index]);
+        note(2, shipped.weights[index], textbook.weights[index]);
     }
     greatest
 }

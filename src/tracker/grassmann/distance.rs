@@ -4,18 +4,10 @@ use std::f64::consts::PI;
 
 use nalgebra::{SimdPartialOrd, SimdValue};
 
-use crate::tracker::grassmann::Lanes;
 use crate::tracker::grassmann::batch::Batch;
 use crate::tracker::grassmann::inner_products::InnerProducts;
-use crate::tracker::grassmann::principal_angles;
+use crate::tracker::grassmann::{Lanes, principal_angles};
 use crate::tracker::params::table::Params;
-
-/// The weights of the distance's two parts.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Distance {
-    alpha: f64,
-    gamma: f64,
-}
 
 /// What the distance asks of an entry of the bag, besides inner products.
 #[derive(Debug, Clone, Copy)]
@@ -26,34 +18,23 @@ pub(crate) struct Entry {
     pub dim: usize,
 }
 
-impl Distance {
-    /// α as it is set, and γ = 1 / D.
-    pub fn of(params: &Params) -> Self {
-        Self {
-            alpha: params.alpha,
-            gamma: params.gamma(),
-        }
-    }
-
-    /// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of each candidate of a batch, and `entry`, the `k`-th.
-    #[inline(always)]
-    pub fn between<const M: usize, const N: usize>(
-        self,
-        batch: &Batch<M, N>,
-        (k, entry): (usize, Entry),
-        products: &InnerProducts,
-        columns: usize,
-    ) -> Lanes {
-        let number = Lanes::splat;
-        // ‖μ - μₖ‖² (equation 5), where μ = V 1 / (P + 1); rounding can put it below 0.
-        let mean_product = products.with_mean::<M>(k).sum() / number(columns as f64);
-        let origins = batch.mean_square - number(2.0) * mean_product + number(entry.mean_square);
-        // UᵀFₖ = (W S⁻¹)ᵀ VᵀFₖ.
-        let bases = batch.coefficients.tr_mul(&products.with_basis(k));
-        let dim = batch.dim.simd_min(number(entry.dim as f64));
-        let angles = principal_angles::squared_norm(&bases, dim);
-        let beta = number(4.0 / (PI * PI)) / dim.simd_max(number(1.0));
-        number(self.alpha * self.gamma) * origins.simd_max(number(0.0))
-            + number(1.0 - self.alpha) * beta * angles
-    }
+/// dist(Aᵢ, B\[k\]) (equation 4), in \[0, 1\]: of each candidate of a batch, and `entry`, the `k`-th.
+#[inline(always)]
+pub(crate) fn between<const M: usize, const N: usize>(
+    batch: &Batch<M, N>,
+    (k, entry): (usize, Entry),
+    products: &InnerProducts,
+    columns: usize,
+    params: &Params,
+) -> Lanes {
+    let (number, alpha, gamma) = (Lanes::splat, params.alpha, params.gamma());
+    // ‖μ - μₖ‖² (equation 5), where μ = V 1 / (P + 1); rounding can put it below 0.
+    let mean_product = products.with_mean::<M>(k).sum() / number(columns as f64);
+    let origins = batch.mean_square - number(2.0) * mean_product + number(entry.mean_square);
+    // UᵀFₖ = (W S⁻¹)ᵀ VᵀFₖ.
+    let bases = batch.coefficients.tr_mul(&products.with_basis(k));
+    let dim = batch.dim.simd_min(number(entry.dim as f64));
+    let angles = principal_angles::squared_norm(&bases, dim);
+    let beta = number(4.0 / (PI * PI)) / dim.simd_max(number(1.0));
+    number(alpha * gamma) * origins.simd_max(number(0.0)) + number(1.0 - alpha) * beta * angles
 }

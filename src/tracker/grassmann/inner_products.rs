@@ -36,13 +36,15 @@ pub(crate) struct InnerProducts {
 }
 
 impl InnerProducts {
-    /// Makes room for these parameters. The bag must be set again.
+    /// Takes the sizes of these parameters. The bag must be set again.
     pub fn prepare(&mut self, params: &Params) {
-        self.len = params.feature_len();
-        self.stride = self.len.next_multiple_of(LINE) + LINE;
-        self.patches = params.history as usize;
-        self.per_entry = params.basis_dim as usize + 1;
-        self.entries = 0;
+        let (patches, per_entry) = (params.history as usize, params.basis_dim as usize + 1);
+        if (self.len, self.patches, self.per_entry) != (params.feature_len(), patches, per_entry) {
+            self.len = params.feature_len();
+            self.stride = self.len.next_multiple_of(LINE) + LINE;
+            (self.patches, self.per_entry) = (patches, per_entry);
+            self.entries = 0;
+        }
     }
 
     fn columns(&self) -> usize {
@@ -76,7 +78,7 @@ impl InnerProducts {
     ///
     /// # Panics
     /// If there is no bag, no previous patch or more than P, or one that is not of length D.
-    pub fn set_history(&mut self, history: &[&[f32]]) {
+    pub fn set_history<'a>(&mut self, mut history: impl ExactSizeIterator<Item = &'a [f32]>) {
         assert!(self.entries > 0, "a bag was set");
         assert!(
             (1..=self.patches).contains(&history.len()),
@@ -85,8 +87,8 @@ impl InnerProducts {
         let (stride, columns) = (self.stride, self.columns());
         let all = &mut self.vectors[..columns * stride];
         let bag = self.entries * self.per_entry * stride;
-        for (index, row) in all[bag..].chunks_exact_mut(stride).enumerate() {
-            match history.get(index) {
+        for row in all[bag..].chunks_exact_mut(stride) {
+            match history.next() {
                 Some(vector) => {
                     assert_eq!(vector.len(), self.len, "a patch of D values");
                     widen(vector, row);

@@ -13,8 +13,7 @@
 //! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights::likelihood` |
 //!
 //! **In:** N candidates and 1 to P previous patches, each of D values; K entries of up to n basis vectors each.
-//! **Out:** N × K distances and likelihoods in \[0, 1\], N weights that sum to 1, the index of the best candidate.
-//! Nothing has a unit: gray values are shares of white.
+//! **Out:** N × K distances in \[0, 1\], for the sum rule. Nothing has a unit: gray values are shares of white.
 //!
 //! Candidates are compared in batches of eight. A `Lanes` is a number of each of them, so that an equation for one
 //! candidate is one vector instruction for eight: one at a time, a frame takes 1.7 times as long.

@@ -8,16 +8,22 @@ use pulp::{Arch, Simd};
 
 /// The likelihoods of a frame's particles; keeps its buffers.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Likelihoods {
+pub struct Likelihoods {
     /// p̂(Aᵢ | B\[k\]): for each particle its likelihood for each entry.
     values: Vec<f64>,
     /// For each entry the least distance, and then the sum over the particles.
     entries: Vec<f64>,
 }
 
+/// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and from
+/// them `weights`, one for each particle.
+///
+/// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential of
+/// that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the sum
+/// the first `pinned.0` entries count `pinned.1` times.
 #[pulp::with_simd(weigh = Arch::new())]
 #[inline(always)]
-fn weigh_simd<S: Simd>(
+pub fn weigh_simd<S: Simd>(
     _: S,
     likelihoods: &mut Likelihoods,
     distances: &[f64],
@@ -33,27 +39,11 @@ fn weigh_simd<S: Simd>(
 
 impl Likelihoods {
     /// Makes room for so many particles and entries of the bag.
-    pub fn reserve(&mut self, particles: usize, entries: usize) {
+    pub(crate) fn reserve(&mut self, particles: usize, entries: usize) {
         self.values.clear();
         self.values.reserve(particles * entries);
         self.entries.clear();
         self.entries.reserve(entries);
-    }
-
-    /// Computes the likelihoods of `distances`, which hold for each particle its distance to each entry of the bag, and
-    /// from them `weights`, one for each particle.
-    ///
-    /// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential
-    /// of that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In
-    /// the sum the first `pinned.0` entries count `pinned.1` times.
-    pub fn weigh(
-        &mut self,
-        distances: &[f64],
-        sigma: f64,
-        pinned: (usize, f64),
-        weights: &mut [f64],
-    ) {
-        weigh(self, distances, sigma, pinned, weights);
     }
 
     /// The normalised likelihoods p̂(Aᵢ | B\[k\]) (equation 10), in the order of the distances. Each entry's sum over
@@ -124,7 +114,7 @@ fn exponentials(values: &mut [f64]) {
 }
 
 /// The particle with the greatest weight (equation 12), the first of equals.
-pub(crate) fn arg_max(weights: &[f64]) -> usize {
+pub fn arg_max(weights: &[f64]) -> usize {
     let mut best = 0;
     for (index, weight) in weights.iter().enumerate() {
         if *weight > weights[best] {
@@ -140,7 +130,8 @@ mod tests {
 
     fn weigh(distances: &[f64], pinned: (usize, f64), exponents: &[f64]) -> Vec<f64> {
         let mut weights = exponents.to_vec();
-        Likelihoods::default().weigh(distances, 0.01, pinned, &mut weights);
+        let mut likelihoods = Likelihoods::default();
+        super::weigh(&mut likelihoods, distances, 0.01, pinned, &mut weights);
         weights
     }
 
