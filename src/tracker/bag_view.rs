@@ -34,9 +34,8 @@ impl BagEntry {
     /// the entry keeps.
     pub(crate) fn of(entry: &Entry, params: &Params) -> Self {
         let subspace = if params.single_vector_candidate {
-            let (_, templates) = entry.span();
-            let mut vectors = vec![vec![0.0; params.feature_len()]; templates.len()];
-            for (vector, template) in vectors.iter_mut().zip(templates) {
+            let mut vectors = vec![vec![0.0; params.feature_len()]; entry.templates.len()];
+            for (vector, template) in vectors.iter_mut().zip(&entry.templates) {
                 template.write(&[], vector);
             }
             let vectors: Vec<&[f32]> = vectors.iter().map(|vector| &vector[..]).collect();
@@ -56,28 +55,19 @@ impl BagEntry {
 
 impl VectorView {
     fn of(vector: &[f32], params: &Params) -> Self {
-        let (columns, rows) = (params.patch_width, params.patch_height);
-        if params.features == Features::Gray {
-            return Self {
-                columns,
-                rows,
-                gray: vector.to_vec(),
-                chroma: None,
-                gradient: None,
-            };
-        }
-        let channel = |lane: usize| {
-            let cells = vector.chunks_exact(CHANNELS);
-            cells.map(|cell| cell[lane]).collect::<Vec<f32>>()
-        };
-        let strengths = vector.chunks_exact(CHANNELS);
-        let strengths = strengths.map(|cell| cell[..DIRECTIONS].iter().sum());
+        let has_gradients = params.features == Features::Gradients;
+        let cells = || vector.chunks_exact(CHANNELS);
+        let channel = |lane: usize| cells().map(|cell| cell[lane]).collect::<Vec<f32>>();
+        let strength = |cell: &[f32]| cell[..DIRECTIONS].iter().sum();
         Self {
-            columns,
-            rows,
-            gray: channel(GRAY),
-            chroma: Some(CHROMA.map(channel)),
-            gradient: Some(strengths.collect()),
+            columns: params.patch_width,
+            rows: params.patch_height,
+            gray: match has_gradients {
+                true => channel(GRAY),
+                false => vector.to_vec(),
+            },
+            chroma: has_gradients.then(|| CHROMA.map(channel)),
+            gradient: has_gradients.then(|| cells().map(strength).collect()),
         }
     }
 }

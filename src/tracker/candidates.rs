@@ -7,7 +7,9 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::appearance::point_distance::PointDistance;
+use crate::tracker::appearance::bag_matrix;
+use crate::tracker::appearance::point_distance::{self, PointDistance};
+use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::samples::TrainingSamples;
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::features::extractor::Extractor;
@@ -71,13 +73,13 @@ impl Candidates {
         clear_and_reserve(&mut self.distances, count * entries);
         clear_and_reserve(&mut self.weights, count);
         self.likelihoods.reserve(count, entries);
-        let (weights, origin) = (state.discriminant.weights(), state.discriminant.origin());
-        let mean = state.background.mean();
-        self.samples.begin(weights, origin, mean, count);
+        let background = &state.background;
+        let Discriminant { weights, origin } = &state.discriminant;
+        self.samples.begin(weights, origin, &background.mean, count);
         if params.single_vector_candidate {
             let queries = self.samples.query_vectors();
-            self.point_distance
-                .load(&state.bag, &state.background, queries, params);
+            let matrix = &mut self.point_distance.matrix;
+            bag_matrix::load(matrix, &state.bag, background, queries, self.len);
         } else {
             self.evaluation.prepare(params);
             self.evaluation.set_bag(state.bag.subspaces());
@@ -118,7 +120,7 @@ impl Candidates {
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors.values_mut()[range];
         extractor.describe(image, particles, &state.bounds, &state.params, vectors);
-        let mean = state.background.mean();
+        let mean = &state.background.mean;
         center(vectors, self.len, mean, &mut self.squares);
     }
 
@@ -127,8 +129,8 @@ impl Candidates {
         let vectors = &self.vectors.values()[self.values_of(&batch)];
         if state.params.single_vector_candidate {
             let squares = &self.squares[batch.start..];
-            self.point_distance
-                .distances(vectors, squares, &state.params, &mut self.distances);
+            let (compared, out) = (&mut self.point_distance, &mut self.distances);
+            point_distance::distances(compared, (vectors, squares), &state.params, out);
             if state.discriminant.is_on() {
                 let products = self.point_distance.query_products(squares.len());
                 self.samples.push_scores(products, squares);
@@ -163,7 +165,7 @@ impl Candidates {
     /// their weights.
     pub fn weigh_from(&mut self, first: usize, sigma: f64, params: &Params, weights: &mut [f64]) {
         // Without a discriminant there are no scores.
-        if let Some(scores @ [_, ..]) = self.samples.scores().get(first..) {
+        if let Some(scores @ [_, ..]) = self.samples.scores.get(first..) {
             let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             for (weight, score) in weights.iter_mut().zip(scores) {
                 *weight += params.discriminant_weight * f64::from(score - max);
@@ -195,7 +197,7 @@ impl Candidates {
             first_distance: distances[0],
             mean_first_distance,
             nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
-            discriminant: self.samples.scores().get(index).copied(),
+            discriminant: self.samples.scores.get(index).copied(),
             scale: self.particles[index].scale,
         }
     }

@@ -8,8 +8,9 @@
 //! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
 //! postcard's encoding.
 
+use crate::tracker::appearance::background;
 use crate::tracker::appearance::bag::Bag;
-use crate::tracker::appearance::subspace;
+use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::error::TrackerError;
 use crate::tracker::image::resolution::MAX_WORKING_SIDE;
 use crate::tracker::input;
@@ -75,7 +76,7 @@ fn restore(state: &mut State) {
     workspace::with(|workspace| {
         let learning = &mut workspace.learning;
         let params = &state.params;
-        state.background.learn(params, &mut learning.background);
+        background::learn(&mut state.background, params, &mut learning.background);
         state
             .bag
             .rebuild(&state.background, params, &mut learning.bag);
@@ -183,28 +184,23 @@ fn check_extensions(state: &State) -> bool {
 }
 
 fn check_bag(bag: &Bag, params: &Params) -> bool {
-    let len = params.feature_len();
-    (1..=params.bag_size as usize).contains(&bag.entries().len())
+    // With single-vector candidates a subspace follows from its templates.
+    let len = match params.single_vector_candidate {
+        true => 0,
+        false => params.feature_len(),
+    };
+    (1..=params.bag_size as usize).contains(&bag.entries.len())
         && bag
-            .entries()
+            .entries
             .iter()
             .all(|entry| entry.is_valid_for(params, MAX_FEATURE))
         && bag.subspaces().all(|entry| {
-            // With single-vector candidates a subspace follows from its templates.
-            let len = if params.single_vector_candidate {
-                0
-            } else {
-                len
-            };
-            if len == 0 {
-                return entry.mean.is_empty() && entry.basis.is_empty();
-            }
             entry.mean.len() == len
                 && entry.basis.len().is_multiple_of(len)
                 && entry.dim() <= params.basis_dim as usize
                 && are_features(&entry.mean)
                 && are_features(&entry.basis)
-                && is_orthonormal(&entry.basis().collect::<Vec<_>>())
+                && is_orthonormal(entry)
         })
 }
 
@@ -212,10 +208,10 @@ fn are_features(values: &[f32]) -> bool {
     values.iter().all(|value| value.abs() <= MAX_FEATURE)
 }
 
-fn is_orthonormal(columns: &[&[f32]]) -> bool {
-    let count = columns.len();
-    let gram = subspace::gram(columns)
-        .view((0, 0), (count, count))
-        .into_owned();
-    gram.is_identity(ORTHONORMAL)
+fn is_orthonormal(entry: &AffineSubspace) -> bool {
+    let gram = subspace::gram(&entry.basis, entry.mean.len().max(1));
+    let shape = (entry.dim(), entry.dim());
+    gram.view((0, 0), shape)
+        .into_owned()
+        .is_identity(ORTHONORMAL)
 }

@@ -171,7 +171,7 @@ impl State {
         workspace: &mut Workspace,
     ) {
         if !self.discriminant.is_on() {
-            let mut origin = self.background.mean().to_vec();
+            let mut origin = self.background.mean.clone();
             origin.resize(self.params.feature_len(), 0.0);
             self.discriminant = Discriminant::new(origin);
         }
@@ -186,7 +186,7 @@ impl State {
             .extractor
             .features(image, areas, &self.bounds, &self.params, features);
         let samples = &mut workspace.candidates.samples;
-        let (weights, origin) = (self.discriminant.weights(), self.discriminant.origin());
+        let Discriminant { weights, origin } = &self.discriminant;
         samples.begin(weights, origin, &[], areas.len());
         samples.score_vectors(features);
         labels::label_all(areas, &self.answer, &self.bounds, &mut fit.labels);

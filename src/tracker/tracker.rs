@@ -64,13 +64,9 @@ impl Tracker {
     /// # Errors
     /// As for [`step`](Self::step).
     pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
-        let frame = self.checked(frame)?;
-        let (estimate, evidence, seen) = workspace::with(|workspace| {
-            let (estimate, evidence) = self.state.step(&frame, workspace);
-            let seen = Seen::of(&self.state, &workspace.candidates);
-            (estimate, evidence, seen)
-        });
-        self.evidence = Some(evidence);
+        let estimate = self.step(frame)?;
+        // This thread's workspace still has the candidates of the step.
+        let seen = workspace::with(|workspace| Seen::of(&self.state, &workspace.candidates));
         Ok((estimate, seen))
     }
 
@@ -125,7 +121,7 @@ impl Tracker {
 
     /// The entries of the bag, oldest first, for people to look at.
     pub fn bag(&self) -> Vec<BagEntry> {
-        let entries = self.state.bag.entries().iter();
+        let entries = self.state.bag.entries.iter();
         let view = |entry| BagEntry::of(entry, &self.state.params);
         entries.map(view).collect()
     }

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 
 use crate::tracker::appearance::foreground_map::ForegroundMap;
-use crate::tracker::appearance::{background, bag, color_histogram};
+use crate::tracker::appearance::{background, color_histogram, span};
 use crate::tracker::candidates::Candidates;
 use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
@@ -50,7 +50,7 @@ pub(crate) struct Learning {
     /// The feature vector of one augmented view.
     pub view: Vec<f32>,
     pub background: background::Scratch,
-    pub bag: bag::Scratch,
+    pub bag: span::Scratch,
     pub color: color_histogram::Scratch,
     pub fit: ridge::Scratch,
     pub pyramid: pyramid::Scratch,

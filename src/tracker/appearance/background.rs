@@ -36,10 +36,11 @@ const REFRESHED: f64 = 0.2;
 pub(crate) struct Background {
     /// Oldest first.
     samples: VecDeque<QuantizedVector>,
+    /// The mean of the samples; empty without samples.
     #[serde(skip)]
-    mean: Vec<f32>,
+    pub mean: Vec<f32>,
     #[serde(skip)]
-    metric: Metric,
+    pub metric: Metric,
 }
 
 /// Buffers for learning from samples.
@@ -47,12 +48,6 @@ pub(crate) struct Background {
 pub(crate) struct Scratch {
     vectors: Vec<f32>,
     metric: mahalanobis::Scratch,
-}
-
-#[pulp::with_simd(learn = Arch::new())]
-#[inline(always)]
-fn learn_simd<S: Simd>(_: S, background: &mut Background, params: &Params, scratch: &mut Scratch) {
-    background.learn_all(params, scratch);
 }
 
 impl Background {
@@ -81,68 +76,23 @@ impl Background {
             sample.set(vector);
             self.samples.push_back(sample);
         }
-        self.learn(params, scratch);
-    }
-
-    /// Learns what follows from the samples.
-    pub fn learn(&mut self, params: &Params, scratch: &mut Scratch) {
         learn(self, params, scratch);
-    }
-
-    #[inline(always)]
-    fn learn_all(&mut self, params: &Params, scratch: &mut Scratch) {
-        let len = params.feature_len();
-        let count = self.samples.len();
-        self.mean.clear();
-        if count < 2 {
-            return;
-        }
-        self.mean.resize(len, 0.0);
-        for sample in &self.samples {
-            sample.add_to(&mut self.mean, 1.0 / count as f32);
-        }
-        self.samples_into(&mut scratch.vectors);
-        self.metric
-            .fit(&scratch.vectors, len, RIDGE, &mut scratch.metric);
     }
 
     /// Makes `out` the samples, with the mean subtracted: none where there is no metric.
     #[inline(always)]
     pub fn samples_into(&self, out: &mut Vec<f32>) {
-        out.resize(self.samples_len(), 0.0);
+        out.resize(self.samples.len() * self.mean.len(), 0.0);
         self.write_samples(out);
-    }
-
-    /// How many values the samples have: none where there is no metric.
-    #[inline(always)]
-    pub fn samples_len(&self) -> usize {
-        if self.mean.is_empty() {
-            0
-        } else {
-            self.samples.len() * self.mean.len()
-        }
     }
 
     /// Writes the samples, with the mean subtracted, to `out`, which is as long as they are.
     #[inline(always)]
     pub fn write_samples(&self, out: &mut [f32]) {
-        if self.mean.is_empty() {
-            return;
-        }
-        let vectors = out.chunks_exact_mut(self.mean.len());
+        let vectors = out.chunks_exact_mut(self.mean.len().max(1));
         for (sample, vector) in self.samples.iter().zip(vectors) {
             sample.write(&self.mean, vector);
         }
-    }
-
-    /// The mean of the samples; empty without samples.
-    pub fn mean(&self) -> &[f32] {
-        &self.mean
-    }
-
-    /// The metric.
-    pub fn metric(&self) -> &Metric {
-        &self.metric
     }
 
     /// Whether the samples may be those of a tracker with `params`.
@@ -153,6 +103,29 @@ impl Background {
                 .iter()
                 .all(|sample| sample.is_valid_for(params.feature_len(), max))
     }
+}
+
+/// Learns what follows from the samples.
+#[pulp::with_simd(learn = Arch::new())]
+#[inline(always)]
+pub(crate) fn learn_simd<S: Simd>(
+    _: S,
+    background: &mut Background,
+    params: &Params,
+    scratch: &mut Scratch,
+) {
+    let (len, count) = (params.feature_len(), background.samples.len());
+    background.mean.clear();
+    if count < 2 {
+        return;
+    }
+    background.mean.resize(len, 0.0);
+    for sample in &background.samples {
+        sample.add_to(&mut background.mean, 1.0 / count as f32);
+    }
+    let (vectors, metric) = (&mut scratch.vectors, &mut scratch.metric);
+    background.samples_into(vectors);
+    background.metric.fit(vectors, len, RIDGE, metric);
 }
 
 /// Draws `count` areas beside the target into `out`, as far as they can be had inside the frame.
@@ -218,12 +191,8 @@ mod tests {
             let vectors: Vec<f32> = (first..last).flat_map(|i| [i as f32; 16]).collect();
             background.rebuild(&vectors, &params, &mut scratch);
             assert_eq!(background.samples.len(), 3);
-            assert!(
-                background
-                    .mean()
-                    .iter()
-                    .all(|value| (value - mean).abs() < 1e-5)
-            );
+            let is_mean = |value: &f32| (value - mean).abs() < 1e-5;
+            assert!(background.mean.iter().all(is_mean));
             let mut samples = Vec::new();
             background.samples_into(&mut samples);
             for (sample, off) in samples.chunks(16).zip([-1.0, 0.0, 1.0]) {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::tracker::appearance::augmentation;
 use crate::tracker::appearance::background::Background;
-use crate::tracker::appearance::span::{self, Span};
-use crate::tracker::appearance::subspace::{AffineSubspace, MAX_VECTORS};
+use crate::tracker::appearance::span::{self, Scratch, Span};
+use crate::tracker::appearance::subspace::{self, AffineSubspace};
 use crate::tracker::features::quantized::QuantizedVector;
 use crate::tracker::params::table::Params;
 
@@ -17,22 +17,17 @@ pub(crate) struct Entry {
     /// The subspace as vectors, for the printed evaluation; empty with single-vector candidates.
     pub subspace: AffineSubspace,
     /// The vectors that it was made of, with single-vector candidates.
-    templates: Vec<QuantizedVector>,
+    pub templates: Vec<QuantizedVector>,
     /// The subspace as coefficients of the templates.
     #[serde(skip)]
-    span: Span,
+    pub span: Span,
 }
 
 /// Up to K affine subspaces, oldest first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Bag {
-    entries: VecDeque<Entry>,
-}
-
-/// Buffers for making entries.
-#[derive(Debug, Default)]
-pub(crate) struct Scratch {
-    span: span::Scratch,
+    /// At least one once a session has begun.
+    pub entries: VecDeque<Entry>,
 }
 
 impl Entry {
@@ -44,29 +39,19 @@ impl Entry {
         params: &Params,
         scratch: &mut Scratch,
     ) {
-        let vectors = features.chunks_exact(params.feature_len());
+        let len = params.feature_len();
         if params.single_vector_candidate {
+            let vectors = features.chunks_exact(len);
             self.templates
                 .resize_with(vectors.len(), QuantizedVector::default);
             for (template, vector) in self.templates.iter_mut().zip(vectors) {
                 template.set(vector);
             }
-            self.rebuild(background, params, scratch);
+            self.span.fit(&self.templates, background, params, scratch);
         } else {
-            let mut slices = [&[][..]; MAX_VECTORS];
-            let count = vectors.len();
-            for (slice, vector) in slices.iter_mut().zip(vectors) {
-                *slice = vector;
-            }
             let basis_dim = params.basis_dim as usize;
-            self.subspace.fit(&slices[..count], basis_dim);
+            subspace::fit(&mut self.subspace, features, len, basis_dim);
         }
-    }
-
-    /// Makes the coefficients anew: the background, and so the metric, has changed.
-    fn rebuild(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
-        self.span
-            .fit(&self.templates, background, params, &mut scratch.span);
     }
 
     /// Whether this may be an entry of a tracker with `params`, but for its subspace as vectors.
@@ -82,12 +67,6 @@ impl Entry {
                 .templates
                 .iter()
                 .all(|template| template.is_valid_for(len, max))
-    }
-
-    /// The subspace as coefficients, and the vectors that they are of: with single-vector candidates.
-    #[inline(always)]
-    pub fn span(&self) -> (&Span, &[QuantizedVector]) {
-        (&self.span, &self.templates)
     }
 }
 
@@ -112,7 +91,7 @@ impl Bag {
             let leaves = self.entries.remove(params.pinned_entries());
             latest = leaves.expect("fewer entries are pinned than the bag has");
         }
-        scratch.span.load(background);
+        span::load(scratch, background);
         latest.fit(features, background, params, scratch);
         self.entries.push_back(latest);
     }
@@ -134,16 +113,12 @@ impl Bag {
     /// Makes what follows from templates and background: after the background changed, and in a restored session.
     pub fn rebuild(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
         if params.single_vector_candidate {
-            scratch.span.load(background);
+            span::load(scratch, background);
             for entry in &mut self.entries {
-                entry.rebuild(background, params, scratch);
+                let templates = &entry.templates;
+                entry.span.fit(templates, background, params, scratch);
             }
         }
-    }
-
-    /// The entries, oldest first; at least one once a session has begun.
-    pub fn entries(&self) -> &VecDeque<Entry> {
-        &self.entries
     }
 
     /// Their subspaces as vectors, for the printed evaluation.

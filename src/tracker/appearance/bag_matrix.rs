@@ -22,9 +22,11 @@ pub(crate) struct BagMatrix {
     pub background_coordinates: Vec<f32>,
 }
 
+/// Loads the bag and the background's metric, for vectors of length `len`, and two vectors whose products are asked for
+/// as well (each of that length, or empty).
 #[pulp::with_simd(load = Arch::new())]
 #[inline(always)]
-fn load_simd<S: Simd>(
+pub(crate) fn load_simd<S: Simd>(
     simd: S,
     matrix: &mut BagMatrix,
     bag: &Bag,
@@ -32,51 +34,39 @@ fn load_simd<S: Simd>(
     queries: [&[f32]; 2],
     len: usize,
 ) {
-    matrix.load_all(simd, bag, background, queries, len);
+    let (metric, entries) = (&background.metric, &bag.entries);
+    matrix.samples = metric.count;
+    matrix.inverse.clone_from(&metric.inverse);
+    matrix.entries.clear();
+    let sizes = entries
+        .iter()
+        .map(|entry| (entry.span.norm, entry.span.dim));
+    matrix.entries.extend(sizes);
+    let count = matrix.samples + matrix.subspace_rows() + queries.len();
+    matrix.values.resize(count * len);
+    let (samples, mut rest) = matrix.values.values_mut().split_at_mut(metric.count * len);
+    background.write_samples(samples);
+    matrix.background_coordinates.clear();
+    for entry in entries {
+        let span = &entry.span;
+        let (rows, others) = rest.split_at_mut((1 + span.dim) * len);
+        span.write_to(
+            simd,
+            &entry.templates,
+            background,
+            &mut matrix.templates,
+            rows,
+        );
+        let coordinates = &span.background_coordinates;
+        matrix.background_coordinates.extend_from_slice(coordinates);
+        rest = others;
+    }
+    for (row, query) in rest.chunks_exact_mut(len).zip(queries) {
+        row[..query.len()].copy_from_slice(query);
+    }
 }
 
 impl BagMatrix {
-    /// Loads the bag and the background's metric, for vectors of length `len`, and two vectors whose products are
-    /// asked for as well (each of that length, or empty).
-    pub fn load(&mut self, bag: &Bag, background: &Background, queries: [&[f32]; 2], len: usize) {
-        load(self, bag, background, queries, len);
-    }
-
-    #[inline(always)]
-    fn load_all<S: Simd>(
-        &mut self,
-        simd: S,
-        bag: &Bag,
-        background: &Background,
-        queries: [&[f32]; 2],
-        len: usize,
-    ) {
-        self.samples = background.metric().count();
-        self.inverse.clear();
-        self.inverse
-            .extend_from_slice(background.metric().inverse());
-        self.entries.clear();
-        let entries = bag.entries();
-        self.entries
-            .extend(entries.iter().map(|entry| entry.span().0.size()));
-        let count = self.samples + self.subspace_rows() + queries.len();
-        self.values.resize(count * len);
-        let (samples, mut rest) = self.values.values_mut().split_at_mut(self.samples * len);
-        background.write_samples(samples);
-        self.background_coordinates.clear();
-        for (entry, (_, dim)) in entries.iter().zip(&self.entries) {
-            let (span, templates) = entry.span();
-            let (rows, others) = rest.split_at_mut((1 + dim) * len);
-            span.write_to(simd, templates, background, &mut self.templates, rows);
-            self.background_coordinates
-                .extend_from_slice(span.background_coordinates());
-            rest = others;
-        }
-        for (row, query) in rest.chunks_exact_mut(len).zip(queries) {
-            row[..query.len()].copy_from_slice(query);
-        }
-    }
-
     /// The rows, one after the other.
     #[inline(always)]
     pub fn rows(&self) -> &[f32] {

@@ -9,16 +9,15 @@
 //! small, and positive definite whatever the samples are. The difference loses digits where a vector lies in the span
 //! of the samples: with a ridge of 1, at most log₁₀ of D.
 
-use crate::tracker::linalg::gemm;
-use crate::tracker::linalg::vector_ops;
+use crate::tracker::linalg::{gemm, vector_ops};
 
 /// The metric of n samples; without samples the plain inner product.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Metric {
     /// n.
-    count: usize,
+    pub count: usize,
     /// L⁻¹, lower triangular, row by row.
-    inverse: Vec<f32>,
+    pub inverse: Vec<f32>,
 }
 
 /// Buffers for fitting a metric.
@@ -61,16 +60,6 @@ impl Metric {
         for (value, exact) in self.inverse.iter_mut().zip(&scratch.inverse) {
             *value = *exact as f32;
         }
-    }
-
-    /// n.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// L⁻¹, row by row.
-    pub fn inverse(&self) -> &[f32] {
-        &self.inverse
     }
 
     /// The background coordinates of a vector, n of them, from its inner products with the samples.

@@ -9,8 +9,6 @@ use std::f64::consts::PI;
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::appearance::background::Background;
-use crate::tracker::appearance::bag::Bag;
 use crate::tracker::appearance::bag_matrix::BagMatrix;
 use crate::tracker::appearance::span::MIN_REMAINDER;
 use crate::tracker::linalg::acos::{LANES, squared_angles};
@@ -23,7 +21,7 @@ const GROUP: usize = 32;
 /// What candidates are compared with, and their products.
 #[derive(Debug, Default)]
 pub(crate) struct PointDistance {
-    matrix: BagMatrix,
+    pub matrix: BagMatrix,
     /// For each row of the matrix its products with all candidates; then, for the entries, under the metric.
     products: Vec<f32>,
     /// For each sample a component of all candidates' background coordinates.
@@ -33,9 +31,11 @@ pub(crate) struct PointDistance {
     norms: Vec<f32>,
 }
 
+/// Appends the distances of candidates (vectors of length D, with the background's mean subtracted, one after the other,
+/// and their squared lengths) to each entry of the bag (equation 4).
 #[pulp::with_simd(distances = Arch::new())]
 #[inline(always)]
-fn distances_simd<S: Simd>(
+pub(crate) fn distances_simd<S: Simd>(
     simd: S,
     point_distance: &mut PointDistance,
     (candidates, squares): (&[f32], &[f32]),
@@ -50,31 +50,6 @@ fn distances_simd<S: Simd>(
 }
 
 impl PointDistance {
-    /// Loads what the candidates of a frame are compared with; `queries` are two vectors whose products with them are
-    /// asked for as well.
-    pub fn load(
-        &mut self,
-        bag: &Bag,
-        background: &Background,
-        queries: [&[f32]; 2],
-        params: &Params,
-    ) {
-        self.matrix
-            .load(bag, background, queries, params.feature_len());
-    }
-
-    /// Appends the distances of candidates (vectors of length D, with the background's mean subtracted, one after the
-    /// other, and their squared lengths) to each entry of the bag (equation 4).
-    pub fn distances(
-        &mut self,
-        candidates: &[f32],
-        squares: &[f32],
-        params: &Params,
-        out: &mut Vec<f64>,
-    ) {
-        distances(self, (candidates, squares), params, out);
-    }
-
     /// The products of the last `count` candidates with the queries.
     pub fn query_products(&self, count: usize) -> [&[f32]; 2] {
         let stride = count.next_multiple_of(GROUP);
@@ -172,7 +147,9 @@ impl PointDistance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::appearance::{background, bag};
+    use crate::tracker::appearance::background::{self, Background};
+    use crate::tracker::appearance::bag::Bag;
+    use crate::tracker::appearance::{bag_matrix, span};
     use crate::tracker::features::quantized::QuantizedVector;
     use crate::tracker::linalg::vector_ops;
     use crate::tracker::params::presets::Preset;
@@ -216,23 +193,34 @@ mod tests {
             let mut background = Background::default();
             background.rebuild(&samples, &params, &mut background::Scratch::default());
             let templates = [vectors(5, 2), vectors(4, 3)];
-            let (mut bag, mut scratch) = (Bag::default(), bag::Scratch::default());
+            let (mut bag, mut scratch) = (Bag::default(), span::Scratch::default());
             for templates in &templates {
                 bag.admit(templates, &background, &params, &mut scratch);
             }
             let mut candidates = vectors(3, 4);
             let given = columns(&candidates);
             for candidate in candidates.chunks_exact_mut(20) {
-                vector_ops::add(candidate, -1.0, background.mean());
+                vector_ops::add(candidate, -1.0, &background.mean);
             }
             let squares = candidates.chunks(20).map(|c| vector_ops::dot(c, c));
             let squares: Vec<f32> = squares.collect();
             let mut point_distance = PointDistance::default();
             let query_products = [vectors(1, 5), vectors(1, 6)];
             let queries = [&query_products[0][..], &query_products[1]];
-            point_distance.load(&bag, &background, queries, &params);
+            bag_matrix::load(
+                &mut point_distance.matrix,
+                &bag,
+                &background,
+                queries,
+                params.feature_len(),
+            );
             let mut found = vec![7.0];
-            point_distance.distances(&candidates, &squares, &params, &mut found);
+            distances(
+                &mut point_distance,
+                (&candidates, &squares),
+                &params,
+                &mut found,
+            );
             for (query_products, found) in
                 query_products.iter().zip(point_distance.query_products(3))
             {

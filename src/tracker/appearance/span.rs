@@ -11,10 +11,7 @@ use pulp::{Arch, Simd};
 use crate::tracker::appearance::background::Background;
 use crate::tracker::appearance::subspace::{self, Gram};
 use crate::tracker::features::quantized::QuantizedVector;
-use crate::tracker::linalg::combinations;
-use crate::tracker::linalg::gemm;
-use crate::tracker::linalg::jacobi;
-use crate::tracker::linalg::vector_ops;
+use crate::tracker::linalg::{combinations, gemm, jacobi, vector_ops};
 use crate::tracker::params::table::Params;
 
 /// A squared length under the metric below this share of the plain one is rounding.
@@ -24,13 +21,13 @@ pub(crate) const MIN_REMAINDER: f32 = 1e-6;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Span {
     /// ‖μ‖².
-    norm: f64,
+    pub norm: f64,
     /// For the mean and for each basis vector, the coefficients of the templates.
     coefficients: Vec<f32>,
     /// For the mean and for each basis vector, its background coordinates.
-    background_coordinates: Vec<f32>,
+    pub background_coordinates: Vec<f32>,
     /// The number of basis vectors.
-    dim: usize,
+    pub dim: usize,
 }
 
 /// Buffers for fitting subspaces.
@@ -47,19 +44,14 @@ pub(crate) struct Scratch {
     scales: Vec<f32>,
 }
 
-impl Scratch {
-    /// Loads the samples of `background`, under whose metric all subspaces are fitted from here on.
-    pub fn load(&mut self, background: &Background) {
-        load_samples(&mut self.samples, background);
-    }
-}
-
-#[pulp::with_simd(load_samples = Arch::new())]
+/// Loads the samples of `background`, under whose metric all subspaces are fitted from here on.
+#[pulp::with_simd(load = Arch::new())]
 #[inline(always)]
-fn load_samples_simd<S: Simd>(_: S, samples: &mut Vec<f32>, background: &Background) {
-    background.samples_into(samples);
+pub(crate) fn load_simd<S: Simd>(_: S, scratch: &mut Scratch, background: &Background) {
+    background.samples_into(&mut scratch.samples);
 }
 
+/// The background coordinates of the templates, and their Gram matrix under the metric.
 #[pulp::with_simd(compare_templates = Arch::new())]
 #[inline(always)]
 fn compare_templates_simd<S: Simd>(
@@ -69,53 +61,45 @@ fn compare_templates_simd<S: Simd>(
     len: usize,
     scratch: &mut Scratch,
 ) {
-    scratch.compare(simd, templates, background, len);
-}
-
-impl Scratch {
-    /// The background coordinates of the templates, and their Gram matrix under the metric.
-    #[inline(always)]
-    fn compare<S: Simd>(
-        &mut self,
-        simd: S,
-        templates: &[QuantizedVector],
-        background: &Background,
-        len: usize,
-    ) {
-        let (metric, count) = (background.metric(), templates.len());
-        let samples = metric.count();
-        self.vectors.resize(count * len, 0.0);
-        for (template, vector) in templates.iter().zip(self.vectors.chunks_exact_mut(len)) {
-            template.write(background.mean(), vector);
+    let Scratch {
+        samples,
+        vectors,
+        products,
+        background_coordinates: coordinates,
+        gram,
+        scales,
+    } = scratch;
+    let (count, width) = (templates.len(), background.metric.count);
+    vectors.resize(count * len, 0.0);
+    for (template, vector) in templates.iter().zip(vectors.chunks_exact_mut(len)) {
+        template.write(&background.mean, vector);
+    }
+    products.resize(count * width, 0.0);
+    gemm::multiply(simd, vectors, samples, len, width, products);
+    gram.resize(count * count, 0.0);
+    gemm::multiply(simd, vectors, vectors, len, count, gram);
+    coordinates.resize(count * width, 0.0);
+    let row = |i: usize| i * width..(i + 1) * width;
+    for i in 0..count {
+        let out = &mut coordinates[row(i)];
+        background
+            .metric
+            .background_coordinates_of(&products[row(i)], out);
+    }
+    scales.clear();
+    for i in 0..count {
+        for j in 0..count {
+            let plain = gram[i * count + j];
+            let product = plain - vector_ops::dot(&coordinates[row(i)], &coordinates[row(j)]);
+            let is_left = i != j || product > plain * MIN_REMAINDER;
+            gram[i * count + j] = if is_left { product } else { 0.0 };
         }
-        let (vectors, products) = (&self.vectors, &mut self.products);
-        products.resize(count * samples, 0.0);
-        gemm::multiply(simd, vectors, &self.samples, len, samples, products);
-        self.gram.resize(count * count, 0.0);
-        gemm::multiply(simd, vectors, vectors, len, count, &mut self.gram);
-        self.background_coordinates.resize(count * samples, 0.0);
-        let row = |i: usize| i * samples..(i + 1) * samples;
-        for i in 0..count {
-            let out = &mut self.background_coordinates[row(i)];
-            metric.background_coordinates_of(&self.products[row(i)], out);
-        }
-        let coordinates = &self.background_coordinates;
-        self.scales.clear();
-        for i in 0..count {
-            for j in 0..count {
-                let plain = self.gram[i * count + j];
-                let product = plain - vector_ops::dot(&coordinates[row(i)], &coordinates[row(j)]);
-                let is_left = i != j || product > plain * MIN_REMAINDER;
-                self.gram[i * count + j] = if is_left { product } else { 0.0 };
-            }
-            let square = self.gram[i * count + i];
-            let scale = if square > 0.0 {
-                1.0 / square.sqrt()
-            } else {
-                0.0
-            };
-            self.scales.push(scale);
-        }
+        let square = gram[i * count + i];
+        scales.push(if square > 0.0 {
+            1.0 / square.sqrt()
+        } else {
+            0.0
+        });
     }
 }
 
@@ -128,7 +112,7 @@ impl Span {
         params: &Params,
         scratch: &mut Scratch,
     ) {
-        let (count, samples) = (templates.len(), background.metric().count());
+        let (count, samples) = (templates.len(), background.metric.count);
         compare_templates(templates, background, params.feature_len(), scratch);
         self.combine(count, params.basis_dim as usize, scratch);
         self.background_coordinates.clear();
@@ -166,16 +150,6 @@ impl Span {
         }
     }
 
-    /// ‖μ‖² and the number of basis vectors.
-    pub fn size(&self) -> (f64, usize) {
-        (self.norm, self.dim)
-    }
-
-    /// The background coordinates of the mean and of the basis vectors.
-    pub fn background_coordinates(&self) -> &[f32] {
-        &self.background_coordinates
-    }
-
     /// Writes the mean and the basis vectors, as plain vectors, to `out`, which is as long as they are. `templates` are
     /// those that this was fitted to; `scratch` is a buffer for them.
     #[inline(always)]
@@ -190,7 +164,7 @@ impl Span {
         let len = out.len() / (1 + self.dim);
         scratch.resize(templates.len() * len, 0.0);
         for (template, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
-            template.write(background.mean(), vector);
+            template.write(&background.mean, vector);
         }
         combinations::assign_combinations(simd, out, &self.coefficients, scratch, len);
     }

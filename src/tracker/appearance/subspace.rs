@@ -24,12 +24,6 @@ pub struct AffineSubspace {
     pub(crate) basis: Vec<f32>,
 }
 
-#[pulp::with_simd(fit = Arch::new())]
-#[inline(always)]
-fn fit_simd<S: Simd>(_: S, subspace: &mut AffineSubspace, vectors: &[&[f32]], basis_dim: usize) {
-    subspace.make_of(vectors, basis_dim);
-}
-
 impl AffineSubspace {
     /// The subspace of feature vectors: μ their mean, U the (up to) `basis_dim` dominant left singular vectors of
     /// the matrix V of which they are the columns (equation 2), uncentred. U has fewer columns where V has fewer
@@ -38,38 +32,14 @@ impl AffineSubspace {
     /// # Panics
     /// If there are no vectors or more than 11, or their lengths differ.
     pub fn of(vectors: &[&[f32]], basis_dim: usize) -> Self {
-        let mut subspace = Self::default();
-        subspace.fit(vectors, basis_dim);
-        subspace
-    }
-
-    /// Becomes the subspace [`of`](Self::of) these vectors, in its present memory.
-    pub(crate) fn fit(&mut self, vectors: &[&[f32]], basis_dim: usize) {
-        fit(self, vectors, basis_dim);
-    }
-
-    #[inline(always)]
-    fn make_of(&mut self, vectors: &[&[f32]], basis_dim: usize) {
         let len = vectors[0].len();
         assert!(
             vectors.iter().all(|vector| vector.len() == len),
             "feature vectors of one length"
         );
-        let share = 1.0 / vectors.len() as f64;
-        self.mean.resize(len, 0.0);
-        combine(vectors, |_| share, &mut self.mean);
-
-        // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
-        let (values, weights) = jacobi::eigenpairs(gram(vectors));
-        self.basis.clear();
-        self.basis.reserve_exact(len * basis_dim);
-        let dim = dominant(values.iter().copied(), basis_dim);
-        self.basis.resize(len * dim, 0.0);
-        let columns = self.basis.chunks_exact_mut(len);
-        for ((place, value), column) in values.iter().enumerate().zip(columns) {
-            let weight = |index| weights[(index, place)] / value.sqrt();
-            combine(vectors, weight, column);
-        }
+        let mut subspace = Self::default();
+        fit(&mut subspace, &vectors.concat(), len, basis_dim);
+        subspace
     }
 
     /// The origin μ, of length D.
@@ -85,6 +55,34 @@ impl AffineSubspace {
     /// The number of columns of U: n, or fewer.
     pub fn dim(&self) -> usize {
         self.basis.len() / self.mean.len().max(1)
+    }
+}
+
+/// Makes `subspace` that [`of`](AffineSubspace::of) vectors of length `len`, one after the other, in its present memory.
+#[pulp::with_simd(fit = Arch::new())]
+#[inline(always)]
+pub(crate) fn fit_simd<S: Simd>(
+    _: S,
+    subspace: &mut AffineSubspace,
+    vectors: &[f32],
+    len: usize,
+    basis_dim: usize,
+) {
+    let AffineSubspace { mean, basis } = subspace;
+    let share = len as f64 / vectors.len() as f64;
+    mean.resize(len, 0.0);
+    combine(vectors, |_| share, mean);
+
+    // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
+    let (values, weights) = jacobi::eigenpairs(gram(vectors, len));
+    basis.clear();
+    basis.reserve_exact(len * basis_dim);
+    let dim = dominant(values.iter().copied(), basis_dim);
+    basis.resize(len * dim, 0.0);
+    let columns = basis.chunks_exact_mut(len);
+    for ((place, value), column) in values.iter().enumerate().zip(columns) {
+        let weight = |index| weights[(index, place)] / value.sqrt();
+        combine(vectors, weight, column);
     }
 }
 
@@ -104,12 +102,12 @@ pub(crate) fn dominant(eigenvalues: impl Iterator<Item = f64>, limit: usize) -> 
         .count()
 }
 
-/// VᵀV of vectors, in double precision.
+/// VᵀV of vectors of length `len`, one after the other, in double precision.
 #[inline(always)]
-pub(crate) fn gram(vectors: &[&[f32]]) -> Gram {
+pub(crate) fn gram(vectors: &[f32], len: usize) -> Gram {
     let mut gram = Gram::zeros();
-    for (i, vector) in vectors.iter().enumerate() {
-        for (j, other) in vectors[..=i].iter().enumerate() {
+    for (i, vector) in vectors.chunks_exact(len).enumerate() {
+        for (j, other) in vectors.chunks_exact(len).take(i + 1).enumerate() {
             let product = dot(vector, other);
             (gram[(i, j)], gram[(j, i)]) = (product, product);
         }
@@ -137,12 +135,13 @@ pub(crate) fn dot(a: &[f32], b: &[f32]) -> f64 {
 
 /// The sum of vectors, each with its weight, into `out`; summed in double precision.
 #[inline(always)]
-fn combine(vectors: &[&[f32]], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
+fn combine(vectors: &[f32], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
     const BLOCK: usize = 64;
+    let len = out.len();
     for (block, out) in out.chunks_mut(BLOCK).enumerate() {
         let mut sums = [0.0; BLOCK];
         let sums = &mut sums[..out.len()];
-        for (index, vector) in vectors.iter().enumerate() {
+        for (index, vector) in vectors.chunks_exact(len).enumerate() {
             let weight = weight(index);
             for (sum, &value) in sums.iter_mut().zip(&vector[block * BLOCK..]) {
                 *sum += weight * f64::from(value);

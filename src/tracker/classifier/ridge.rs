@@ -32,8 +32,9 @@ const MIN_GRADIENT: f32 = 1e-30;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Discriminant {
     /// The first frame's mean background. It is subtracted from all vectors, so that w means the same in all frames.
-    origin: Vec<f32>,
-    weights: Vec<f32>,
+    pub origin: Vec<f32>,
+    /// w.
+    pub weights: Vec<f32>,
 }
 
 /// Buffers for a fit.
@@ -44,18 +45,6 @@ pub(crate) struct Scratch {
     gradient: Vec<f32>,
     direction: Vec<f32>,
     product: Vec<f32>,
-}
-
-#[pulp::with_simd(fit = Arch::new())]
-#[inline(always)]
-fn fit_simd<S: Simd>(
-    simd: S,
-    discriminant: &mut Discriminant,
-    (samples, vectors): (&TrainingSamples, &[f32]),
-    (damping, steps): (f64, usize),
-    scratch: &mut Scratch,
-) {
-    discriminant.fit_all(simd, (samples, vectors), (damping, steps), scratch);
 }
 
 impl Discriminant {
@@ -72,22 +61,6 @@ impl Discriminant {
         !self.weights.is_empty()
     }
 
-    /// w.
-    pub fn weights(&self) -> &[f32] {
-        &self.weights
-    }
-
-    /// The vector that is subtracted from all.
-    pub fn origin(&self) -> &[f32] {
-        &self.origin
-    }
-
-    /// Replaces the weights.
-    #[cfg(test)]
-    pub fn set_weights(&mut self, weights: &[f32]) {
-        self.weights.copy_from_slice(weights);
-    }
-
     /// The fit to the first frame, with the labels in `scratch`.
     pub fn begin(&mut self, samples: &TrainingSamples, vectors: &[f32], scratch: &mut Scratch) {
         let damping = DAMPING * FIRST_DAMPING;
@@ -99,62 +72,6 @@ impl Discriminant {
         fit(self, (samples, vectors), (DAMPING, STEPS), scratch);
     }
 
-    #[inline(always)]
-    fn fit_all<S: Simd>(
-        &mut self,
-        simd: S,
-        (samples, vectors): (&TrainingSamples, &[f32]),
-        (damping, steps): (f64, usize),
-        scratch: &mut Scratch,
-    ) {
-        let Scratch {
-            labels: residuals,
-            gradient,
-            direction,
-            product,
-        } = scratch;
-        let damping = damping as f32 * residuals.len() as f32;
-        for (residual, score) in residuals.iter_mut().zip(samples.scores()) {
-            *residual -= score;
-        }
-        // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
-        gradient.clear();
-        gradient.resize(self.weights.len(), 0.0);
-        samples.add_sum(simd, vectors, Coefficients::Given(residuals), gradient);
-        direction.clone_from(gradient);
-        product.resize(gradient.len(), 0.0);
-        let mut squared = vector_ops::dot(gradient, gradient);
-        let enough = (squared * 1e-10).max(MIN_GRADIENT);
-        for step in 1..=steps {
-            if squared <= enough {
-                break;
-            }
-            if step == steps {
-                // The gradient is not needed after the last step.
-                let along = samples.energy(simd, vectors, direction);
-                let along = along + damping * vector_ops::dot(direction, direction);
-                vector_ops::add(&mut self.weights, squared / along, direction);
-                break;
-            }
-            product.fill(0.0);
-            vector_ops::add(product, damping, direction);
-            samples.add_sum(
-                simd,
-                vectors,
-                Coefficients::ProductsWith(direction),
-                product,
-            );
-            let step = squared / vector_ops::dot(direction, product);
-            vector_ops::add(&mut self.weights, step, direction);
-            vector_ops::add(gradient, -step, product);
-            let before = squared;
-            squared = vector_ops::dot(gradient, gradient);
-            for (direction, gradient) in direction.iter_mut().zip(gradient.iter()) {
-                *direction = gradient + squared / before * *direction;
-            }
-        }
-    }
-
     /// Whether this may be the discriminant of a tracker with `params`.
     pub fn is_valid_for(&self, params: &Params, max: f32) -> bool {
         let len = if params.discriminant_weight > 0.0 {
@@ -162,11 +79,64 @@ impl Discriminant {
         } else {
             0
         };
-        let bounded = |values: &[f32]| values.iter().all(|value| value.abs() <= max);
+        let is_bounded = |value: &f32| value.abs() <= max;
         self.origin.len() == len
             && self.weights.len() == len
-            && bounded(&self.origin)
-            && bounded(&self.weights)
+            && self.origin.iter().chain(&self.weights).all(is_bounded)
+    }
+}
+
+#[pulp::with_simd(fit = Arch::new())]
+#[inline(always)]
+fn fit_simd<S: Simd>(
+    simd: S,
+    discriminant: &mut Discriminant,
+    (samples, vectors): (&TrainingSamples, &[f32]),
+    (damping, steps): (f64, usize),
+    scratch: &mut Scratch,
+) {
+    let weights = &mut discriminant.weights;
+    let Scratch {
+        labels: residuals,
+        gradient,
+        direction,
+        product,
+    } = scratch;
+    let damping = damping as f32 * residuals.len() as f32;
+    for (residual, score) in residuals.iter_mut().zip(&samples.scores) {
+        *residual -= score;
+    }
+    // Conjugate gradients on (UᵀU + damping) change = Uᵀ residuals.
+    gradient.clear();
+    gradient.resize(weights.len(), 0.0);
+    samples.add_sum(simd, vectors, Coefficients::Given(residuals), gradient);
+    direction.clone_from(gradient);
+    product.resize(gradient.len(), 0.0);
+    let mut squared = vector_ops::dot(gradient, gradient);
+    let enough = (squared * 1e-10).max(MIN_GRADIENT);
+    for step in 1..=steps {
+        if squared <= enough {
+            break;
+        }
+        if step == steps {
+            // The gradient is not needed after the last step.
+            let along = samples.energy(simd, vectors, direction);
+            let along = along + damping * vector_ops::dot(direction, direction);
+            vector_ops::add(weights, squared / along, direction);
+            break;
+        }
+        product.fill(0.0);
+        vector_ops::add(product, damping, direction);
+        let coefficients = Coefficients::ProductsWith(direction);
+        samples.add_sum(simd, vectors, coefficients, product);
+        let step = squared / vector_ops::dot(direction, product);
+        vector_ops::add(weights, step, direction);
+        vector_ops::add(gradient, -step, product);
+        let before = squared;
+        squared = vector_ops::dot(gradient, gradient);
+        for (direction, gradient) in direction.iter_mut().zip(gradient.iter()) {
+            *direction = gradient + squared / before * *direction;
+        }
     }
 }
 

@@ -23,7 +23,8 @@ pub(crate) struct TrainingSamples {
     origin: Vec<f32>,
     /// One over the length of x - origin; 0 where there is none.
     scales: Vec<f32>,
-    scores: Vec<f32>,
+    /// About 1 on the target and 0 beside it, but not bounded.
+    pub scores: Vec<f32>,
     scratch: Vec<f32>,
 }
 
@@ -77,15 +78,20 @@ impl TrainingSamples {
         self.scratch = scratch;
     }
 
-    /// The scores: about 1 on the target and 0 beside it, but not bounded.
-    pub fn scores(&self) -> &[f32] {
-        &self.scores
-    }
-
     /// Forgets all samples but the first `count`.
     pub fn truncate(&mut self, count: usize) {
         self.scales.truncate(count);
         self.scores.truncate(count);
+    }
+
+    /// The vectors from the sample `first` on. At the end the last one stands more than once, and is not to be counted.
+    #[inline(always)]
+    fn group<'a>(&self, first: usize, vectors: &'a [f32], len: usize) -> [&'a [f32]; GROUP] {
+        let mut group = [vectors; GROUP];
+        for (i, vector) in group.iter_mut().enumerate() {
+            *vector = &vectors[(first + i).min(self.scales.len() - 1) * len..][..len];
+        }
+        group
     }
 
     /// Σ (uᵢ · d)².
@@ -95,12 +101,7 @@ impl TrainingSamples {
         let of_origin = vector_ops::dot(&self.origin, direction);
         let mut energy = 0.0;
         for first in (0..scales.len()).step_by(GROUP) {
-            let mut group = [vectors; GROUP];
-            for (i, vector) in group.iter_mut().enumerate() {
-                // A group at the end has the last vector more than once, which is not counted.
-                *vector = &vectors[(first + i).min(scales.len() - 1) * len..][..len];
-            }
-            let products = gemm::tile(simd, group, [direction]);
+            let products = gemm::tile(simd, self.group(first, vectors, len), [direction]);
             for ([product], scale) in products.iter().zip(&scales[first..]) {
                 let product = scale * (product - of_origin);
                 energy += product * product;
@@ -126,11 +127,7 @@ impl TrainingSamples {
         let count = self.scales.len();
         let mut total = 0.0;
         for first in (0..count).step_by(GROUP) {
-            let mut group = [vectors; GROUP];
-            for (i, vector) in group.iter_mut().enumerate() {
-                // A group at the end has the last vector more than once, with the factor 0.
-                *vector = &vectors[(first + i).min(count - 1) * len..][..len];
-            }
+            let group = self.group(first, vectors, len);
             let mut factors = [0.0; GROUP];
             let scales = &self.scales[first..];
             match coefficients {

@@ -8,7 +8,7 @@ use pulp::{Arch, Simd};
 
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::classifier::window_score::{Products, Scorer};
+use crate::tracker::classifier::window_score::Scorer;
 use crate::tracker::features::channels::{CHANNELS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
 
@@ -40,11 +40,13 @@ pub(crate) fn window_scores_simd<S: Simd>(
         }
         for first in (0..columns).step_by(S::F32_LANES) {
             let products = correlate(simd, planes, (first, places), width, discriminant);
+            let [directions, grays] = products;
+            let products = directions.into_iter().zip(grays);
             let rows = rows.chunks_mut(columns).zip(places).zip(products);
-            for ((row, j), products) in rows {
+            for ((row, j), (directions, grays)) in rows {
                 let boxes = planes.boxes(simd, (first, j), height);
                 let mut scores = Lanes::ZERO;
-                scores.load_mut::<S>()[0] = scorer.score(simd, products, boxes);
+                scores.load_mut::<S>()[0] = scorer.score(simd, [directions, grays], boxes);
                 for (out, score) in row[first..].iter_mut().zip(&scores.0[..S::F32_LANES]) {
                     *out = *score;
                 }
@@ -53,8 +55,8 @@ pub(crate) fn window_scores_simd<S: Simd>(
     }
 }
 
-/// The products of the windows from column `first` on in each of `rows`. Of windows that are not on the grid they mean
-/// nothing.
+/// The products of the windows from column `first` on in each of `rows`: with the weights and with the origin, of all
+/// channels but the gray one and then of that. Of windows that are not on the grid they mean nothing.
 #[inline(always)]
 fn correlate<S: Simd>(
     simd: S,
@@ -62,30 +64,22 @@ fn correlate<S: Simd>(
     (first, rows): (usize, [usize; ROWS]),
     width: usize,
     discriminant: &Discriminant,
-) -> [Products<S>; ROWS] {
+) -> [[[S::f32s; 2]; ROWS]; 2] {
     let row_len = width * CHANNELS;
-    let weights = discriminant.weights().chunks_exact(row_len);
-    let origin = discriminant.origin().chunks_exact(row_len);
-    let mut directions = [[simd.splat_f32s(0.0); 2]; ROWS];
-    let mut grays = directions;
+    let weights = discriminant.weights.chunks_exact(row_len);
+    let origin = discriminant.origin.chunks_exact(row_len);
+    let mut sums = [[[simd.splat_f32s(0.0); 2]; ROWS]; 2];
     for (r, of) in weights.zip(origin).enumerate() {
         for channel in 0..CHANNELS {
             let mut lines = [&[][..]; ROWS];
             for (line, row) in lines.iter_mut().zip(rows) {
                 *line = planes.line((first, row + r), channel);
             }
-            let sums = if channel == GRAY {
-                &mut grays
-            } else {
-                &mut directions
-            };
+            let sums = &mut sums[usize::from(channel == GRAY)];
             add_products(simd, lines, of, channel, sums);
         }
     }
-    std::array::from_fn(|row| Products {
-        directions: directions[row],
-        grays: grays[row],
-    })
+    sums
 }
 
 /// Adds the products of a channel of a row of cells, for windows from the beginning of each of `lines` on.
@@ -158,7 +152,7 @@ mod tests {
             let origin: Vec<f32> = (0..len).map(|i| number(i) / 20.0).collect();
             let mut discriminant = Discriminant::new(origin.clone());
             let weights: Vec<f32> = (0..len).map(|i| number(i + 5000)).collect();
-            discriminant.set_weights(&weights);
+            discriminant.weights.clone_from(&weights);
 
             let (across, down) = (5, 3);
             let mut grid = Grid::default();

@@ -10,15 +10,6 @@ use crate::tracker::linalg::vector_ops;
 /// A squared distance from the origin below this share of the squared lengths is rounding, as in a training sample.
 const MIN_REMAINDER: f32 = 1e-6;
 
-/// The products of windows with the weights and with the origin, one window a lane.
-#[derive(Clone, Copy)]
-pub(crate) struct Products<S: Simd> {
-    /// Of the directions.
-    pub directions: [S::f32s; 2],
-    /// Of the gray values as they are on the grid.
-    pub grays: [S::f32s; 2],
-}
-
 /// What the scores of a frame have in common.
 pub(crate) struct Scorer {
     /// The sums of the gray channel of the weights and of the origin.
@@ -34,7 +25,7 @@ pub(crate) struct Scorer {
 impl Scorer {
     #[inline(always)]
     pub fn new(discriminant: &Discriminant, cell_pixels: f32) -> Self {
-        let (weights, origin) = (discriminant.weights(), discriminant.origin());
+        let Discriminant { weights, origin } = discriminant;
         let grays = |vector: &[f32]| -> f32 {
             let cells = vector.as_chunks::<CHANNELS>().0.iter();
             cells.map(|cell| cell[GRAY]).sum()
@@ -48,12 +39,14 @@ impl Scorer {
         }
     }
 
-    /// The scores of windows, from their products and their sums of energies, gray values and squares of these.
+    /// The scores of windows, one a lane. `products` are those with the weights and with the origin: first of all channels
+    /// but the gray one, then of the gray values as they are on the grid. The rest are the windows' sums of energies, gray
+    /// values and squares of these.
     #[inline(always)]
     pub fn score<S: Simd>(
         &self,
         simd: S,
-        products: Products<S>,
+        [mut whole, grays]: [[S::f32s; 2]; 2],
         [energy, gray, square]: [S::f32s; 3],
     ) -> S::f32s {
         let zero = simd.splat_f32s(0.0);
@@ -68,8 +61,7 @@ impl Scorer {
         let least_deviation = simd.splat_f32s(self.least_deviation);
         let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
         let scale = simd.div_f32s(simd.splat_f32s(GRAY_WEIGHT), deviation);
-        let mut whole = products.directions;
-        for ((whole, grays), sum) in whole.iter_mut().zip(products.grays).zip(self.grays) {
+        for ((whole, grays), sum) in whole.iter_mut().zip(grays).zip(self.grays) {
             let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
             *whole = simd.mul_add_e_f32s(scale, simd.sub_f32s(grays, shift), *whole);
         }
