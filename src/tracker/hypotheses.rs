@@ -2,6 +2,7 @@
 
 use rand_chacha::ChaCha8Rng;
 
+use crate::tracker::appearance::color_histogram::ColorPixels;
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::warp::Rotation;
@@ -40,17 +41,11 @@ impl State {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut workspace.dense_search;
                 let foreground = &mut workspace.foreground;
-                foreground.compute(
-                    image,
-                    &self.color,
-                    &self.answer,
-                    radius,
-                    bounds,
-                    self.format.has_color,
-                );
+                let pixels = ColorPixels::of(image, self.format.has_color);
+                foreground.compute(pixels, &self.color, &self.answer, radius, bounds);
                 dense_search.run(extractor, search, &self.discriminant, foreground);
                 let cell = Extractor::cell_size(&self.answer, bounds, params);
-                search.propose(dense_search.maxima(), cell, draws, particles);
+                search.propose(&dense_search.maxima, cell, draws, particles);
             }
         }
     }

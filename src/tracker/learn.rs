@@ -12,7 +12,7 @@ use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
-use crate::tracker::scale::{maximum, pyramid};
+use crate::tracker::scale::{dsst, maximum, pyramid};
 use crate::tracker::state::State;
 use crate::tracker::workspace::Workspace;
 
@@ -50,7 +50,7 @@ impl State {
     pub fn record_seen(&mut self, workspace: &Workspace) {
         if self.params.static_penalty > 0.0 {
             self.last_seen
-                .record(self.answer, workspace.change_test.image());
+                .record(self.answer, &workspace.change_test.image);
         }
     }
 
@@ -134,11 +134,9 @@ impl State {
     /// Updates the colour histograms with the box `at`.
     pub fn learn_color(&mut self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
         if self.params.histogram_weight > 0.0 {
-            let has_color = self.format.has_color;
-            let pixels = ColorPixels::of(image, has_color);
+            let pixels = ColorPixels::of(image, self.format.has_color);
             let scratch = &mut workspace.learning.color;
-            self.color
-                .learn(pixels, at, &self.bounds, has_color, scratch);
+            self.color.learn(pixels, at, &self.bounds, scratch);
         }
     }
 
@@ -147,8 +145,8 @@ impl State {
         let rate = self.params.scale_learning_rate;
         if rate > 0.0 {
             self.describe_pyramid(image, at, workspace);
-            self.scale_filter
-                .learn(&mut workspace.learning.pyramid, rate);
+            let pyramid = &mut workspace.learning.pyramid;
+            dsst::learn(&mut self.scale_filter, pyramid, rate);
         }
     }
 

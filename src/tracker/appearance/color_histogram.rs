@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::tracker::appearance::sparse_bins;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::plane::Plane;
+use crate::tracker::image::ycbcr::NEUTRAL;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
@@ -69,14 +70,16 @@ pub(crate) struct Part {
 pub(crate) struct ColorPixels<'a> {
     luma: &'a Plane,
     chroma: Option<&'a [Plane; 2]>,
+    has_color: bool,
 }
 
 impl<'a> ColorPixels<'a> {
-    /// Those of `frame`; without chroma unless `has_color`.
+    /// Those of `frame`, for a session in colour where `has_color`.
     pub fn of(frame: &'a Frame, has_color: bool) -> Self {
         Self {
-            luma: frame.luma(),
-            chroma: frame.chroma().filter(|_| has_color),
+            luma: &frame.luma,
+            chroma: frame.chroma.as_ref(),
+            has_color,
         }
     }
 
@@ -121,7 +124,7 @@ impl<'a> ColorPixels<'a> {
 
     /// Writes the bins of the pixels of row `y` of `part` to `out`.
     #[inline(always)]
-    pub fn bins(&self, part: &Part, y: usize, bin_count: usize, out: &mut Vec<u16>) {
+    pub fn bins(&self, part: &Part, y: usize, out: &mut Vec<u16>) {
         let (upper, lower) = (self.luma.row(2 * y), self.luma.row(2 * y + 1));
         let last = upper.len() - 1;
         clear_and_reserve(out, self.columns());
@@ -132,19 +135,17 @@ impl<'a> ColorPixels<'a> {
         };
         let luma_bin = |x: usize| luma(x) / (256 / LUMA_BINS) as u16;
         let columns = part.left..part.right;
-        if bin_count == LUMA_BINS {
+        if !self.has_color {
             out.extend(columns.map(luma_bin));
             return;
         }
-        let Some([cb, cr]) = self.chroma else {
-            let gray = chroma_bin(128) * (CHROMA_BINS as u16 + 1);
-            out.extend(columns.map(|x| luma_bin(x) * (CHROMA_BINS * CHROMA_BINS) as u16 + gray));
-            return;
-        };
-        let (cb, cr) = (cb.row(y), cr.row(y));
-        let last = cb.len() - 1;
+        let rows = self
+            .chroma
+            .map(|planes| planes.each_ref().map(|plane| plane.row(y)));
         out.extend(columns.map(|x| {
-            let (cb, cr) = (chroma_bin(cb[x.min(last)]), chroma_bin(cr[x.min(last)]));
+            let at_x = |row: &[u8]| row[x.min(row.len() - 1)];
+            let chroma = rows.map_or([NEUTRAL as u8; 2], |rows| rows.map(at_x));
+            let [cb, cr] = chroma.map(chroma_bin);
             (luma_bin(x) * CHROMA_BINS as u16 + cb) * CHROMA_BINS as u16 + cr
         }));
     }
@@ -181,10 +182,9 @@ impl ColorHistogram {
         pixels: ColorPixels<'_>,
         at: &Particle,
         bounds: &StateBounds,
-        has_color: bool,
         scratch: &mut Scratch,
     ) {
-        let count = Self::bin_count(has_color);
+        let count = Self::bin_count(pixels.has_color);
         let target = [(INNER, 1.0)];
         let surroundings = [(RING.1, 1.0), (RING.0, -1.0)];
         let is_first = !self.has_learned();
@@ -237,7 +237,7 @@ impl ColorHistogram {
 
 fn add(pixels: ColorPixels<'_>, part: &Part, sign: f32, scratch: &mut Scratch) {
     for y in part.top..part.bottom {
-        pixels.bins(part, y, scratch.counts.len(), &mut scratch.bins);
+        pixels.bins(part, y, &mut scratch.bins);
         for &bin in &scratch.bins {
             scratch.counts[usize::from(bin)] += sign;
         }

@@ -2,8 +2,6 @@
 //! over boxes by an integral image.
 
 use crate::tracker::appearance::color_histogram::{ColorHistogram, ColorPixels, Part};
-use crate::tracker::image::frame::Frame;
-use crate::tracker::image::rect::Rect;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
@@ -23,17 +21,15 @@ pub(crate) struct ForegroundMap {
 }
 
 impl ForegroundMap {
-    /// Becomes the map of `frame` for boxes within `radius` working pixels of that of `center`.
+    /// Becomes the map of the frame of `pixels` for boxes within `radius` working pixels of that of `center`.
     pub fn compute(
         &mut self,
-        frame: &Frame,
+        pixels: ColorPixels<'_>,
         histogram: &ColorHistogram,
         center: &Particle,
         radius: f64,
         bounds: &StateBounds,
-        has_color: bool,
     ) {
-        let pixels = ColorPixels::of(frame, has_color);
         // Room for the widest search at once.
         clear_and_reserve(&mut self.sums, (pixels.columns() + 1) * (pixels.rows() + 1));
         if !histogram.has_learned() {
@@ -46,7 +42,7 @@ impl ForegroundMap {
         let stride = part.right - part.left + 1;
         self.sums.resize(stride * (part.bottom - part.top + 1), 0.0);
         for (row, y) in (part.top..part.bottom).enumerate() {
-            pixels.bins(&part, y, self.posterior.len(), &mut self.bins);
+            pixels.bins(&part, y, &mut self.bins);
             let (above, below) = self.sums[row * stride..].split_at_mut(stride);
             let mut sum = 0.0;
             let corners = below[1..].iter_mut().zip(&above[1..]);
@@ -64,15 +60,11 @@ impl ForegroundMap {
         if self.sums.is_empty() {
             return 0.0;
         }
-        let area = bounds.area(particle);
-        let Rect {
-            x,
-            y,
-            width,
-            height,
-        } = area.in_pixels_of(self.side);
-        let sum = self.at(x + width, y + height) - self.at(x, y + height) - self.at(x + width, y)
-            + self.at(x, y);
+        let area = bounds.area(particle).in_pixels_of(self.side);
+        let (left, top) = (area.x, area.y);
+        let (right, bottom) = (left + area.width, top + area.height);
+        let sum = self.at(right, bottom) - self.at(left, bottom) - self.at(right, top)
+            + self.at(left, top);
         let usual = bounds.box_width * bounds.box_height * scale * scale;
         f64::from(sum) * self.side * self.side / usual
     }

@@ -30,7 +30,8 @@ pub(crate) struct DenseSearch {
     planes: ChannelPlanes,
     /// The logarithm of what the weight of a particle at each place is multiplied by, row by row.
     values: Vec<f32>,
-    maxima: Vec<Particle>,
+    /// Best first.
+    pub maxima: Vec<Particle>,
 }
 
 /// The places of a dense search: a grid around a center.
@@ -62,10 +63,6 @@ impl SearchGrid {
 
     fn columns(&self) -> usize {
         2 * self.offset.0 + 1
-    }
-
-    fn rows(&self) -> usize {
-        2 * self.offset.1 + 1
     }
 
     #[inline(always)]
@@ -101,11 +98,6 @@ fn weigh_simd<S: Simd>(
 }
 
 impl DenseSearch {
-    /// The maxima, best first.
-    pub fn maxima(&self) -> &[Particle] {
-        &self.maxima
-    }
-
     /// Scores all places around the last answer, displaced with the image, in the channels that `extractor` has
     /// computed, and finds the maxima.
     pub fn run(
@@ -135,7 +127,7 @@ impl DenseSearch {
         );
         clear_and_reserve(&mut self.values, (2 * MAX_OFFSET + 1).pow(2));
         let values = &mut self.values;
-        values.resize(places.columns() * places.rows(), 0.0);
+        values.resize(places.columns() * (2 * places.offset.1 + 1), 0.0);
         let cell_pixels = (cell.0 * cell.1) as f32;
         let size = (params.patch_width as usize, params.patch_height as usize);
         let planes = &mut self.planes;

@@ -5,15 +5,15 @@
 
 use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::gray::GrayPatches;
-use crate::tracker::features::hog::Hog;
+use crate::tracker::features::hog;
+use crate::tracker::features::hog_cells::HogCells;
 use crate::tracker::features::integral::IntegralChannels;
 use crate::tracker::image::downsample;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::{Particle, StateBounds};
-use crate::tracker::params::table::Features;
-use crate::tracker::params::table::Params;
+use crate::tracker::params::table::{Features, Params};
 
 /// How much larger than the largest particle the areas of a frame may be. Scales change by a few percent a frame.
 const SCALE_MARGIN: f64 = 1.08;
@@ -27,9 +27,9 @@ pub(crate) struct Extractor {
     /// Working pixels along a side of one of the frame's pixels.
     downsample: f64,
     integral: IntegralChannels,
-    hog: Hog,
+    hog: HogCells,
     /// For grids, which have other numbers of cells.
-    grid_hog: Hog,
+    grid_hog: HogCells,
 }
 
 /// The cells of a particle and its surroundings, row by row.
@@ -81,7 +81,7 @@ impl Extractor {
         bounds: &StateBounds,
         params: &Params,
     ) {
-        self.downsample = frame.downsample();
+        self.downsample = f64::from(frame.luma.pixel_side);
         if params.features == Features::Gradients {
             let window = Self::window(particles, radius, bounds, params);
             let (width, height) = Self::cell_size(&particles[0], bounds, params);
@@ -122,7 +122,7 @@ impl Extractor {
                 let areas = areas.map(|area| area.in_pixels_of(self.downsample));
                 let size = (params.patch_width as usize, params.patch_height as usize);
                 let size = (size, params.chroma_weight);
-                self.hog.describe(&self.integral, areas, size, out);
+                hog::describe(&mut self.hog, &self.integral, areas, size, out);
             }
         }
     }
@@ -179,8 +179,8 @@ impl Extractor {
         let hog = &mut self.grid_hog;
         hog.reserve(max_columns, max_rows);
         let size = ((columns, rows), params.chroma_weight);
-        hog.describe(&self.integral, areas, size, &mut grid.values);
-        grid.grays.extend(hog.grays());
+        hog::describe(hog, &self.integral, areas, size, &mut grid.values);
+        grid.grays.extend(hog.cells.iter().map(|cell| cell.0[GRAY]));
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
             cell[GRAY] = 0.0;
         }

@@ -43,7 +43,7 @@ impl GradientRow {
 
         for (channel, out) in self.chroma.iter_mut().enumerate() {
             out.clear();
-            if let Some(planes) = frame.chroma() {
+            if let Some(planes) = &frame.chroma {
                 compress_chroma(&planes[channel], pixels.clone(), y, out);
             }
             out.resize(padded, 0.0);

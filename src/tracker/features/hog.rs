@@ -6,75 +6,36 @@
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::features::channels::{CHANNELS, GRAY};
+use crate::tracker::features::channels::CHANNELS;
 use crate::tracker::features::hog_cells::HogCells;
 use crate::tracker::features::integral::IntegralChannels;
 use crate::tracker::image::rect::Rect;
 
-/// Computes the feature vectors of areas; its memory is kept from one frame to the next.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Hog {
-    /// Columns and rows of cells.
-    size: (usize, usize),
-    cells: HogCells,
-}
-
-impl Hog {
-    /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to
-    /// `out`: `columns * rows * CHANNELS` values each.
-    pub fn describe(
-        &mut self,
-        integral: &IntegralChannels,
-        areas: impl Iterator<Item = Rect>,
-        (size, chroma_weight): ((usize, usize), f64),
-        out: &mut [f32],
-    ) {
-        self.resize(size);
-        self.cells.chroma_weight = chroma_weight as f32;
-        describe_all(self, integral, areas, out);
-    }
-
-    /// The gray sums of the cells of the area that was described, if it was only one, with the mean gray subtracted.
-    pub fn grays(&self) -> impl Iterator<Item = f32> {
-        self.cells.cells.iter().map(|cell| cell.0[GRAY])
-    }
-
-    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
-    pub fn reserve(&mut self, columns: usize, rows: usize) {
-        if self.cells.cells.capacity() < columns * rows {
-            self.resize((columns, rows));
-        }
-    }
-
-    fn resize(&mut self, size: (usize, usize)) {
-        if self.size != size {
-            self.size = size;
-            self.cells.resize(size.0, size.1);
-        }
-    }
-}
-
-#[pulp::with_simd(describe_all = Arch::new())]
+/// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to `out`:
+/// `columns * rows * CHANNELS` values each. `cells` has the last one's cells then.
+#[pulp::with_simd(describe = Arch::new())]
 #[inline(always)]
-fn describe_all_simd<S: Simd, A: Iterator<Item = Rect>>(
+pub(crate) fn describe_simd<S: Simd, A: Iterator<Item = Rect>>(
     simd: S,
-    hog: &mut Hog,
+    cells: &mut HogCells,
     integral: &IntegralChannels,
     areas: A,
+    ((columns, rows), chroma_weight): ((usize, usize), f64),
     out: &mut [f32],
 ) {
-    let (columns, rows) = hog.size;
+    cells.resize(columns, rows);
+    cells.chroma_weight = chroma_weight as f32;
     let vectors = out.chunks_exact_mut(columns * rows * CHANNELS);
     for (area, vector) in areas.zip(vectors) {
-        hog.cells.sum(simd, integral, &area, hog.size);
-        hog.cells.normalize(simd, columns, vector);
+        cells.sum(simd, integral, &area);
+        cells.normalize(simd, vector);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::features::channels::{CHROMA, DIRECTIONS, GRAY_WEIGHT, HALF_CHROMA};
+    use crate::tracker::features::channels::{CHROMA, DIRECTIONS, GRAY, GRAY_WEIGHT, HALF_CHROMA};
     use crate::tracker::features::hog_cells::{MAX_DIRECTION, MIN_STRENGTH};
     use crate::tracker::image::frame::Frame;
     use crate::tracker::params::presets::Preset;
@@ -117,7 +78,7 @@ mod tests {
                 sums[lower] += share * strength * (1.0 - part);
                 sums[(lower + 1) % DIRECTIONS] += share * strength * part;
                 sums[GRAY] += share * f64::from(frame.pixels()[y * width + x]);
-                let planes = frame.chroma().expect("it has colour");
+                let planes = frame.chroma.as_ref().expect("it has colour");
                 for (channel, plane) in CHROMA.into_iter().zip(planes) {
                     let chroma = f64::from(plane.pixels[y / 2 * 30 + x / 2]) - 128.0;
                     sums[channel] += share * chroma / (f64::from(HALF_CHROMA) + chroma.abs());
@@ -138,7 +99,7 @@ mod tests {
             Rect::new(-9.5, 35.2, 40.0, 30.0),
         ] {
             integral.compute(&frame, &Rect::new(-20.0, 0.0, 75.0, 80.0), (4.0, 4.0));
-            cells.sum(pulp::Scalar, &integral, &area, (4, 4));
+            cells.sum(pulp::Scalar, &integral, &area);
             for index in 0..16 {
                 let (width, height) = (area.width / 4.0, area.height / 4.0);
                 let x = area.x + (index % 4) as f64 * width;
@@ -151,7 +112,7 @@ mod tests {
                         "{found} {expected}"
                     );
                 }
-                let expected = expected[GRAY] - f64::from(integral.mean_gray()) * width * height;
+                let expected = expected[GRAY] - f64::from(integral.mean_gray) * width * height;
                 assert!((f64::from(found[GRAY]) - expected).abs() < 1.0);
             }
         }
@@ -165,7 +126,7 @@ mod tests {
         let mut out = vec![1.0; params.feature_len()];
         let areas = std::iter::once(area);
         let size = (size, params.chroma_weight);
-        Hog::default().describe(&integral, areas, size, &mut out);
+        describe(&mut HogCells::default(), &integral, areas, size, &mut out);
         out
     }
 

@@ -31,14 +31,18 @@ const LIMITS: Lanes = {
 /// Columns of cells that are summed together: as many as an area usually has.
 const STRIP: usize = 8;
 
-/// The cells of one area.
+/// The cells of one area; their memory is kept from one frame to the next.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HogCells {
+    columns: usize,
+    rows: usize,
     /// The channels of each cell, summed over its pixels, row by row. The integral image's mean gray is subtracted from
     /// every pixel, and pixels beyond its window are black.
     pub cells: Vec<Lanes>,
     norm: BlockNorm,
-    grays: GrayMoments,
+    /// The sum of the gray values of all cells, and that of their squares.
+    gray_sum: f32,
+    gray_squares: f32,
     /// The area of a cell, in pixels.
     cell_area: f32,
     /// The weight of the mean chroma of a cell.
@@ -48,16 +52,20 @@ pub(crate) struct HogCells {
     y_edges: SampleCoords,
 }
 
-/// The sum of the gray values of all cells, and that of their squares.
-#[derive(Debug, Clone, Copy, Default)]
-struct GrayMoments {
-    sum: f32,
-    squares: f32,
-}
-
 impl HogCells {
-    /// Makes room for so many columns and rows of cells.
+    /// Makes room for up to so many columns and rows of cells, for areas of different numbers of them.
+    pub fn reserve(&mut self, columns: usize, rows: usize) {
+        if self.cells.capacity() < columns * rows {
+            self.resize(columns, rows);
+        }
+    }
+
+    /// Makes it so many columns and rows of cells.
     pub fn resize(&mut self, columns: usize, rows: usize) {
+        if (self.columns, self.rows) == (columns, rows) {
+            return;
+        }
+        (self.columns, self.rows) = (columns, rows);
         self.cells.resize(columns * rows, Lanes::ZERO);
         self.norm.resize(columns, rows);
         self.x_edges.resize(columns + 1);
@@ -66,49 +74,45 @@ impl HogCells {
 
     /// Sums the cells of `area`, and their energies.
     #[inline(always)]
-    pub fn sum<S: Simd>(
-        &mut self,
-        simd: S,
-        integral: &IntegralChannels,
-        area: &Rect,
-        (columns, rows): (usize, usize),
-    ) {
+    pub fn sum<S: Simd>(&mut self, simd: S, integral: &IntegralChannels, area: &Rect) {
+        let (columns, rows) = (self.columns, self.rows);
         let width = (area.width / columns as f64) as f32;
         let height = (area.height / rows as f64) as f32;
-        integral.locate_columns((area.x as f32, width), &mut self.x_edges);
-        integral.locate_rows((area.y as f32, height), &mut self.y_edges);
+        integral.x.locate(area.x as f32, width, &mut self.x_edges);
+        integral.y.locate(area.y as f32, height, &mut self.y_edges);
         let mut totals = [Lanes::ZERO; 2];
         let mut first = 0;
         while first + STRIP <= columns {
-            self.sum_strip::<S, STRIP>(simd, integral, (first, columns), &mut totals);
+            self.sum_strip::<S, STRIP>(simd, integral, first, &mut totals);
             first += STRIP;
         }
         while first < columns {
-            self.sum_strip::<S, 1>(simd, integral, (first, columns), &mut totals);
+            self.sum_strip::<S, 1>(simd, integral, first, &mut totals);
             first += 1;
         }
         self.norm.sum_vertically();
         self.cell_area = (area.width * area.height) as f32 / self.cells.len() as f32;
-        let [sum, squares] = totals.map(|total| total.0[GRAY]);
-        self.grays = GrayMoments { sum, squares };
-        if !integral.contains(area) {
-            self.blacken_outside(integral, columns);
+        [self.gray_sum, self.gray_squares] = totals.map(|total| total.0[GRAY]);
+        let is_inside =
+            integral.x.contains(area.x, area.width) && integral.y.contains(area.y, area.height);
+        if !is_inside {
+            self.blacken_outside(integral);
         }
     }
 
     /// Makes the pixels beyond the window black. In the integral image they have the mean gray.
     #[cold]
-    fn blacken_outside(&mut self, integral: &IntegralChannels, columns: usize) {
-        self.grays = GrayMoments::default();
+    fn blacken_outside(&mut self, integral: &IntegralChannels) {
+        (self.gray_sum, self.gray_squares) = (0.0, 0.0);
         for (index, cell) in self.cells.iter_mut().enumerate() {
-            let (column, row) = (index % columns, index / columns);
-            let x = |edge: usize| integral.width_before(self.x_edges.get(edge));
-            let y = |edge: usize| integral.height_before(self.y_edges.get(edge));
+            let (column, row) = (index % self.columns, index / self.columns);
+            let x = |edge: usize| integral.x.pixels_before(self.x_edges.get(edge));
+            let y = |edge: usize| integral.y.pixels_before(self.y_edges.get(edge));
             let inside = (x(column + 1) - x(column)) * (y(row + 1) - y(row));
             let gray = &mut cell.0[GRAY];
-            *gray -= integral.mean_gray() * (self.cell_area - inside);
-            self.grays.sum += *gray;
-            self.grays.squares += *gray * *gray;
+            *gray -= integral.mean_gray * (self.cell_area - inside);
+            self.gray_sum += *gray;
+            self.gray_squares += *gray * *gray;
         }
     }
 
@@ -118,7 +122,7 @@ impl HogCells {
         &mut self,
         simd: S,
         integral: &IntegralChannels,
-        (first, columns): (usize, usize),
+        first: usize,
         totals: &mut [Lanes; 2],
     ) {
         let energy_shares = ENERGY_SHARES;
@@ -141,7 +145,7 @@ impl HogCells {
             }
             left = right;
         }
-        for (j, cells) in self.cells.chunks_exact_mut(columns).enumerate() {
+        for (j, cells) in self.cells.chunks_exact_mut(self.columns).enumerate() {
             let cells = &mut cells[first..][..N];
             let row = integral.row(self.y_edges.get(j + 1));
             let mut energies = [zero; N];
@@ -172,10 +176,10 @@ impl HogCells {
 
     /// Writes the feature vector of the cells to `out`.
     #[inline(always)]
-    pub fn normalize<S: Simd>(&mut self, simd: S, columns: usize, out: &mut [f32]) {
-        let (count, cell_area, grays) = (self.cells.len() as f32, self.cell_area, self.grays);
-        let mean = grays.sum / count;
-        let variance = (grays.squares / count - mean * mean).max(0.0);
+    pub fn normalize<S: Simd>(&mut self, simd: S, out: &mut [f32]) {
+        let (count, cell_area) = (self.cells.len() as f32, self.cell_area);
+        let mean = self.gray_sum / count;
+        let variance = (self.gray_squares / count - mean * mean).max(0.0);
         let gray_scale = GRAY_WEIGHT / variance.sqrt().max(MIN_CONTRAST * cell_area);
         let floor = (MIN_STRENGTH * cell_area) * (MIN_STRENGTH * cell_area);
         // A value is min(cell * factor + offset, limit).
@@ -189,7 +193,7 @@ impl HogCells {
         let (directions, limits) = (directions.load::<S>(), limits.load::<S>());
         let factors = self.norm.factors(floor);
         let mut first = 0;
-        for (cells, factors) in self.cells.chunks_exact(columns).zip(factors) {
+        for (cells, factors) in self.cells.chunks_exact(self.columns).zip(factors) {
             for (cell, &factor) in cells.iter().zip(factors) {
                 let (direction_factor, cell) = (simd.splat_f32s(factor), cell.load::<S>());
                 let mut values = Lanes::ZERO;

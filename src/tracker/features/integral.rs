@@ -11,6 +11,8 @@
 //! stripes of full contrast over the whole window, and a cell of these is then off by less than 1 %. White noise
 //! reaches 2 million in a direction.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd};
 
 use crate::tracker::features::binning::sum_row;
@@ -27,82 +29,44 @@ const MIN_COARSE_CELL: f64 = 8.0;
 /// The sums of the channels over all pixels of a window above and left of each *corner* of a grid.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct IntegralChannels {
-    /// The window, in pixels of the frame.
-    left: usize,
-    top: usize,
-    right: usize,
-    bottom: usize,
-    /// Pixels from one corner to the next: 1 or 2.
-    spacing: usize,
-    /// Corners after the first one in a row and in a column.
-    columns: usize,
-    rows: usize,
-    /// `(rows + 1) * (columns + 1)` sums, row by row. May be longer.
+    /// The window along x and along y.
+    pub x: Axis,
+    pub y: Axis,
+    /// `(y.corners + 1) * (x.corners + 1)` sums, row by row. May be longer.
     sums: Vec<Lanes>,
     /// The mean gray value of the window, rounded down: subtracted from every gray value.
-    mean_gray: f32,
+    pub mean_gray: f32,
     gradients: GradientRow,
+}
+
+/// A window along one axis, in pixels of the frame.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Axis {
+    pixels: Range<usize>,
+    /// Pixels from one corner to the next: 1 or 2.
+    spacing: usize,
+    /// Corners after the first one.
+    corners: usize,
 }
 
 impl IntegralChannels {
     /// Sums the channels over the part of `frame` that `window` touches, for cells of size `cell` = width, height. All
     /// lengths are in pixels of `frame`.
     pub fn compute(&mut self, frame: &Frame, window: &Rect, cell: (f64, f64)) {
-        (self.left, self.right) = covered(window.x, window.width, frame.width() as usize);
-        (self.top, self.bottom) = covered(window.y, window.height, frame.height() as usize);
-        self.spacing = if cell.0.min(cell.1) >= MIN_COARSE_CELL {
+        let spacing = if cell.0.min(cell.1) >= MIN_COARSE_CELL {
             2
         } else {
             1
         };
-        self.columns = (self.right - self.left).div_ceil(self.spacing);
-        self.rows = (self.bottom - self.top).div_ceil(self.spacing);
+        self.x = Axis::covering(window.x, window.width, frame.width(), spacing);
+        self.y = Axis::covering(window.y, window.height, frame.height(), spacing);
         sum_window(self, frame);
-    }
-
-    /// Sets `coords` to evenly spaced columns from `x` on, in pixels of the frame.
-    #[inline(always)]
-    pub fn locate_columns(&self, (x, step): (f32, f32), coords: &mut SampleCoords) {
-        let factor = 1.0 / self.spacing as f32;
-        coords.set((x - self.left as f32) * factor, step * factor, self.columns);
-    }
-
-    /// Sets `coords` to evenly spaced rows from `y` on, in pixels of the frame.
-    #[inline(always)]
-    pub fn locate_rows(&self, (y, step): (f32, f32), coords: &mut SampleCoords) {
-        let factor = 1.0 / self.spacing as f32;
-        coords.set((y - self.top as f32) * factor, step * factor, self.rows);
-    }
-
-    /// Whether all of `area`, in pixels of the frame, is in the window.
-    #[inline(always)]
-    pub fn contains(&self, area: &Rect) -> bool {
-        let (right, bottom) = (area.x + area.width, area.y + area.height);
-        area.x >= self.left as f64
-            && area.y >= self.top as f64
-            && right <= self.right as f64
-            && bottom <= self.bottom as f64
-    }
-
-    /// The whole number that was subtracted from every gray value: the mean of the window.
-    pub fn mean_gray(&self) -> f32 {
-        self.mean_gray
-    }
-
-    /// How many columns of pixels of the window are left of `x`.
-    pub fn width_before(&self, x: SampleCoord) -> f32 {
-        pixels_before(x, self.spacing, self.right - self.left)
-    }
-
-    /// How many rows of pixels of the window are above `y`.
-    pub fn height_before(&self, y: SampleCoord) -> f32 {
-        pixels_before(y, self.spacing, self.bottom - self.top)
     }
 
     /// The sums along a row.
     #[inline(always)]
     pub fn row(&self, y: SampleCoord) -> IntegralRow<'_> {
-        let stride = self.columns + 1;
+        let stride = self.x.corners + 1;
         let rows = &self.sums[y.corner * stride..][..2 * stride];
         let (upper, lower) = rows.split_at(stride);
         IntegralRow {
@@ -113,41 +77,68 @@ impl IntegralChannels {
     }
 }
 
+impl Axis {
+    /// The pixels of `count` that an interval touches, at least one.
+    fn covering(start: f64, len: f64, count: u32, spacing: usize) -> Self {
+        let count = count as usize;
+        let first = (start.floor().max(0.0) as usize).min(count - 1);
+        let end = ((start + len).ceil().max(0.0) as usize).clamp(first + 1, count);
+        let corners = (end - first).div_ceil(spacing);
+        Self {
+            pixels: first..end,
+            spacing,
+            corners,
+        }
+    }
+
+    /// Sets `coords` to evenly spaced coordinates from `start` on, in pixels of the frame.
+    #[inline(always)]
+    pub fn locate(&self, start: f32, step: f32, coords: &mut SampleCoords) {
+        let factor = 1.0 / self.spacing as f32;
+        let start = (start - self.pixels.start as f32) * factor;
+        coords.set(start, step * factor, self.corners);
+    }
+
+    /// Whether all of an interval is in the window.
+    #[inline(always)]
+    pub fn contains(&self, start: f64, len: f64) -> bool {
+        start >= self.pixels.start as f64 && start + len <= self.pixels.end as f64
+    }
+
+    /// How many pixels of the window are before `coord`. The last corner may be beyond the last pixel.
+    pub fn pixels_before(&self, coord: SampleCoord) -> f32 {
+        let at_corner = |corner: usize| (corner * self.spacing).min(self.pixels.len()) as f32;
+        let before = at_corner(coord.corner);
+        before + (at_corner(coord.corner + 1) - before) * coord.fraction
+    }
+}
+
 #[pulp::with_simd(sum_window = Arch::new())]
 #[inline(always)]
 fn sum_window_simd<S: Simd>(simd: S, integral: &mut IntegralChannels, frame: &Frame) {
-    let (columns, spacing) = (integral.columns, integral.spacing);
+    let (columns, rows, spacing) = (integral.x.corners, integral.y.corners, integral.x.spacing);
+    let (window, lines) = (integral.x.pixels.clone(), integral.y.pixels.clone());
     let stride = columns + 1;
-    let corners = stride * (integral.rows + 1);
+    let corners = stride * (rows + 1);
     if integral.sums.len() < corners {
         integral.sums.resize(corners, Lanes::ZERO);
     }
     integral.sums[..stride].fill(Lanes::ZERO);
-    let window = integral.left..integral.right;
     let mut gray_sum = 0;
-    let lines = frame.pixels().chunks_exact(frame.width() as usize);
-    for line in lines.take(integral.bottom).skip(integral.top) {
-        gray_sum += line[window.clone()]
-            .iter()
-            .map(|&gray| u32::from(gray))
-            .sum::<u32>();
+    for y in lines.clone() {
+        let line = frame.luma.row(y)[window.clone()].iter();
+        gray_sum += line.map(|&gray| u32::from(gray)).sum::<u32>();
     }
-    let pixels = window.len() * (integral.bottom - integral.top);
+    let pixels = window.len() * lines.len();
     integral.mean_gray = (gray_sum / pixels as u32) as f32;
-    for row in 0..integral.rows {
+    for row in 0..rows {
         let (above, below) = integral.sums.split_at_mut((row + 1) * stride);
         let (above, below) = (&above[row * stride..], &mut below[..stride]);
         below[0] = Lanes::ZERO;
-        let first = integral.top + row * spacing;
-        for y in first..integral.bottom.min(first + spacing) {
-            let gradients = &mut integral.gradients;
-            gradients.compute(
-                frame,
-                window.clone(),
-                y,
-                columns * spacing,
-                integral.mean_gray,
-            );
+        let first = lines.start + row * spacing;
+        for y in first..lines.end.min(first + spacing) {
+            let (gradients, padded) = (&mut integral.gradients, columns * spacing);
+            gradients.compute(frame, window.clone(), y, padded, integral.mean_gray);
             match (spacing, y - first) {
                 (1, _) => sum_row::<S, 1, true>(simd, gradients, above, below),
                 (_, 0) => sum_row::<S, 2, true>(simd, gradients, above, below),
@@ -191,21 +182,6 @@ impl IntegralRow<'_> {
     }
 }
 
-/// How many of the window's `count` pixels along an axis are before `coord`. The last corner may be beyond the last
-/// pixel.
-fn pixels_before(coord: SampleCoord, spacing: usize, count: usize) -> f32 {
-    let at_corner = |corner: usize| (corner * spacing).min(count) as f32;
-    let before = at_corner(coord.corner);
-    before + (at_corner(coord.corner + 1) - before) * coord.fraction
-}
-
-/// The pixels of `count` that an interval touches, at least one: the first one and the end.
-fn covered(start: f64, len: f64, count: usize) -> (usize, usize) {
-    let first = (start.floor().max(0.0) as usize).min(count - 1);
-    let end = ((start + len).ceil().max(0.0) as usize).clamp(first + 1, count);
-    (first, end)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,8 +220,9 @@ mod tests {
                 let (mut rows, mut columns) = (SampleCoords::default(), SampleCoords::default());
                 rows.resize(1);
                 columns.resize(1);
-                sums.locate_rows(((top + corner(down)) as f32, 0.0), &mut rows);
-                sums.locate_columns(((left + corner(across)) as f32, 0.0), &mut columns);
+                sums.y.locate((top + corner(down)) as f32, 0.0, &mut rows);
+                sums.x
+                    .locate((left + corner(across)) as f32, 0.0, &mut columns);
                 let row = sums.row(rows.get(0));
                 let found = row.at(pulp::Scalar, columns.get(0));
                 for (found, expected) in found.iter().zip(&expected) {
@@ -267,8 +244,8 @@ mod tests {
         rows.resize(2);
         columns.resize(2);
         for edge in [260.2, 271.3, 305.7] {
-            sums.locate_rows((edge, 6.5), &mut rows);
-            sums.locate_columns((edge, 6.5), &mut columns);
+            sums.y.locate(edge, 6.5, &mut rows);
+            sums.x.locate(edge, 6.5, &mut columns);
             let corner =
                 |x: usize, y: usize| sums.row(rows.get(y)).at(pulp::Scalar, columns.get(x))[0];
             assert!(corner(1, 1) > 2_f32.powi(24));

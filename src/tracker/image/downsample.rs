@@ -64,7 +64,10 @@ pub(crate) fn squares(plane: &Plane, factor: usize) -> (usize, usize) {
 }
 
 /// As [`downsample`], for the squares of these columns and rows.
-pub(crate) fn downsample_part(
+#[pulp::with_simd(downsample_part = Arch::new())]
+#[inline(always)]
+pub(crate) fn downsample_part_simd<S: Simd>(
+    _: S,
     plane: &Plane,
     factor: usize,
     (columns, rows): (Range<usize>, Range<usize>),
@@ -72,30 +75,16 @@ pub(crate) fn downsample_part(
 ) {
     out.clear();
     out.resize(columns.len() * rows.len(), 0);
-    if !out.is_empty() {
-        square_means(plane, factor, columns, rows.start, out);
-    }
-}
-
-#[pulp::with_simd(square_means = Arch::new())]
-#[inline(always)]
-fn square_means_simd<S: Simd>(
-    _: S,
-    plane: &Plane,
-    factor: usize,
-    columns: Range<usize>,
-    first_row: usize,
-    out: &mut [u8],
-) {
     match factor {
-        2 => square_means_of::<2>(plane, columns, first_row, out),
-        4 => square_means_of::<4>(plane, columns, first_row, out),
+        _ if out.is_empty() => {}
+        2 => square_means::<2>(plane, columns, rows.start, out),
+        4 => square_means::<4>(plane, columns, rows.start, out),
         _ => unreachable!("the factor is 2 or 4"),
     }
 }
 
 #[inline(always)]
-fn square_means_of<const FACTOR: usize>(
+fn square_means<const FACTOR: usize>(
     plane: &Plane,
     columns: Range<usize>,
     first_row: usize,
@@ -133,7 +122,7 @@ mod tests {
                 let frame = frame.expect("a frame of this size");
                 for factor in [2, 4] {
                     let mut found = vec![1, 2, 3];
-                    let columns = downsample(frame.luma(), factor, &mut found);
+                    let columns = downsample(&frame.luma, factor, &mut found);
                     assert_eq!(columns, width / factor);
                     assert_eq!(found.len(), columns * (height / factor));
                     let count = factor * factor;
@@ -153,7 +142,7 @@ mod tests {
         let frame = Frame::from_luma(43, 18, vec![9; 43 * 18]).expect("a frame of this size");
         let found = downsampled(&frame, 4, Frame::default());
         assert_eq!((found.width(), found.height()), (10, 4));
-        assert_eq!(found.downsample(), 4.0);
+        assert_eq!(found.luma.pixel_side, 4);
         assert_eq!(found.source_size(), (43, 18));
     }
 

@@ -38,9 +38,9 @@ pub struct FrameFormat {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Frame {
     source: (u32, u32),
-    luma: Plane,
+    pub(crate) luma: Plane,
     /// Cb and Cr of Rec. 601 in full range, in pixels twice as large as those of the luma.
-    chroma: Option<[Plane; 2]>,
+    pub(crate) chroma: Option<[Plane; 2]>,
 }
 
 impl Frame {
@@ -147,21 +147,6 @@ impl Frame {
             luma: self.luma.reduced(format.size),
             chroma: chroma.map(|planes| [planes[0].reduced(half), planes[1].reduced(half)]),
         }))
-    }
-
-    /// Cb and Cr.
-    pub(crate) fn chroma(&self) -> Option<&[Plane; 2]> {
-        self.chroma.as_ref()
-    }
-
-    /// The luma.
-    pub(crate) fn luma(&self) -> &Plane {
-        &self.luma
-    }
-
-    /// Working pixels along a side of one of the luma's pixels: 1, 2 or 4.
-    pub(crate) fn downsample(&self) -> f64 {
-        f64::from(self.luma.pixel_side)
     }
 
     /// Width of the luma.

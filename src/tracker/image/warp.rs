@@ -187,7 +187,7 @@ mod tests {
         let original = Frame::from_rgb(80, 60, &rgb).expect("a frame of this size");
         let turned = rotated(&original, 1.1);
         let (mut found, mut sum) = ((0.0, 0.0), 0.0);
-        let [_, cr] = turned.chroma().expect("it has colour");
+        let [_, cr] = turned.chroma.as_ref().expect("it has colour");
         for (i, &value) in cr.pixels.iter().enumerate() {
             let weight = f64::from(value) - 128.0;
             let (x, y) = (2.0 * (i % 40) as f64 + 1.0, 2.0 * (i / 40) as f64 + 1.0);

@@ -25,18 +25,14 @@ const NOISE: f64 = 10.0;
 /// The small images of the present frame and of the last one, compared.
 #[derive(Debug, Default)]
 pub(crate) struct ChangeTest {
-    image: SmallImage,
+    /// The small image of the present frame.
+    pub image: SmallImage,
     integral: JointIntegral,
     /// Where the target was then, in pixels of the present small image; none where nothing is compared.
     last_box: Option<Rect>,
 }
 
 impl ChangeTest {
-    /// The small image of the present frame.
-    pub fn image(&self) -> &SmallImage {
-        &self.image
-    }
-
     /// Makes the small image of `frame` around the box of `particle`.
     pub fn load(&mut self, frame: &Frame, particle: &Particle, bounds: &StateBounds) {
         self.last_box = None;
@@ -171,7 +167,7 @@ mod tests {
     fn compared(from: Particle, to: Particle, shift: usize) -> ChangeTest {
         let (mut test, mut last) = (ChangeTest::default(), LastSeen::default());
         test.load(&frame(0, &from), &from, &BOUNDS);
-        last.record(from, test.image());
+        last.record(from, &test.image);
         test.load(&frame(shift, &to), &from, &BOUNDS);
         let displaced = particle(from.x + shift as f64, from.y);
         test.compare(&last, &displaced, 60.0, &BOUNDS);
@@ -282,7 +278,7 @@ mod tests {
             let frame = frame.expect("a frame of this size");
             let mut last = LastSeen::default();
             test.load(&frame, &target, &BOUNDS);
-            last.record(particle(1.0, 1.0), test.image());
+            last.record(particle(1.0, 1.0), &test.image);
             assert!(last.is_valid_for((width as u32, height as u32), true));
             test.load(&frame, &target, &BOUNDS);
             test.compare(&last, &particle(1.0, 1.0), 60.0, &BOUNDS);

@@ -33,7 +33,7 @@ pub(crate) struct SmallImage {
 impl SmallImage {
     /// Becomes the small image of `frame` around the box of `particle`: without pixels where the frame is too small.
     pub fn load(&mut self, frame: &Frame, particle: &Particle, bounds: &StateBounds) {
-        let (width, height) = squares(frame.luma(), CELL);
+        let (width, height) = squares(&frame.luma, CELL);
         let area = small_box(particle, bounds);
         let (x, y) = area.center();
         let span = |center: f64, length: f64, count: usize| {
@@ -48,7 +48,7 @@ impl SmallImage {
         (self.left, self.top) = (columns.start as u32, rows.start as u32);
         self.width = columns.len() as u32;
         clear_and_reserve(&mut self.pixels, width.min(MAX_SIDE) * height.min(MAX_SIDE));
-        downsample_part(frame.luma(), CELL, (columns, rows), &mut self.pixels);
+        downsample_part(&frame.luma, CELL, (columns, rows), &mut self.pixels);
     }
 
     /// The number of pixels in a row.

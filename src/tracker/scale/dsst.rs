@@ -42,11 +42,6 @@ impl ScaleFilter {
         self.energies.clear();
     }
 
-    /// Learns the pyramid in `scratch`, whose middle is the target, with the learning rate η.
-    pub fn learn(&mut self, scratch: &mut Scratch, rate: f64) {
-        learn(self, scratch, rate);
-    }
-
     /// Measures the scale of the target in the pyramid in `scratch`.
     pub fn find(&self, scratch: &mut Scratch) -> Maximum {
         let response = respond(self, scratch);
@@ -86,10 +81,15 @@ impl ScaleFilter {
     }
 }
 
-/// The updates of A and B.
+/// Learns the pyramid in `scratch`, whose middle is the target, with the learning rate η.
 #[pulp::with_simd(learn = Arch::new())]
 #[inline(always)]
-fn learn_simd<S: Simd>(simd: S, filter: &mut ScaleFilter, scratch: &mut Scratch, rate: f64) {
+pub(crate) fn learn_simd<S: Simd>(
+    simd: S,
+    filter: &mut ScaleFilter,
+    scratch: &mut Scratch,
+    rate: f64,
+) {
     let len = scratch.transform(simd);
     let rate = if filter.has_learned() {
         rate as f32
@@ -183,7 +183,7 @@ mod tests {
 
     fn learned() -> ScaleFilter {
         let mut filter = ScaleFilter::default();
-        filter.learn(&mut pyramid(0.0), 0.5);
+        learn(&mut filter, &mut pyramid(0.0), 0.5);
         filter
     }
 
@@ -267,7 +267,7 @@ mod tests {
         let mut filter = ScaleFilter::default();
         let mut flat = pyramid(0.0);
         flat.features.fill(0.0);
-        filter.learn(&mut flat, 1.0);
+        learn(&mut filter, &mut flat, 1.0);
         let found = filter.find(&mut flat);
         assert!(found.change.is_finite() && found.response == 0.0);
     }
