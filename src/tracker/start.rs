@@ -18,7 +18,6 @@ use crate::tracker::image::rect::Rect;
 use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::last_seen::LastSeen;
-use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
 use crate::tracker::params::table::Params;
 use crate::tracker::scale::dsst::ScaleFilter;
@@ -46,7 +45,6 @@ impl State {
     ) -> Self {
         let source = frame.source_size();
         let (bounds, answer) = Self::place(source, format.size, &target);
-        let global_motion = params.global_motion.then(|| GlobalMotion::new(frame));
         let mut state = Self {
             params,
             source,
@@ -60,7 +58,7 @@ impl State {
             bag: Bag::default(),
             background: Background::default(),
             discriminant: Discriminant::default(),
-            global_motion,
+            global_motion: None,
             scale_filter: ScaleFilter::default(),
             color: ColorHistogram::default(),
             last_seen: LastSeen::default(),
@@ -69,29 +67,28 @@ impl State {
             orientation: 0.0,
             frames_lost: 0,
         };
-        state.reset_particles(answer);
-        state.init_models(frame, 0, workspace);
-        let learning = &mut workspace.learning;
-        let (features, bag) = (&learning.features, &mut learning.bag);
-        state
-            .bag
-            .admit(features, &state.background, &state.params, bag);
-        state.history.push(features, &state.params);
+        state.begin(frame, given(0, target), workspace);
         state
     }
 
     /// Takes `target` (checked) as the box in `frame`, the next one.
     pub fn retarget(&mut self, frame: &Frame, target: Rect, workspace: &mut Workspace) {
         let number = self.estimate.frame + 1;
-        let (bounds, answer) = Self::place(self.source, self.format.size, &target);
-        self.bounds = bounds;
+        (self.bounds, self.answer) = Self::place(self.source, self.format.size, &target);
         self.orientation = 0.0;
         self.frames_lost = 0;
-        self.reset_particles(answer);
-        if let Some(profiles) = &mut self.global_motion {
-            *profiles = GlobalMotion::new(frame);
-        }
-        self.init_models(frame, number, workspace);
+        self.begin(frame, given(number, target), workspace);
+    }
+
+    /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
+    fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
+        // All particles are there, with equal weights.
+        let count = self.params.stored_particles();
+        self.particles = vec![self.answer; count];
+        self.weights = vec![1.0 / count.max(1) as f64; count];
+        let profiles = || GlobalMotion::new(frame);
+        self.global_motion = self.params.global_motion.then(profiles);
+        self.init_models(frame, given.frame, workspace);
         let learning = &mut workspace.learning;
         let (features, bag) = (&learning.features, &mut learning.bag);
         self.bag.rebuild(&self.background, &self.params, bag);
@@ -100,15 +97,7 @@ impl State {
         self.bag
             .admit_pinned(features, &self.background, &self.params, bag);
         self.history.push(features, &self.params);
-        self.estimate = given(number, target);
-    }
-
-    /// All particles at `particle`, with equal weights.
-    fn reset_particles(&mut self, particle: Particle) {
-        let count = self.params.stored_particles();
-        self.answer = particle;
-        self.particles = vec![particle; count];
-        self.weights = vec![1.0 / count.max(1) as f64; count];
+        self.estimate = given;
     }
 
     /// Learns everything that a box given by the user says about the surroundings, and describes the box and its
@@ -157,9 +146,10 @@ impl State {
             let rotation = Rotation::about((self.answer.x, self.answer.y), angle);
             let rotated = rotation.apply(image, &window, Frame::default());
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
-            let view = &mut learning.view;
-            extractor.features(&rotated, &answer, &self.bounds, params, view);
-            learning.features.extend_from_slice(view);
+            let first = learning.features.len();
+            learning.features.resize(first + params.feature_len(), 0.0);
+            let view = &mut learning.features[first..];
+            extractor.describe(&rotated, &answer, &self.bounds, params, view);
         }
     }
 

@@ -47,8 +47,6 @@ pub(crate) struct Learning {
     pub areas: Vec<Particle>,
     /// Feature vectors, the answer's first.
     pub features: Vec<f32>,
-    /// The feature vector of one augmented view.
-    pub view: Vec<f32>,
     pub background: background::Scratch,
     pub bag: span::Scratch,
     pub color: color_histogram::Scratch,
