@@ -11,6 +11,8 @@ use walkdir::WalkDir;
 
 const MAX_LINES: usize = 300;
 const MAX_HEADER_LINES: usize = 40;
+/// The lines of src/tracker without its tests.
+const MAX_TRACKER_LINES: usize = 9500;
 
 /// A folder, and those from which it must not import. The tracker imports from no other.
 const NOT_FROM: [(&str, &[&str]); 3] = [
@@ -48,6 +50,16 @@ fn too_long(folder: &Path) -> Vec<String> {
     let long = lengths.filter(|(_, lines)| *lines > MAX_LINES);
     long.map(|(name, lines)| format!("{name}: {lines} lines"))
         .collect()
+}
+
+/// The lines of the files below `folder` but for the tests at the end of each; other code for tests counts.
+fn lines_without_tests(folder: &Path) -> usize {
+    let lines = files(folder).into_iter().map(|(_, text)| {
+        let tests = text.find("\n#[cfg(test)]\nmod tests {");
+        let end = tests.map_or(text.len(), |newline| newline + 1);
+        text[..end].lines().count()
+    });
+    lines.sum()
 }
 
 /// The mod.rs files of the tracker's rooms that do not begin with a text of 1 to 40 lines.
@@ -107,6 +119,15 @@ fn data_goes_one_way() {
 #[test]
 fn no_file_is_too_long() {
     assert_none(&too_long(&src()), "files over 300 lines");
+}
+
+#[test]
+fn the_tracker_is_not_too_long() {
+    let lines = lines_without_tests(&src().join("tracker"));
+    assert!(
+        lines <= MAX_TRACKER_LINES,
+        "src/tracker has {lines} lines without tests, over {MAX_TRACKER_LINES}"
+    );
 }
 
 #[test]
@@ -285,4 +306,16 @@ fn an_import_against_the_flow_a_long_file_and_a_bare_room_are_found() {
     );
     let right = tree(&[("tracker/room/mod.rs", &"//! word\n".repeat(40))]);
     assert!(without_header(right.path()).is_empty());
+}
+
+#[test]
+fn tests_at_the_end_of_a_file_are_no_lines_of_it() {
+    let folder = tree(&[
+        (
+            "a.rs",
+            "fn a() {}\n#[cfg(test)]\nfn b() {}\n\n#[cfg(test)]\nmod tests {\n}\n",
+        ),
+        ("room/b.rs", "fn a() {}\nfn b() {}\n"),
+    ]);
+    assert_eq!(lines_without_tests(folder.path()), 6);
 }
