@@ -112,8 +112,12 @@ impl State {
         let new = &workspace.candidates.particles[known..];
         let weight = self.params.histogram_weight;
         let (foreground, scale) = (&workspace.foreground, self.answer.scale);
-        let log_priors = new.iter().map(|particle| {
-            search.log_prior(particle) + weight * foreground.mean(particle, scale, &self.bounds)
+        let last = self.update_gate.last_distance;
+        let log_priors = new.iter().enumerate().map(|(index, particle)| {
+            let distance = workspace.candidates.distances_of(known + index)[0];
+            let slack = search::slack(last, distance);
+            search.log_prior(particle, slack)
+                + weight * foreground.mean(particle, scale, &self.bounds)
         });
         workspace.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {

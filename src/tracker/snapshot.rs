@@ -22,7 +22,7 @@ use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
@@ -181,6 +181,7 @@ fn check_extensions(state: &State) -> bool {
             .is_valid_for((width, height), params.static_penalty > 0.0)
         && orientation::is_valid_for(state.orientation, params)
         && (0.0..=1e6).contains(&state.update_gate.mean_distance)
+        && (0.0..=1e6).contains(&state.update_gate.last_distance)
 }
 
 fn check_bag(bag: &Bag, params: &Params) -> bool {

@@ -43,16 +43,20 @@ pub(crate) fn passes(score: f32, number: u64) -> bool {
     number < WARM_UP || score >= MIN_SCORE
 }
 
-/// The running mean of the answers' distances to the first subspace.
+/// The answers' distances to the first subspace, but for those of frames in which the target was lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UpdateGate {
+    /// The running mean.
     pub mean_distance: f64,
+    /// The last one; 0 before the first.
+    pub last_distance: f64,
 }
 
 impl Default for UpdateGate {
     fn default() -> Self {
         Self {
             mean_distance: INITIAL_MEAN,
+            last_distance: 0.0,
         }
     }
 }
@@ -88,7 +92,7 @@ impl UpdateGate {
     }
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may update the models as far as
-    /// the distance tells; updates the running mean.
+    /// the distance tells; updates the statistics.
     pub fn judge(&mut self, distance: f64, has_color: bool, number: u64, params: &Params) -> bool {
         let strictness = if has_color { COLOR_STRICTNESS } else { 1.0 };
         let limit =
@@ -97,6 +101,7 @@ impl UpdateGate {
         let passes = number < WARM_UP || accepted;
         let rate = if passes { RATE } else { RATE_REJECTED };
         self.mean_distance += rate * (distance - self.mean_distance);
+        self.last_distance = distance;
         passes
     }
 }
@@ -128,6 +133,7 @@ mod tests {
         let params = Preset::Robust.params();
         let gate = UpdateGate {
             mean_distance: 0.57,
+            ..UpdateGate::default()
         };
         assert!(gate.recognizes(0.6, 1.5, &params));
         assert!(!gate.recognizes(0.6, 11.0, &params));

@@ -14,6 +14,8 @@ pub(crate) const REFINED_STD: f64 = 2.0;
 /// How far the dense search looks, as a multiple of the box's longer side: a target that moves by its own length is
 /// still seen.
 const DENSE_RADIUS: f64 = 1.0;
+/// How many times as wide as usual the prior on the displacement is at most.
+pub(crate) const MAX_SLACK: f64 = 2.0;
 
 /// The search of one frame.
 #[derive(Debug, Clone, Copy)]
@@ -69,9 +71,9 @@ impl SearchContext<'_> {
     }
 
     /// The logarithm of the prior on the displacement of a particle: from the last answer, or from where that would be
-    /// had it moved with the image.
+    /// had it moved with the image. The prior is `slack` times as wide as usual.
     #[inline(always)]
-    pub fn log_prior(&self, particle: &Particle) -> f64 {
+    pub fn log_prior(&self, particle: &Particle, slack: f64) -> f64 {
         if self.params.displacement_std <= 0.0 || self.params.search == Search::Resampled {
             return 0.0;
         }
@@ -79,9 +81,16 @@ impl SearchContext<'_> {
             |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
         let nearest = squared(&self.last).min(squared(&self.displaced()));
         // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
-        let variance = (self.spread * self.params.displacement_std).powi(2);
+        let variance = (slack * self.spread * self.params.displacement_std).powi(2);
         -0.5 * nearest / variance.max(f64::MIN_POSITIVE)
     }
+}
+
+/// How many times as wide as usual the prior on the displacement is at a place whose distance to the first subspace is
+/// `distance`; that of the last answer was `last`. What covers a target looks less like the first image than the target
+/// that comes out beside it.
+pub(crate) fn slack(last: f64, distance: f64) -> f64 {
+    (last / distance.max(f64::MIN_POSITIVE)).clamp(1.0, MAX_SLACK)
 }
 
 /// How many particles a search of the usual width draws in all, and how many of these in the first round.
@@ -165,6 +174,14 @@ mod tests {
     }
 
     #[test]
+    fn only_a_place_nearer_the_first_image_may_be_further_away() {
+        assert_eq!(slack(0.0, 0.0), 1.0);
+        assert_eq!(slack(0.3, 0.5), 1.0);
+        assert_eq!(slack(0.45, 0.3), 1.5);
+        assert_eq!(slack(0.5, 0.0), MAX_SLACK);
+    }
+
+    #[test]
     fn a_prior_of_any_width_is_greatest_at_the_last_answer_and_falls() {
         for std in [0.0, 5e-324, 1e-200, 1e-3, 12.0] {
             let params = Params {
@@ -172,8 +189,8 @@ mod tests {
                 ..Preset::Robust.params()
             };
             let search = search(&params, 1.0);
-            assert_eq!(search.log_prior(&LAST), 0.0, "{std}");
-            let prior = search.log_prior(&Particle { x: 53.0, ..LAST });
+            assert_eq!(search.log_prior(&LAST, 1.0), 0.0, "{std}");
+            let prior = search.log_prior(&Particle { x: 53.0, ..LAST }, 1.0);
             let falls = if std > 0.0 { prior < 0.0 } else { prior == 0.0 };
             assert!(falls, "{std}: {prior}");
         }

@@ -153,7 +153,8 @@ parameters! {
     /// How many vectors of areas beside the target the Mahalanobis metric is made of: what the background has too
     /// counts less. With `single_vector_candidate`. Off: 0.
     background_samples: u32 [0 to 256];
-    /// Standard deviation of the prior on the displacement in a frame, in pixels: a look-alike far away loses. Off: 0.
+    /// Standard deviation of the prior on the displacement in a frame, in pixels: a look-alike far away loses. Up to
+    /// twice as much for a place that looks more like the first box than the last answer does. Off: 0.
     displacement_std: f64 [0 to 1000];
     /// Learning rate of the correlation filter that measures the scale along a pyramid of areas. Off: 0.
     scale_learning_rate: f64 [0 to 1];
