@@ -102,15 +102,13 @@ async fn a_target_that_goes_out_of_sight_is_counted_once() {
     let app = TestApplication::start().await;
     let id = app.open().await;
     let mut lost = Vec::new();
-    let covered = pictures::encode(
-        image::GrayImage::from_pixel(pictures::WIDTH, pictures::HEIGHT, image::Luma([128])),
-        image::ImageFormat::Png,
-    );
+    // Far beyond the edge: the ground alone.
+    let away = pictures::png(1000);
     for t in 1..40 {
         let frame = if t < 20 {
             pictures::png(t)
         } else {
-            covered.clone()
+            away.clone()
         };
         let answer = expect(app.post_frame(&id, frame).await, StatusCode::OK).await;
         lost.push(answer["status"] == "lost");
