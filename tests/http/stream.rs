@@ -186,7 +186,7 @@ async fn the_newest_frame_wins_where_that_is_asked_for() {
     // One worker, and frames that take it some time.
     let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "?drop=true").await;
+    let mut stream = StreamClient::open(&app, &id, "?drop").await;
     let frames: Vec<Vec<u8>> = (1..=60).map(pictures::png).collect();
     for frame in frames {
         stream.send(frame).await;

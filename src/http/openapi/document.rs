@@ -23,7 +23,7 @@ pub fn document_at(base_path: &str) -> String {
     document["servers"][0]["url"] = base_path.into();
     let links = links(&document);
     for operation in operations(&mut document) {
-        give_id(operation);
+        complete_parameters(operation);
         if OPENING.iter().any(|id| operation["operationId"] == *id) {
             operation["responses"]["201"]["links"] = links.clone();
         }
@@ -39,13 +39,16 @@ fn operations(document: &mut Value) -> impl Iterator<Item = &mut Value> {
         .flat_map(Map::values_mut)
 }
 
-/// The id of a session gets an example.
-fn give_id(operation: &mut Value) {
+/// The id of a session gets an example. A switch in the query needs no value.
+fn complete_parameters(operation: &mut Value) {
     let parameters = operation.get_mut("parameters");
     let parameters = parameters.and_then(Value::as_array_mut);
     for parameter in parameters.into_iter().flatten() {
         if parameter["in"] == "path" {
             parameter["example"] = EXAMPLE_ID.into();
+        }
+        if parameter["in"] == "query" && parameter["schema"]["type"] == "boolean" {
+            parameter["allowEmptyValue"] = true.into();
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::request_id;
 use crate::http::session_path::SessionPath;
 use crate::http::state::AppState;
+use crate::http::upload::switch::Switch;
 use crate::sessions::{ByteCharge, ReplayError, Session};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{FromRequestParts, Query, Request, State};
@@ -46,8 +47,9 @@ pub struct StreamSettings {
     #[param(required = false, nullable = false)]
     from: Option<u64>,
     /// Whether a frame that waits is skipped when a newer one comes.
-    #[param(required = false, nullable = false, default = false)]
-    drop: Option<bool>,
+    #[param(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    drop: Switch,
 }
 
 operation_problems!(
@@ -112,7 +114,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     // The stream before this one tracks no further frame.
     let place = Arc::new(state.streams.take(session.id()));
     let stand = stand(&state, &session, &client, &place, settings.from).await?;
-    let newest_wins = settings.drop.unwrap_or(false);
+    let newest_wins = settings.drop.0;
     let stream = SessionStream {
         work: Arc::new(FrameWork {
             state,
