@@ -2,7 +2,7 @@
 //!
 //! This is start-time fair queueing (Goyal, Vin, Cheng 1996) with measured instead of announced lengths: a client's
 //! requests wait in a lane of their own, in order of arrival, and each lane counts the processor time of its work. A lane
-//! that was empty starts at the time of the lane served last, so that waiting saves up no claims.
+//! whose requests begin to wait starts level with the others, so that being idle saves up no claims.
 //!
 //! Clients whose work is slow have workers of their own ([`Pace`]), so that the frames of the others need not wait until a
 //! slow one is done.

@@ -26,9 +26,11 @@ pub(super) struct Lanes<G> {
     /// Requests with several frames that have begun and not ended, and how many may.
     pub(super) long: usize,
     max_long: usize,
-    /// Time used by the lane of each pace that was served last, when it was served.
+    /// The greatest time that a lane of each pace had used when it was served.
     now: [Duration; 2],
     pub(super) lanes: HashMap<Lane, Waiting<G>>,
+    /// How often a request became the first of its lane.
+    firsts: u64,
 }
 
 /// A lane.
@@ -37,6 +39,8 @@ pub(super) struct Waiting<G> {
     pub(super) used: Duration,
     pub(super) running: usize,
     pub(super) requests: VecDeque<(Length, G)>,
+    /// Orders lanes that have used the same time: those that start level are many.
+    since: u64,
     /// The longest time that a worker was held lately.
     slowest: Duration,
 }
@@ -70,6 +74,14 @@ impl Pace {
             Self::Slow => 10,
         }
     }
+
+    /// That of a lane whose slowest work took this time.
+    fn of(slowest: Duration) -> Self {
+        match slowest > SLOW {
+            true => Self::Slow,
+            false => Self::Quick,
+        }
+    }
 }
 
 impl<G> Lanes<G> {
@@ -82,6 +94,7 @@ impl<G> Lanes<G> {
             max_long: workers,
             now: [Duration::ZERO; 2],
             lanes: HashMap::new(),
+            firsts: 0,
         }
     }
 
@@ -90,20 +103,39 @@ impl<G> Lanes<G> {
         self.running.iter().sum()
     }
 
-    /// The lane, to which a request comes. One that was empty starts at the time of the lane served last.
+    /// The lane, to which a request comes. Where no other of its requests waits, it starts at the virtual time.
     pub(super) fn enter(&mut self, lane: Lane) -> &mut Waiting<G> {
+        let pace = self.lanes.entry(lane).or_default().pace();
+        let now = self.virtual_time(pace);
         let waiting = self.lanes.entry(lane).or_default();
-        if waiting.requests.is_empty() && waiting.running == 0 {
-            let now = self.now[waiting.pace() as usize];
+        if waiting.requests.is_empty() {
             waiting.used = waiting.used.max(now);
+            self.firsts += 1;
+            waiting.since = self.firsts;
         }
         waiting
+    }
+
+    /// Where a lane starts: level with the one that has used least of those that wait for a worker, so that it is next.
+    /// Where none waits, at the greatest time at which one was served, so that it has no claim against those at work.
+    fn virtual_time(&self, pace: Pace) -> Duration {
+        let waiting = self.lanes.values().filter(|lane| {
+            let first = lane.requests.front();
+            lane.pace() == pace && first.is_some_and(|(length, _)| self.has_place(*length))
+        });
+        let least = waiting.map(|lane| lane.used).min();
+        least.unwrap_or(self.now[pace as usize])
+    }
+
+    /// Whether such a request need not wait for another one with several frames to end.
+    fn has_place(&self, length: Length) -> bool {
+        length != Length::Long || self.long < self.max_long
     }
 
     /// Whether a request of a lane may have a worker.
     pub(super) fn may_begin(&self, waiting: &Waiting<G>, length: Length) -> bool {
         let has_worker = self.running[waiting.pace() as usize] < self.workers;
-        has_worker && (length != Length::Long || self.long < self.max_long)
+        has_worker && self.has_place(length)
     }
 
     /// Whether the first request of a lane may have a worker.
@@ -123,8 +155,11 @@ impl<G> Lanes<G> {
 
     pub(super) fn next(&mut self) -> Option<(Lane, Length, Pace, G)> {
         let waiting = self.lanes.iter().filter(|(_, w)| self.is_next(w));
-        let lane = *waiting.min_by_key(|(_, w)| (w.running, w.used))?.0;
-        let (length, give) = self.lanes.get_mut(&lane)?.requests.pop_front()?;
+        let lane = *waiting.min_by_key(|(_, w)| (w.running, w.used, w.since))?.0;
+        let waiting = self.lanes.get_mut(&lane)?;
+        let (length, give) = waiting.requests.pop_front()?;
+        self.firsts += 1;
+        waiting.since = self.firsts;
         let pace = self.serve(lane, length);
         Some((lane, length, pace, give))
     }
@@ -149,11 +184,13 @@ impl<G> Lanes<G> {
         waiting.used += time;
         if !time.is_zero() {
             let before = waiting.pace();
-            waiting.slowest = time.max(waiting.slowest.mul_f64(FADING));
-            if waiting.pace() != before {
-                // Lanes of another pace have other times.
-                waiting.used = self.now[waiting.pace() as usize];
-            }
+            let slowest = time.max(waiting.slowest.mul_f64(FADING));
+            let after = Pace::of(slowest);
+            // Lanes of another pace have other times.
+            let start = (after != before).then(|| self.virtual_time(after));
+            let waiting = self.lanes.entry(lane).or_default();
+            waiting.slowest = slowest;
+            waiting.used = start.unwrap_or(waiting.used);
         }
     }
 
@@ -169,10 +206,7 @@ impl<G> Lanes<G> {
 
 impl<G> Waiting<G> {
     fn pace(&self) -> Pace {
-        match self.slowest > SLOW {
-            true => Pace::Slow,
-            false => Pace::Quick,
-        }
+        Pace::of(self.slowest)
     }
 }
 
@@ -182,6 +216,7 @@ impl<G> Default for Waiting<G> {
             used: Duration::ZERO,
             running: 0,
             requests: VecDeque::new(),
+            since: 0,
             slowest: Duration::ZERO,
         }
     }
@@ -203,5 +238,44 @@ mod tests {
         // Some quick work hides nothing.
         assert!((0..10).all(|_| work(1) == Pace::Slow));
         assert!((0..20).any(|_| work(1) == Pace::Quick));
+    }
+
+    /// A request of `lane`, which waits.
+    fn ask(lanes: &mut Lanes<u64>, lane: u64) {
+        let waiting = lanes.enter(Lane(lane));
+        waiting.requests.push_back((Length::Short, lane));
+    }
+
+    /// The lane that is served next. Its work takes a millisecond.
+    fn served(lanes: &mut Lanes<u64>) -> u64 {
+        let (lane, _, pace, request) = lanes.next().expect("a request waits");
+        lanes.release(lane, pace, Duration::from_millis(1));
+        request
+    }
+
+    #[test]
+    fn a_lane_with_one_request_is_not_overtaken_by_those_that_come_after_it() {
+        for first in 0..20 {
+            let mut lanes = Lanes::new(1);
+            ask(&mut lanes, first);
+            (20..40).for_each(|lane| ask(&mut lanes, lane));
+            assert_eq!(served(&mut lanes), first);
+        }
+    }
+
+    #[test]
+    fn a_lane_starts_level_with_the_one_that_waits_and_has_used_least() {
+        let mut lanes = Lanes::new(2);
+        // Served while the only other lane has a worker: so it has used most.
+        ask(&mut lanes, 1);
+        lanes.lanes.get_mut(&Lane(1)).unwrap().used = Duration::from_secs(9);
+        assert_eq!(served(&mut lanes), 1);
+        // Now one that waits has used less.
+        ask(&mut lanes, 2);
+        lanes.lanes.get_mut(&Lane(2)).unwrap().used = Duration::from_secs(5);
+        assert_eq!(lanes.enter(Lane(3)).used, Duration::from_secs(5));
+        // Where none waits, there is no claim against those that were served.
+        assert_eq!(served(&mut lanes), 2);
+        assert_eq!(lanes.enter(Lane(4)).used, Duration::from_secs(9));
     }
 }
