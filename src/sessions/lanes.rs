@@ -266,11 +266,11 @@ mod tests {
     #[test]
     fn a_lane_starts_level_with_the_one_that_waits_and_has_used_least() {
         let mut lanes = Lanes::new(2);
-        // Served while the only other lane has a worker: so it has used most.
+        // One that was served has used nine seconds.
         ask(&mut lanes, 1);
         lanes.lanes.get_mut(&Lane(1)).unwrap().used = Duration::from_secs(9);
         assert_eq!(served(&mut lanes), 1);
-        // Now one that waits has used less.
+        // One that waits has used five: another starts there, not at nine.
         ask(&mut lanes, 2);
         lanes.lanes.get_mut(&Lane(2)).unwrap().used = Duration::from_secs(5);
         assert_eq!(lanes.enter(Lane(3)).used, Duration::from_secs(5));
