@@ -15,7 +15,7 @@ thread_local! {
 fuzz_target!(|data: &[u8]| {
     SERVICE.with(|service| {
         let restore = |bytes: &[u8]| service.send((Method::POST, "/sessions"), MEDIA_TYPE, bytes);
-        let restored = restore(&snapshot_of(2, data));
+        let restored = restore(&snapshot_of(4, data));
         let Some(session) = restored.session() else {
             return;
         };

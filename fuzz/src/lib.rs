@@ -4,7 +4,7 @@ mod pictures;
 mod service;
 
 pub use pictures::{jpeg, pattern, png, webp, HEIGHT, WIDTH};
-pub use service::{snapshot_of, Answer, Service};
+pub use service::{content_of, snapshot_of, Answer, Service};
 
 /// The box of the target in the pictures.
 pub const BOX: &str = "16,12,16,12";

@@ -1,15 +1,11 @@
 //! Writes the first inputs of the targets to `corpus/`, beside the current folder's own ones.
 
 use axum::http::Method;
-use bagtrack_fuzz::{jpeg, png, webp, Service, BOX};
+use bagtrack_fuzz::{content_of, jpeg, png, webp, Service, BOX};
 use base64::engine::general_purpose::STANDARD;
 use base64::Engine;
 use std::fs;
 use std::io;
-
-/// Bytes before the content of a snapshot (its magic and its version), and of the code after it.
-const SNAPSHOT_HEAD: usize = bagtrack::sessions::SNAPSHOT_MAGIC.len() + 1;
-const SNAPSHOT_CODE: usize = bagtrack::sessions::MAC_BYTES;
 
 fn main() -> io::Result<()> {
     let pictures = [("png", png(0)), ("jpeg", jpeg(0)), ("webp", webp(0))];
@@ -54,9 +50,8 @@ fn main() -> io::Result<()> {
         for t in 1..8 {
             let get = format!("{session}/snapshot");
             let snapshot = service.send((Method::GET, &get), "text/plain", b"").body;
-            let content = &snapshot[SNAPSHOT_HEAD..snapshot.len() - SNAPSHOT_CODE];
             if t % 3 == 1 {
-                write("snapshot", &format!("{preset}-{t}"), content)?;
+                write("snapshot", &format!("{preset}-{t}"), &content_of(&snapshot)?)?;
             }
             service.send(
                 (Method::POST, &format!("{session}/frames")),

@@ -4,11 +4,15 @@ use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use axum::Router;
 use bagtrack::http::{Application, Config};
-use bagtrack::sessions::{MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack::sessions::{MacKeys, MAC_BYTES, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use flate2::read::DeflateDecoder;
+use flate2::write::DeflateEncoder;
+use flate2::Compression;
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::cell::Cell;
 use std::convert::Infallible;
+use std::io::{self, Read, Write};
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use tower::ServiceExt;
@@ -173,11 +177,27 @@ impl Default for Service {
     }
 }
 
-/// A snapshot with these bytes as its content, with the code of unsigned ones.
+/// Bytes of the length of a snapshot's content, which come before it.
+const LENGTH_BYTES: usize = 4;
+
+/// What a snapshot holds, uncompressed.
+pub fn content_of(snapshot: &[u8]) -> io::Result<Vec<u8>> {
+    let head = SNAPSHOT_MAGIC.len() + 1 + LENGTH_BYTES;
+    let compressed = &snapshot[head..snapshot.len() - MAC_BYTES];
+    let mut content = Vec::new();
+    DeflateDecoder::new(compressed).read_to_end(&mut content)?;
+    Ok(content)
+}
+
+/// A snapshot with these bytes as its content, which is not compressed, with the code of unsigned ones.
 pub fn snapshot_of(version: u8, content: &[u8]) -> Vec<u8> {
     let none: &[&str] = &[];
     let keys = MacKeys::new(SNAPSHOT_KEY_CONTEXT, none).accepting_unsigned(false);
-    let mut bytes = [SNAPSHOT_MAGIC, &[version], content].concat();
+    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::none());
+    encoder.write_all(content).expect("a vector takes all bytes");
+    let compressed = encoder.finish().expect("a vector takes all bytes");
+    let length = content.len() as u32;
+    let mut bytes = [SNAPSHOT_MAGIC, &[version], &length.to_le_bytes(), &compressed].concat();
     let code = keys.sign(&bytes);
     bytes.extend_from_slice(&code);
     bytes

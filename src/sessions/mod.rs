@@ -21,6 +21,7 @@
 mod admission;
 mod byte_budget;
 mod clock;
+mod compression;
 mod cpu_time;
 mod expired;
 mod fair_queue;

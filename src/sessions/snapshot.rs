@@ -1,12 +1,13 @@
 //! A session as bytes: the tracker's snapshot and the answers to the last request.
 //!
-//! Layout: [`MAGIC`], one version byte, the content, and the code of all of these under a key of the service
+//! Layout: [`MAGIC`], one version byte, the compressed content, and the code of all of these under a key of the service
 //! ([`MacKeys`]). The content is, in postcard's encoding: the trackers' snapshots, then the list of stored answers,
 //! each a digest and what was answered for each target. Where the session was opened with a list of boxes, the version
 //! is another one, and the number of targets comes first. Snapshots come from clients, so nothing in them is read
 //! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
 //! of the stored answers only as many are kept as a request may have, and the tracker validates its own part.
 
+use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};
 use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
@@ -22,9 +23,9 @@ pub const MAGIC: &[u8] = b"\x89bagtrack\r\n";
 /// What keys for snapshots are derived for.
 pub const KEY_CONTEXT: &str = "bagtrack 2026-11 session snapshot";
 /// Of a session that was opened with a box.
-const VERSION: u8 = 2;
+const VERSION: u8 = 4;
 /// Of a session that was opened with a list of boxes.
-const LIST_VERSION: u8 = 3;
+const LIST_VERSION: u8 = 5;
 
 /// Why bytes are not a session.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -81,33 +82,37 @@ impl SessionSnapshot {
 
     /// The bytes of a session, without a code.
     pub(super) fn write(targets: &Targets, recent: &[Answered]) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
+        let mut content = Vec::new();
         let trackers = targets.trackers();
-        match trackers {
-            PerTarget::One(_) => bytes.push(VERSION),
+        let version = match trackers {
+            PerTarget::One(_) => VERSION,
             PerTarget::List(list) => {
-                bytes.push(LIST_VERSION);
-                bytes = extend(bytes, &list.len());
+                content = extend(content, &list.len());
+                LIST_VERSION
             }
-        }
+        };
         for tracker in trackers.as_slice() {
-            bytes = extend(bytes, &&tracker.snapshot()[..]);
+            content = extend(content, &&tracker.snapshot()[..]);
         }
-        bytes = extend(bytes, &recent.len());
+        content = extend(content, &recent.len());
         for Answered {
             fingerprint,
             targets,
         } in recent
         {
-            bytes = extend(bytes, fingerprint);
-            bytes = targets.as_slice().iter().fold(bytes, extend);
+            content = extend(content, fingerprint);
+            content = targets.as_slice().iter().fold(content, extend);
         }
+        let mut bytes = [MAGIC, &[version]].concat();
+        compression::compress(&content, &mut bytes);
         bytes
     }
 
     /// The session of bytes without a code.
     pub(super) fn read(bytes: &[u8], max_recent: usize) -> Result<Self, SnapshotError> {
-        let (version, mut rest) = check_version(bytes)?;
+        let (version, compressed) = check_version(bytes)?;
+        let content = compression::decompress(compressed).ok_or(SnapshotError::Damaged)?;
+        let mut rest = &content[..];
         let mut count = None;
         if version == LIST_VERSION {
             let number;

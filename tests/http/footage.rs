@@ -7,10 +7,9 @@ use reqwest::StatusCode;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-fn coke() -> PathBuf {
+fn root() -> PathBuf {
     let root = std::env::var_os("BAGTRACK_SEQUENCES");
     PathBuf::from(root.expect("BAGTRACK_SEQUENCES names the folder of the eight videos"))
-        .join("Coke")
 }
 
 fn frames(folder: &Path) -> Vec<Vec<u8>> {
@@ -59,7 +58,7 @@ fn assert_same(answer: &Value, estimate: &Estimate) {
 #[tokio::test]
 #[ignore = "needs the eight videos: set BAGTRACK_SEQUENCES to their folder"]
 async fn coke_over_http_gives_the_librarys_boxes() {
-    let folder = coke();
+    let folder = root().join("Coke");
     let frames = frames(&folder);
     assert!(frames.len() > 100);
     let [x, y, width, height] = first_box(&folder);
@@ -91,4 +90,35 @@ async fn coke_over_http_gives_the_librarys_boxes() {
         assert_same(&answer, &estimate);
     }
     assert_eq!(app.frames_of(id).await, frames.len() as u64);
+}
+
+#[tokio::test]
+#[ignore = "needs the eight videos: set BAGTRACK_SEQUENCES to their folder"]
+async fn a_session_of_real_video_is_stored_in_48_kib() {
+    let app = TestApplication::start().await;
+    for entry in std::fs::read_dir(root()).unwrap() {
+        let folder = entry.unwrap().path();
+        if !folder.is_dir() {
+            continue;
+        }
+        let text = first_box(&folder)
+            .map(|number| number.to_string())
+            .join(",");
+        let frames = frames(&folder);
+        let created = app
+            .create(frames[0].clone(), &[("box", text.as_str())])
+            .await;
+        let created = expect(created, StatusCode::CREATED).await;
+        let id = created["id"].as_str().unwrap();
+        // After 60 frames the bag is full.
+        let mut most = 0;
+        for (number, frame) in frames.iter().enumerate().take(240).skip(1) {
+            expect(app.post_frame(id, frame.clone()).await, StatusCode::OK).await;
+            if number.is_multiple_of(60) {
+                most = most.max(app.snapshot(id).await.len());
+            }
+        }
+        println!("{}: at most {most} bytes", folder.display());
+        assert!(most <= 48 << 10, "{}: {most} bytes", folder.display());
+    }
 }

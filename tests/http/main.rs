@@ -16,6 +16,7 @@ mod expiry;
 mod export;
 mod flow;
 mod footage;
+mod forged;
 mod forms;
 mod heavy;
 mod hostile_connections;
