@@ -179,7 +179,7 @@ fn the_resolution_follows_the_target() {
 
 /// The largest state there is: full resolution, colour, a full bag.
 #[test]
-fn a_session_of_full_resolution_keeps_at_most_256_kib() {
+fn a_session_of_full_resolution_keeps_at_most_128_kib() {
     let rgb: Vec<u8> = (0..3 * 1280 * 960)
         .map(|i| ((i % 4999) * (i % 4999) / 97 % 251) as u8)
         .collect();
@@ -191,5 +191,5 @@ fn a_session_of_full_resolution_keeps_at_most_256_kib() {
     }
     assert_eq!(tracker.frame_format().size, (1280, 960));
     let bytes = tracker.snapshot().len();
-    assert!(bytes <= 256 * 1024, "{bytes}");
+    assert!(bytes <= 128 * 1024, "{bytes}");
 }

@@ -46,9 +46,7 @@ impl BagEntry {
         let columns = subspace.basis.chunks_exact(params.feature_len());
         Self {
             mean: VectorView::of(&subspace.mean, params),
-            basis: columns
-                .map(|column| VectorView::of(column, params))
-                .collect(),
+            basis: columns.map(|it| VectorView::of(it, params)).collect(),
         }
     }
 }

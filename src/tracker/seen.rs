@@ -25,17 +25,11 @@ impl Seen {
         let sigma = state.params.sigma;
         let distances = candidates.distances_of(best);
         let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
-        let likelihoods = distances
-            .iter()
-            .map(|distance| ((least - distance) / sigma).exp());
-        let likelihoods: Vec<f64> = likelihoods.collect();
-        let sum: f64 = likelihoods.iter().sum();
-        Self {
-            particles: boxes.zip(candidates.weights.iter().copied()).collect(),
-            votes: likelihoods
-                .iter()
-                .map(|likelihood| likelihood / sum)
-                .collect(),
-        }
+        let likelihood = |distance: &f64| ((least - distance) / sigma).exp();
+        let mut votes: Vec<f64> = distances.iter().map(likelihood).collect();
+        let sum: f64 = votes.iter().sum();
+        votes.iter_mut().for_each(|vote| *vote /= sum);
+        let particles = boxes.zip(candidates.weights.iter().copied()).collect();
+        Self { particles, votes }
     }
 }

@@ -22,7 +22,7 @@ use crate::tracker::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 15;
+const VERSION: u32 = 16;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].

@@ -67,11 +67,7 @@ impl Background {
     pub fn rebuild(&mut self, vectors: &[f32], params: &Params, scratch: &mut Scratch) {
         for vector in vectors.chunks_exact(params.feature_len()) {
             let is_full = self.samples.len() >= params.metric_samples();
-            let oldest = if is_full {
-                self.samples.pop_front()
-            } else {
-                None
-            };
+            let oldest = self.samples.pop_front_if(|_| is_full);
             let mut sample = oldest.unwrap_or_default();
             sample.set(vector);
             self.samples.push_back(sample);

@@ -13,6 +13,7 @@ use crate::tracker::image::frame::Frame;
 use crate::tracker::image::plane::Plane;
 use crate::tracker::image::ycbcr::NEUTRAL;
 use crate::tracker::linalg::scratch::clear_and_reserve;
+use crate::tracker::linalg::vector_ops;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 
 /// Bins of luma, and of each of Cb and Cr.
@@ -202,7 +203,7 @@ impl ColorHistogram {
             bins.resize(count, 0.0);
             let rate = if is_first { 1.0 } else { rate };
             for (bin, newest) in bins.iter_mut().zip(&scratch.counts) {
-                let value = *bin + rate * (newest - *bin);
+                let value = vector_ops::to_bfloat16(*bin + rate * (newest - *bin));
                 *bin = if value > MIN_BIN { value } else { 0.0 };
             }
         }

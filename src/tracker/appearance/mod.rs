@@ -12,7 +12,7 @@
 //!   n = 1 for the candidate), under that metric.
 //!
 //! In: feature vectors of length D, one after the other. Out: N x K distances in \[0, 1\], and the products of the
-//! candidates with the discriminant's vectors. Vectors are kept quantised to a byte a value. A covariance of equal
+//! candidates with the discriminant's vectors. Vectors are kept quantised to 4 bits a value. A covariance of equal
 //! samples gives the plain metric, and a vector that is nothing but rounding after centring counts as the background's
 //! mean; nothing here divides by zero.
 

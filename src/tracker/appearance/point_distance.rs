@@ -166,7 +166,7 @@ mod tests {
         DMatrix::from_column_slice(20, vectors.len() / 20, vectors).cast()
     }
 
-    /// What becomes of vectors that are quantised to a byte a value.
+    /// What becomes of vectors that are quantised to 4 bits a value.
     fn kept(vectors: &[f32]) -> DMatrix<f64> {
         let mut out = vec![0.0; vectors.len()];
         for (vector, out) in vectors.chunks(20).zip(out.chunks_mut(20)) {

@@ -31,9 +31,9 @@ const MIN_GRADIENT: f32 = 1e-30;
 /// The discriminant's state; without vectors it is off.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Discriminant {
-    /// The first frame's mean background. It is subtracted from all vectors, so that w means the same in all frames.
+    /// Nearly the first frame's mean background, subtracted from all vectors so that w means the same in all frames.
     pub origin: Vec<f32>,
-    /// w.
+    /// w, in 8 significant bits.
     pub weights: Vec<f32>,
 }
 
@@ -52,7 +52,7 @@ impl Discriminant {
     pub fn new(origin: Vec<f32>) -> Self {
         Self {
             weights: vec![0.0; origin.len()],
-            origin,
+            origin: origin.iter().map(|x| (x * 32.0).round() / 32.0).collect(),
         }
     }
 
@@ -138,6 +138,9 @@ fn fit_simd<S: Simd>(
             *direction = gradient + squared / before * *direction;
         }
     }
+    for weight in weights {
+        *weight = vector_ops::to_bfloat16(*weight);
+    }
 }
 
 #[cfg(test)]
@@ -190,8 +193,10 @@ mod tests {
             let change = normal.lu().solve(&(u.transpose() * residuals));
             let expected = before + change.expect("a damped matrix is regular");
             for (expected, found) in expected.iter().zip(&discriminant.weights) {
+                // To 8 significant bits.
+                let tolerance = 1e-4 + expected.abs() / 256.0;
                 assert!(
-                    (expected - f64::from(*found)).abs() < 1e-4,
+                    (expected - f64::from(*found)).abs() < tolerance,
                     "{expected} {found}"
                 );
             }

@@ -150,7 +150,7 @@ mod tests {
             let mut extractor = Extractor::default();
             extractor.compute_channels(&frame(), &[center], 60.0, &bounds, &params);
             let origin: Vec<f32> = (0..len).map(|i| number(i) / 20.0).collect();
-            let mut discriminant = Discriminant::new(origin.clone());
+            let mut discriminant = Discriminant::new(origin);
             let weights: Vec<f32> = (0..len).map(|i| number(i + 5000)).collect();
             discriminant.weights.clone_from(&weights);
 
@@ -193,7 +193,7 @@ mod tests {
                 }
                 let left = vector
                     .iter()
-                    .zip(&origin)
+                    .zip(&discriminant.origin)
                     .map(|(value, origin)| value - origin);
                 let left: Vec<f32> = left.collect();
                 let length = vector_ops::dot(&left, &left).sqrt();

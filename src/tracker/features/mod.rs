@@ -14,7 +14,7 @@
 //! | [`gradient`], [`binning`] | a row of gradients, and its row of the integral image |
 //! | [`sample_coords`] | coordinates in the integral image |
 //! | [`channels`] | the order of the channels |
-//! | [`quantized`] | vectors in 8 or 14 bits a value, as the state keeps them |
+//! | [`quantized`] | vectors in 4 or 10 bits a value, as the state keeps them |
 //!
 //! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
 //! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and

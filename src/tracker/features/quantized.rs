@@ -1,34 +1,57 @@
-//! Vectors in 8 or 14 bits a value, as the state keeps them.
+//! Vectors in 4 or 10 bits a value, as the state keeps them.
 //!
-//! A session keeps more than a hundred feature vectors, of the bag's subspaces and of the background. Each has a scale
-//! of its own, so a value is off by at most 1/254 of the vector's largest. Running means need more: a small step must
-//! change them.
+//! A session keeps more than a hundred feature vectors. Each has a scale of its own, so in 4 bits a value is off by at
+//! most 1/14 of the vector's largest. Running means have 10 bits: a small step must change them.
 
 use pulp::{Arch, Simd};
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
 const ROUND: f32 = 12_582_912.0;
 
 /// A quantised value.
-pub(crate) trait Level: Copy + Default + Into<f32> {
+pub(crate) trait Level: Copy + Default + Into<f32> + Serialize + DeserializeOwned {
     /// The largest one.
     const MAX: f32;
     /// The number in the last bits.
     fn from_bits(bits: u32) -> Self;
+    /// Writes values to a snapshot.
+    fn serialize_all<S: Serializer>(values: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
+        values.serialize(serializer)
+    }
+    /// Reads what [`serialize_all`](Self::serialize_all) writes.
+    fn deserialize_all<'de, D: Deserializer<'de>>(source: D) -> Result<Vec<Self>, D::Error> {
+        Vec::deserialize(source)
+    }
 }
 
+/// No level: the second half of the last byte where the number of values is odd.
+const NONE: i8 = -8;
+
 impl Level for i8 {
-    const MAX: f32 = 127.0;
+    const MAX: f32 = 7.0;
     #[inline(always)]
     fn from_bits(bits: u32) -> Self {
         bits as i8
     }
+    /// Two in a byte.
+    fn serialize_all<S: Serializer>(values: &[i8], serializer: S) -> Result<S::Ok, S::Error> {
+        let second = |pair: &[i8]| *pair.get(1).unwrap_or(&NONE);
+        let byte = |pair: &[i8]| (pair[0] & 15) as u8 | (second(pair) << 4) as u8;
+        serializer.collect_seq(values.chunks(2).map(byte))
+    }
+    fn deserialize_all<'de, D: Deserializer<'de>>(source: D) -> Result<Vec<i8>, D::Error> {
+        let bytes = Vec::<i8>::deserialize(source)?;
+        let mut values = Vec::with_capacity(2 * bytes.len());
+        values.extend(bytes.iter().flat_map(|byte| [byte << 4 >> 4, byte >> 4]));
+        values.pop_if(|last| *last == NONE);
+        Ok(values)
+    }
 }
 
 impl Level for i16 {
-    /// Two bytes at most in a snapshot, whose whole numbers have seven bits a byte.
-    const MAX: f32 = 8191.0;
+    const MAX: f32 = 511.0;
     #[inline(always)]
     fn from_bits(bits: u32) -> Self {
         bits as i16
@@ -37,8 +60,13 @@ impl Level for i16 {
 
 /// A vector: `scale` times whole numbers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(bound = "T: Level")]
 pub(crate) struct Quantized<T> {
     scale: f32,
+    #[serde(
+        serialize_with = "T::serialize_all",
+        deserialize_with = "T::deserialize_all"
+    )]
     values: Vec<T>,
 }
 
@@ -48,22 +76,10 @@ pub(crate) type QuantizedVector = Quantized<i8>;
 #[pulp::with_simd(quantize = Arch::new())]
 #[inline(always)]
 fn quantize_simd<S: Simd, T: Level>(_: S, vector: &mut Quantized<T>, features: &[f32]) {
-    // Sixteen maxima, so that the loop vectorises.
-    let mut maxima = [0.0_f32; 16];
-    let (chunks, rest) = features.as_chunks::<16>();
-    for chunk in chunks {
-        for (max, value) in maxima.iter_mut().zip(chunk) {
-            let value = value.abs();
-            *max = if value > *max { value } else { *max };
-        }
-    }
-    let all = maxima.iter().chain(rest);
-    vector.scale = all.fold(0.0_f32, |max, value| max.max(value.abs())) / T::MAX;
-    let inverse = if vector.scale > 0.0 {
-        1.0 / vector.scale
-    } else {
-        0.0
-    };
+    // The bits of positive numbers are in their order, and the maximum of whole numbers vectorises.
+    let magnitudes = features.iter().map(|value| value.abs().to_bits());
+    vector.scale = f32::from_bits(magnitudes.fold(0, u32::max)) / T::MAX;
+    let inverse = 1.0 / vector.scale.max(f32::MIN_POSITIVE);
     vector.values.resize(features.len(), T::default());
     for (quantized, value) in vector.values.iter_mut().zip(features) {
         *quantized = T::from_bits((value * inverse + ROUND).to_bits());
@@ -116,11 +132,11 @@ mod tests {
         let mut back = vec![0.0; 100];
         vector.add_to(&mut back, 1.0);
         for (value, back) in features.iter().zip(&back) {
-            assert!((value - back).abs() <= 0.3 / 254.0 + 1e-6);
+            assert!((value - back).abs() <= 0.3 / 14.0 + 1e-6);
         }
         let mut without = vec![7.0; 100];
         vector.write(&features, &mut without);
-        assert!(without.iter().all(|rest| rest.abs() <= 0.3 / 254.0 + 1e-6));
+        assert!(without.iter().all(|rest| rest.abs() <= 0.3 / 14.0 + 1e-6));
         let rounded: Vec<i8> = features
             .iter()
             .map(|v| (v / vector.scale).round() as i8)
@@ -130,7 +146,7 @@ mod tests {
         finer.set(&features);
         finer.write(&[], &mut back);
         for (value, back) in features.iter().zip(&back) {
-            assert!((value - back).abs() <= 0.3 / 16_382.0 + 1e-6);
+            assert!((value - back).abs() <= 0.3 / 1022.0 + 1e-6);
         }
         vector.set(&[0.0; 3]);
         let mut zeros = vec![0.0; 3];

@@ -53,6 +53,12 @@ pub(crate) fn add(target: &mut [f32], factor: f32, vector: &[f32]) {
     }
 }
 
+/// The nearest number with 8 significant bits, for finite ones: its lower half is zeros, which compress well.
+#[inline(always)]
+pub(crate) fn to_bfloat16(value: f32) -> f32 {
+    f32::from_bits(value.to_bits().wrapping_add(0x8000) & 0xFFFF_0000)
+}
+
 /// Scales a vector to length 1; a vector of zeros stays.
 #[inline(always)]
 pub(crate) fn normalize(vector: &mut [f32]) {

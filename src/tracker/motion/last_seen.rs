@@ -15,9 +15,11 @@ use crate::tracker::motion::particles::{Particle, StateBounds};
 pub(crate) const CELL: usize = 4;
 
 /// What is further from the last box than this, in working pixels, is left out.
-const MARGIN: f64 = 160.0;
+const MARGIN: f64 = 128.0;
 /// The most pixels along a side of the small image.
 const MAX_SIDE: usize = 256;
+/// The bits of a pixel that count: the others are noise, which no snapshot can compress.
+const KEPT_BITS: u8 = !3;
 
 /// The part of a working image around the last box, in pixels that are [`CELL`] times as large.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -49,6 +51,7 @@ impl SmallImage {
         self.width = columns.len() as u32;
         clear_and_reserve(&mut self.pixels, width.min(MAX_SIDE) * height.min(MAX_SIDE));
         downsample_part(&frame.luma, CELL, (columns, rows), &mut self.pixels);
+        self.pixels.iter_mut().for_each(|pixel| *pixel &= KEPT_BITS);
     }
 
     /// The number of pixels in a row.
