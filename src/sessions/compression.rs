@@ -3,6 +3,7 @@
 //! A state is quantised numbers, in which hardly any run of bytes comes twice. So nothing is searched for, which takes
 //! half the time and a twentieth more bytes.
 
+use super::targets::MAX_LIST_BYTES;
 use zlib_rs::{
     DeflateConfig, InflateConfig, ReturnCode, Strategy, compress_bound, compress_slice,
     decompress_slice,
@@ -14,6 +15,8 @@ const RAW: i32 = -15;
 const MEM_LEVEL: i32 = 6;
 /// A Huffman code has at least one bit, so no byte becomes more than these.
 const MAX_RATIO: usize = 8;
+/// No session has more: a list of targets is held to half of this, and the parameters hold one target below it.
+const MAX_BYTES: usize = 2 * MAX_LIST_BYTES;
 const LENGTH_BYTES: usize = 4;
 
 /// Appends the length of `content` (32 bits, little-endian) and its compressed bytes to `out`.
@@ -37,11 +40,11 @@ pub(super) fn compress(content: &[u8], out: &mut Vec<u8>) {
     out.truncate(end);
 }
 
-/// What [`compress`] was given; none if these are not its bytes. It takes at most eight times the memory of `bytes`.
+/// What [`compress`] was given; none if these are not its bytes, or become more than a session can have.
 pub(super) fn decompress(bytes: &[u8]) -> Option<Vec<u8>> {
     let (length, compressed) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
-    if length > MAX_RATIO * compressed.len() {
+    if length > MAX_BYTES.min(MAX_RATIO * compressed.len()) {
         return None;
     }
     let mut content = vec![0; length];
@@ -76,5 +79,8 @@ mod tests {
         // A gigabyte of zeros, as DEFLATE writes it at best, is refused before it is there.
         let forged = [&(1_u32 << 30).to_le_bytes()[..], &[0; 1 << 20]].concat();
         assert_eq!(decompress(&forged), None);
+        let mut large = Vec::new();
+        compress(&vec![0; MAX_BYTES + 1], &mut large);
+        assert_eq!(decompress(&large), None);
     }
 }
