@@ -9,7 +9,10 @@ impl World {
     pub fn answer(&mut self, request: Request, answer: Answer, arrives: bool) {
         match answer {
             Answer::Tracked { state, checkpoint } => {
-                let shared = state.len().min(self.promised.len());
+                // What was promised when the request was sent, and what this answer promises. Of what lies between, a late
+                // answer may tell what another has replaced.
+                let told = request.promised.max(checkpoint + 1).min(state.len());
+                let shared = told.min(self.promised.len());
                 assert_eq!(
                     state[..shared],
                     self.promised[..shared],
