@@ -7,9 +7,10 @@
 //!
 //! Frames come with numbers, or over a stream without. A stream that is opened begins a new generation of the record.
 //!
-//! What has to hold: a stream tracks no frame after a newer one was opened; an answer that says `Checkpoint: N` is never
-//! taken back up to frame N, neither by the answer to a later request, nor by another that says so of other frames, nor
-//! by a 409 to a later request that asks for an earlier frame; and without failures the client gets to the end.
+//! What has to hold: a frame is accepted only after the one that it was tracked after; a stream tracks no frame after a
+//! newer one was opened; an answer that says `Checkpoint: N` is never taken back up to frame N, neither by the answer to
+//! a later request, nor by another that says so of other frames, nor by a 409 to a later request that asks for an
+//! earlier frame; and without failures the client gets to the end.
 
 mod replica;
 mod schedule;

@@ -14,6 +14,8 @@ pub struct Record {
     pub version: Version,
     pub token: u64,
     pub state: State,
+    /// The last state that was accepted, written or not. No script reads it.
+    pub accepted: State,
 }
 
 #[derive(Clone, Debug)]
@@ -76,6 +78,12 @@ impl Record {
                 if stream.is_some() {
                     assert_eq!(stream, *newest_stream, "an old stream tracks on");
                 }
+                let (_, before) = tracked.split_last().expect("a frame was tracked");
+                assert_eq!(
+                    before, self.accepted,
+                    "a frame follows another than its own"
+                );
+                self.accepted.clone_from(&tracked);
                 self.token = token;
                 self.version.frame = tracked.len() - 1;
                 if writes {
@@ -108,6 +116,7 @@ impl Record {
             self.version.generation += 1;
             self.version.frame = self.version.checkpoint;
             self.token = 0;
+            self.accepted.clone_from(&self.state);
         }
         Reply::Other(self.told())
     }

@@ -33,6 +33,7 @@ impl World {
                 version,
                 token: 0,
                 state: vec![0],
+                accepted: vec![0],
             },
             replicas: Default::default(),
             calls: Vec::new(),
