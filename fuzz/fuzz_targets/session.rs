@@ -131,7 +131,7 @@ impl Script<'_> {
                     .replace('{', "%7B")
                     .replace('}', "%7D");
                 let path = format!(
-                    "/sessions?box={}&preset={preset}&seed=7&params={params}",
+                    "/sessions?box={}&preset={preset}&seed=7&parameters={params}",
                     target.text()
                 );
                 let answer = service.send((Method::POST, &path), "image/png", picture(*index));

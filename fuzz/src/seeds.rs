@@ -15,7 +15,7 @@ fn main() -> io::Result<()> {
         for (field, value) in [
             ("box", BOX),
             ("preset", "paper"),
-            ("params", "{\"particles\": 20}"),
+            ("parameters", "{\"particles\": 20}"),
         ] {
             let head = format!(
                 "--B\r\nContent-Disposition: form-data; name=\"{field}\"\r\n\r\n{value}\r\n"
@@ -30,7 +30,7 @@ fn main() -> io::Result<()> {
         form[0] = 0x41;
         write("multipart", name, &form)?;
         let json = format!(
-            r#"{{"frame": "{}", "box": [16, 12, 16, 12], "preset": "paper", "params": {{"particles": 20}}}}"#,
+            r#"{{"frame": "{}", "box": [16, 12, 16, 12], "preset": "paper", "parameters": {{"particles": 20}}}}"#,
             STANDARD.encode(picture)
         );
         write("json", name, json.as_bytes())?;
@@ -42,16 +42,20 @@ fn main() -> io::Result<()> {
         // Small, so that a change meets something of each part.
         let params =
             "%7B%22particles%22:20,%22patch_width%22:8,%22patch_height%22:8,%22bag_size%22:2%7D";
-        let path = format!("/sessions?box={BOX}&seed=7&preset={preset}&params={params}");
+        let path = format!("/sessions?box={BOX}&seed=7&preset={preset}&parameters={params}");
         let created = service.send((Method::POST, &path), "image/png", &png(0));
         let session = created
             .session()
-            .ok_or_else(|| io::Error::other("no session"))?;
+            .ok_or_else(|| io::Error::other(String::from_utf8_lossy(&created.body).into_owned()))?;
         for t in 1..8 {
             let get = format!("{session}/snapshot");
             let snapshot = service.send((Method::GET, &get), "text/plain", b"").body;
             if t % 3 == 1 {
-                write("snapshot", &format!("{preset}-{t}"), &content_of(&snapshot)?)?;
+                write(
+                    "snapshot",
+                    &format!("{preset}-{t}"),
+                    &content_of(&snapshot)?,
+                )?;
             }
             service.send(
                 (Method::POST, &format!("{session}/frames")),

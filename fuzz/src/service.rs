@@ -194,10 +194,18 @@ pub fn snapshot_of(version: u8, content: &[u8]) -> Vec<u8> {
     let none: &[&str] = &[];
     let keys = MacKeys::new(SNAPSHOT_KEY_CONTEXT, none).accepting_unsigned(false);
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::none());
-    encoder.write_all(content).expect("a vector takes all bytes");
+    encoder
+        .write_all(content)
+        .expect("a vector takes all bytes");
     let compressed = encoder.finish().expect("a vector takes all bytes");
     let length = content.len() as u32;
-    let mut bytes = [SNAPSHOT_MAGIC, &[version], &length.to_le_bytes(), &compressed].concat();
+    let mut bytes = [
+        SNAPSHOT_MAGIC,
+        &[version],
+        &length.to_le_bytes(),
+        &compressed,
+    ]
+    .concat();
     let code = keys.sign(&bytes);
     bytes.extend_from_slice(&code);
     bytes
