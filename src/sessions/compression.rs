@@ -1,7 +1,6 @@
 //! The compression of stored sessions and snapshots: DEFLATE with Huffman codes alone.
 //!
-//! A state is quantised numbers, in which hardly any run of bytes comes twice. So nothing is searched for, which takes
-//! half the time and a twentieth more bytes.
+//! A state is quantised numbers, in which few runs of bytes come twice. So none is searched for, which saves time.
 
 use super::targets::MAX_LIST_BYTES;
 use zlib_rs::{
@@ -9,7 +8,7 @@ use zlib_rs::{
     decompress_slice,
 };
 
-/// No header and no checksum: what is compressed here has a code of its own.
+/// No header and no checksum: each tracker's snapshot has one.
 const RAW: i32 = -15;
 /// Blocks of 4,096 bytes, so that each part of a state gets codes of its own.
 const MEM_LEVEL: i32 = 6;
