@@ -57,6 +57,9 @@ pub enum BindError {
         /// What the system says.
         source: io::Error,
     },
+    /// The system gives no threads.
+    #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
+    Workers(io::Error),
 }
 
 /// How a service ends.
@@ -103,7 +106,7 @@ impl Application {
         let store = SharedStore::connect(&config.store).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
-            state: AppState::new(config, access, clock, store),
+            state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
             extra: Router::new(),
         })
     }

@@ -9,6 +9,7 @@ use super::saturation::Saturation;
 use super::store_config::SharedStore;
 use super::stream::open_streams::OpenStreams;
 use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
@@ -59,7 +60,15 @@ impl std::ops::Deref for AppState {
 
 impl AppState {
     /// The state of a service with these settings, keys and this clock.
-    pub fn new(config: Config, access: Access, clock: Clock, store: Option<SharedStore>) -> Self {
+    ///
+    /// # Errors
+    /// The system gives no threads for the workers.
+    pub fn new(
+        config: Config,
+        access: Access,
+        clock: Clock,
+        store: Option<SharedStore>,
+    ) -> io::Result<Self> {
         let lease = Lease {
             first: config.session_first,
             idle: config.session_idle,
@@ -67,13 +76,13 @@ impl AppState {
         let (most, requests) = (config.max_sessions, config.session_queue);
         let registry = Registry::new(most, requests, lease, clock.clone());
         let registry = registry.with_memory(config.session_bytes());
-        Self(Arc::new(Shared {
+        Ok(Self(Arc::new(Shared {
             registry: match store {
                 Some(_) => registry.with_eviction(),
                 None => registry,
             },
             store,
-            admission: Admission::new(config.queue, config.worker_count()),
+            admission: Admission::new(config.queue, config.worker_count())?,
             uploads: ByteBudget::new(config.max_upload_bytes),
             clients: Clients::new(&config),
             access,
@@ -85,7 +94,7 @@ impl AppState {
             clock,
             draining: AtomicBool::new(false),
             config,
-        }))
+        })))
     }
 
     /// Makes `/readyz` answer 503 from now on.

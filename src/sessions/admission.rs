@@ -9,8 +9,9 @@ use super::fair_queue::{FairQueue, Turn};
 use super::lanes::{Lane, Length, Pace};
 use super::workers::Workers;
 use std::any::Any;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 /// The queue is full; try again later.
@@ -18,22 +19,16 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 #[error("the queue is full")]
 pub struct QueueFull;
 
-/// The work panicked, or there was no thread for it. The panic hook has already reported a panic.
+/// The work panicked: what the panic said. The panic hook has already reported it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum WorkLost {
-    /// What the panic said, where it was text.
-    #[error("the work panicked: {0}")]
-    Panicked(String),
-    /// The system gave no thread.
-    #[error("there is no thread for the work")]
-    NoThread,
-}
+#[error("the work panicked: {0}")]
+pub struct WorkPanicked(String);
 
-impl WorkLost {
+impl WorkPanicked {
     fn of(panic: &(dyn Any + Send)) -> Self {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-        Self::Panicked(text.unwrap_or("a value that is not text").to_owned())
+        Self(text.unwrap_or("a value that is not text").to_owned())
     }
 }
 
@@ -59,6 +54,24 @@ impl QueuePermit {
     }
 }
 
+/// Work that waits for a worker. Dropping it drops the work, if no worker has taken it.
+struct Unstarted<W>(Arc<Mutex<Option<W>>>);
+
+impl<W> Drop for Unstarted<W> {
+    fn drop(&mut self) {
+        drop(take(&self.0));
+    }
+}
+
+/// Takes the work that waits, if nobody did before.
+fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
+    // Nothing panics while it is held.
+    waiting
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .take()
+}
+
 /// A queue before the workers. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
@@ -69,13 +82,17 @@ pub struct Admission {
 
 impl Admission {
     /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work.
-    pub fn new(queue: usize, workers: usize) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// The system gives no threads for the workers.
+    pub fn new(queue: usize, workers: usize) -> io::Result<Self> {
+        // As many again may wait between two frames.
+        let threads = |pace: Pace| Workers::new(2 * workers, pace.niceness());
+        Ok(Self {
             queue: Arc::new(Semaphore::new(queue)),
             workers: FairQueue::new(workers),
-            // As many again may wait between two frames.
-            threads: Arc::new(Pace::ALL.map(|pace| Workers::new(2 * workers, pace.niceness()))),
-        }
+            threads: Arc::new([threads(Pace::Quick)?, threads(Pace::Slow)?]),
+        })
     }
 
     /// Whether there is a place in the queue now. It may be gone when it is asked for.
@@ -107,29 +124,39 @@ impl Admission {
     /// dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
     ///
     /// # Errors
-    /// The work panicked, or there was no thread for it.
-    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkLost>
+    /// The work panicked.
+    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkPanicked>
     where
         T: Send + 'static,
         F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
-        let turn = self.workers.acquire(queue.lane, queue.length).await;
-        let threads = &self.threads[turn.pace() as usize];
-        let mut permits = (queue, turn);
+        let (lane, length) = (queue.lane, queue.length);
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
-        threads.start(Box::new(move || {
-            permits.1.begin();
-            // A panic drops `work`, so no half-changed value is read.
-            let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut permits.1))));
-            drop(permits);
-            // It cannot be sent when the client has gone.
-            let _ = send.send(outcome);
-        }));
-        match outcome.await {
-            Ok(outcome) => outcome.map_err(|panic| WorkLost::of(panic.as_ref())),
-            Err(_) => Err(WorkLost::NoThread),
-        }
+        // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
+        let unstarted = Unstarted(Arc::new(Mutex::new(Some((queue, work)))));
+        let (taken, threads) = (unstarted.0.clone(), self.threads.clone());
+        let start = move |mut turn: Turn| {
+            let Some((queue, work)) = take(&taken) else {
+                return Err(turn);
+            };
+            let threads = &threads[turn.pace() as usize];
+            threads.start(Box::new(move || {
+                turn.begin();
+                // A panic drops `work`, so no half-changed value is read.
+                let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut turn))));
+                drop(queue);
+                Box::new(move || {
+                    drop(turn);
+                    // It cannot be sent when the client has gone.
+                    let _ = send.send(outcome);
+                })
+            }));
+            Ok(())
+        };
+        self.workers.enter(lane, length, Box::new(start));
+        let outcome = outcome.await.expect("all work ends, and says how");
+        outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()))
     }
 
     /// Places free in the queue.
@@ -154,7 +181,7 @@ mod tests {
 
     #[tokio::test]
     async fn the_queue_refuses_when_full_and_frees_on_drop() {
-        let admission = Admission::new(1, 1);
+        let admission = Admission::new(1, 1).unwrap();
         let permit = enter(&admission).unwrap();
         assert_eq!(admission.check_place(), Err(QueueFull));
         assert_eq!(enter(&admission).unwrap_err(), QueueFull);
@@ -164,7 +191,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
-        let admission = Admission::new(1, 1);
+        let admission = Admission::new(1, 1).unwrap();
         let (started_tx, started) = mpsc::channel();
         let (finish, finish_rx) = mpsc::channel::<()>();
         let queue = enter(&admission).unwrap();
@@ -185,13 +212,13 @@ mod tests {
         assert!(request.await.unwrap_err().is_cancelled());
         assert_eq!((admission.queue_places(), admission.busy_workers()), (0, 1));
         finish.send(()).unwrap();
-        drop(admission.workers.acquire(Lane(0), Length::Short).await);
+        drop(admission.workers.ask(Lane(0), Length::Short).await);
         assert_eq!(admission.busy_workers(), 0);
     }
 
     #[tokio::test]
     async fn work_is_never_done_on_the_thread_that_asks_for_it() {
-        let admission = Admission::new(9, 2);
+        let admission = Admission::new(9, 2).unwrap();
         let here = std::thread::current().id();
         for _ in 0..20 {
             let queue = enter(&admission).unwrap();
@@ -202,15 +229,54 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
+        let admission = Admission::new(9, 1).unwrap();
+        let (go, wait) = mpsc::channel::<()>();
+        let first = enter(&admission).unwrap();
+        let mut first = Box::pin(admission.run(first, move |_| {
+            wait.recv().unwrap();
+            std::thread::current().id()
+        }));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        let mut others: Vec<_> = (0..5)
+            .map(|_| enter(&admission).unwrap())
+            .map(|queue| Box::pin(admission.run(queue, |_| std::thread::current().id())))
+            .collect();
+        for other in &mut others {
+            assert!(futures_util::poll!(other).is_pending());
+        }
+        go.send(()).unwrap();
+        let thread = first.await.unwrap();
+        for other in others {
+            assert_eq!(other.await.unwrap(), thread);
+        }
+    }
+
+    #[tokio::test]
+    async fn work_whose_client_has_gone_before_it_began_is_not_done() {
+        let admission = Admission::new(2, 1).unwrap();
+        let (go, wait) = mpsc::channel::<()>();
+        let first = enter(&admission).unwrap();
+        let mut first = Box::pin(admission.run(first, move |_| wait.recv().unwrap()));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        let second = enter(&admission).unwrap();
+        let mut second = Box::pin(admission.run(second, |_| panic!("nobody waits for it")));
+        assert!(futures_util::poll!(&mut second).is_pending());
+        assert_eq!(admission.queue_places(), 0);
+        drop(second);
+        assert_eq!(admission.queue_places(), 1, "its place is free at once");
+        go.send(()).unwrap();
+        first.await.unwrap();
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (2, 0));
+    }
+
+    #[tokio::test]
     async fn a_panic_is_an_error_and_frees_the_permits() {
-        let admission = Admission::new(1, 1);
+        let admission = Admission::new(1, 1).unwrap();
         let queue = enter(&admission).unwrap();
         let result = admission.run(queue, |_| panic!("a test panics")).await;
-        let panicked: Result<(), WorkLost> = result;
-        assert_eq!(
-            panicked,
-            Err(WorkLost::Panicked("a test panics".to_owned()))
-        );
+        let panicked: Result<(), WorkPanicked> = result;
+        assert_eq!(panicked, Err(WorkPanicked("a test panics".to_owned())));
         assert_eq!((admission.queue_places(), admission.busy_workers()), (1, 0));
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! This is start-time fair queueing (Goyal, Vin, Cheng 1996) with measured instead of announced lengths: a client's
 //! requests wait in a lane of their own, in order of arrival, and each lane counts the processor time of its work. A lane
-//! whose requests begin to wait starts level with the others, so that being idle saves up no claims.
+//! that had no work saves up a small claim, so a client that sends less than its share hardly waits for those that send
+//! all they can.
 //!
 //! Clients whose work is slow have workers of their own ([`Pace`]), so that the frames of the others need not wait until a
 //! slow one is done.
@@ -12,15 +13,16 @@
 
 use super::cpu_time::thread_cpu_time;
 use super::lanes::{Lane, Lanes, Length, Pace};
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::oneshot;
 
-/// Gives a request its worker.
-type Give = oneshot::Sender<Turn>;
+/// Starts a request's work, or gives the turn back where its client has gone.
+type Give = Box<dyn FnOnce(Turn) -> Result<(), Turn> + Send>;
 
 /// The queue. Clones are the same one.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct FairQueue(Arc<Mutex<Lanes<Give>>>);
 
 /// A worker, given back when this is dropped.
@@ -41,23 +43,27 @@ impl FairQueue {
         Self(Arc::new(Mutex::new(Lanes::new(workers))))
     }
 
-    /// Waits for a worker. Dropping the future gives up the place.
-    pub(super) async fn acquire(&self, lane: Lane, length: Length) -> Turn {
-        let given = {
+    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up.
+    pub(super) fn enter(&self, lane: Lane, length: Length, give: Give) {
+        let pace = {
             let mut state = self.lock();
             state.forget_idle_lanes();
             state.enter(lane);
-            if state.may_begin(&state.lanes[&lane], length) {
-                let pace = state.serve(lane, length);
-                return self.turn(lane, length, pace);
+            if !state.may_begin(&state.lanes[&lane], length) {
+                return state.enter(lane).requests.push_back((length, give));
             }
-            let (give, given) = oneshot::channel();
-            state.enter(lane).requests.push_back((length, give));
-            given
+            state.serve(lane, length)
         };
+        // What is given back is handed on as it is dropped.
+        drop(give(self.turn(lane, length, pace)));
+    }
+
+    /// Asks for a worker; what is returned gets it.
+    #[cfg(test)]
+    pub(super) fn ask(&self, lane: Lane, length: Length) -> oneshot::Receiver<Turn> {
+        let (give, given) = oneshot::channel();
+        self.enter(lane, length, Box::new(|turn| give.send(turn)));
         given
-            .await
-            .expect("every lane with requests is served in the end")
     }
 
     /// Workers that have work.
@@ -76,6 +82,7 @@ impl FairQueue {
             }
             let (give, given) = oneshot::channel();
             let own = state.lanes.get_mut(&lane)?;
+            let give: Give = Box::new(|turn| give.send(turn));
             own.requests.push_front((Length::Begun, give));
             given
         };
@@ -109,7 +116,7 @@ impl FairQueue {
                     None => return,
                 }
             };
-            if let Err(mut refused) = give.send(self.turn(lane, length, pace)) {
+            if let Err(mut refused) = give(self.turn(lane, length, pace)) {
                 // Its client has gone. The worker is still to be given away.
                 refused.queue = None;
                 ended = Some((lane, pace, Duration::ZERO, length != Length::Short));
@@ -120,6 +127,12 @@ impl FairQueue {
     fn lock(&self) -> MutexGuard<'_, Lanes<Give>> {
         // Nothing panics while it is held.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for FairQueue {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "FairQueue({} at work)", self.running())
     }
 }
 
@@ -171,125 +184,87 @@ impl Drop for Turn {
 mod tests {
     use super::*;
 
-    #[tokio::test]
-    async fn a_client_with_one_request_does_not_wait_behind_all_of_another() {
+    fn given(asked: &mut oneshot::Receiver<Turn>) -> Turn {
+        asked.try_recv().expect("a worker is free for it")
+    }
+
+    #[test]
+    fn a_client_with_one_request_does_not_wait_behind_all_of_another() {
         let queue = FairQueue::new(1);
-        let mut first = queue.acquire(Lane(1), Length::Short).await;
+        let mut first = given(&mut queue.ask(Lane(1), Length::Short));
         first.begin();
-        let (done, mut order) = tokio::sync::mpsc::unbounded_channel();
-        let ask = |lane: u64| {
-            let (queue, done) = (queue.clone(), done.clone());
-            tokio::spawn(async move {
-                let turn = queue.acquire(Lane(lane), Length::Short).await;
-                done.send(lane).unwrap();
-                drop(turn);
-            })
-        };
-        let mut asked: Vec<_> = (0..20).map(|_| ask(1)).collect();
-        asked.push(ask(2));
-        while queue
-            .lock()
-            .lanes
-            .values()
-            .map(|w| w.requests.len())
-            .sum::<usize>()
-            < 21
-        {
-            tokio::task::yield_now().await;
-        }
+        let mut asked: Vec<_> = (0..20).map(|_| queue.ask(Lane(1), Length::Short)).collect();
+        let mut other = queue.ask(Lane(2), Length::Short);
         drop(first);
-        let mut served = Vec::new();
-        for task in asked {
-            task.await.unwrap();
-            served.push(order.recv().await.unwrap());
-        }
-        assert_eq!(served[0], 2, "{served:?}");
+        drop(given(&mut other));
+        asked.iter_mut().for_each(|asked| drop(given(asked)));
         assert_eq!(queue.running(), 0);
     }
 
-    #[tokio::test]
-    async fn work_on_many_frames_lets_others_go_between_two_of_them() {
+    #[test]
+    fn work_on_many_frames_lets_others_go_between_two_of_them() {
         let queue = FairQueue::new(1);
-        let mut long = queue.acquire(Lane(1), Length::Long).await;
+        let mut long = given(&mut queue.ask(Lane(1), Length::Long));
         // Nobody waits.
         long.step_back();
         assert_eq!(queue.running(), 1);
+        let short = queue.ask(Lane(2), Length::Short);
         let (done, order) = std::sync::mpsc::channel();
-        let short = tokio::spawn({
-            let (queue, done) = (queue.clone(), done.clone());
-            async move {
-                let turn = queue.acquire(Lane(2), Length::Short).await;
-                done.send("short").unwrap();
-                drop(turn);
+        let frames = std::thread::spawn({
+            let done = done.clone();
+            move || {
+                long.begin();
+                long.step_back();
+                done.send("long").unwrap();
             }
         });
-        while !queue.lock().lanes.contains_key(&Lane(2)) {
-            tokio::task::yield_now().await;
-        }
-        let frames = tokio::task::spawn_blocking(move || {
-            long.begin();
-            long.step_back();
-            done.send("long").unwrap();
-        });
-        short.await.unwrap();
-        frames.await.unwrap();
+        let short = short.blocking_recv().unwrap();
+        done.send("short").unwrap();
+        drop((short, done));
+        frames.join().unwrap();
         assert_eq!(order.iter().collect::<Vec<_>>(), ["short", "long"]);
         assert_eq!((queue.running(), queue.lock().long), (0, 0));
     }
 
-    #[tokio::test]
-    async fn work_on_one_frame_keeps_its_worker() {
+    #[test]
+    fn work_on_one_frame_keeps_its_worker() {
         let queue = FairQueue::new(1);
-        let mut short = queue.acquire(Lane(1), Length::Short).await;
-        let other = tokio::spawn({
-            let queue = queue.clone();
-            async move { drop(queue.acquire(Lane(2), Length::Long).await) }
-        });
-        while !queue.lock().lanes.contains_key(&Lane(2)) {
-            tokio::task::yield_now().await;
-        }
-        // It would wait for ever for the other, which runs on this thread.
+        let mut short = given(&mut queue.ask(Lane(1), Length::Short));
+        let mut other = queue.ask(Lane(2), Length::Long);
+        // It would wait for ever for the other, which ends on this thread.
         short.step_back();
         drop(short);
-        other.await.unwrap();
+        drop(given(&mut other));
         assert_eq!((queue.running(), queue.lock().long), (0, 0));
     }
 
-    #[tokio::test]
-    async fn quick_work_never_waits_behind_slow_work() {
+    #[test]
+    fn quick_work_never_waits_behind_slow_work() {
         let queue = FairQueue::new(1);
-        let mut first = queue.acquire(Lane(1), Length::Short).await;
+        let mut first = given(&mut queue.ask(Lane(1), Length::Short));
         // It took as long as a large picture takes.
         first.queue = None;
         queue.hand_on(Lane(1), Pace::Quick, Duration::from_millis(50), false);
-        let slow = queue.acquire(Lane(1), Length::Short).await;
+        let slow = given(&mut queue.ask(Lane(1), Length::Short));
         // The only worker of quick work is free.
-        let quick = queue.acquire(Lane(2), Length::Short).await;
+        let quick = given(&mut queue.ask(Lane(2), Length::Short));
         assert_eq!(queue.running(), 2);
-        let mut behind = Box::pin(queue.acquire(Lane(1), Length::Short));
-        assert!(futures_util::poll!(&mut behind).is_pending());
+        let mut behind = queue.ask(Lane(1), Length::Short);
+        assert!(behind.try_recv().is_err());
         drop(quick);
-        assert!(futures_util::poll!(&mut behind).is_pending());
+        assert!(behind.try_recv().is_err());
         drop(slow);
-        drop(behind.await);
+        drop(given(&mut behind));
     }
 
-    #[tokio::test]
-    async fn requests_whose_clients_have_gone_lose_no_worker() {
+    #[test]
+    fn requests_whose_clients_have_gone_lose_no_worker() {
         let queue = FairQueue::new(1);
-        let turn = queue.acquire(Lane(1), Length::Short).await;
-        let gone = tokio::spawn({
-            let queue = queue.clone();
-            async move { queue.acquire(Lane(2), Length::Short).await }
-        });
-        while !queue.lock().lanes.contains_key(&Lane(2)) {
-            tokio::task::yield_now().await;
-        }
-        gone.abort();
-        assert!(gone.await.unwrap_err().is_cancelled());
+        let turn = given(&mut queue.ask(Lane(1), Length::Short));
+        drop(queue.ask(Lane(2), Length::Short));
         drop(turn);
         assert_eq!(queue.running(), 0);
-        drop(queue.acquire(Lane(2), Length::Short).await);
+        drop(given(&mut queue.ask(Lane(2), Length::Short)));
         assert_eq!(queue.running(), 0);
     }
 }

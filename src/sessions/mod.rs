@@ -45,7 +45,7 @@ mod targets;
 mod work_limit;
 mod workers;
 
-pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkLost};
+pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkPanicked};
 pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
 pub use fair_queue::Turn;

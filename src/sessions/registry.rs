@@ -261,7 +261,7 @@ mod tests {
         let session = insert(&registry);
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
-        let admission = Admission::new(9, 1);
+        let admission = Admission::new(9, 1).unwrap();
         let work = move |_: &mut Turn| {
             let _state = locked.state();
             panic!("a test panics in the work");

@@ -110,7 +110,7 @@ mod tests {
 
     #[tokio::test]
     async fn each_limit_stops_the_work() {
-        let mut turn = FairQueue::new(1).acquire(Lane(0), Length::Short).await;
+        let mut turn = FairQueue::new(1).ask(Lane(0), Length::Short).await.unwrap();
         let soon = || Instant::now() + LONG;
         let limit = WorkLimit::new(soon(), LONG);
         let client = limit.abandon_on_drop();

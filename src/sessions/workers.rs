@@ -1,62 +1,55 @@
-//! The threads that decode and track. Each is started when there is work for it, up to a maximum.
+//! The threads that decode and track.
 //!
 //! A thread keeps a megabyte or more of buffers from one frame to the next. So work goes to the thread that became idle
 //! last: its buffers are most likely still in the caches of its core.
 
 use std::collections::VecDeque;
-use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::{fmt, io};
 
-/// Work. It must not panic.
-type Job = Box<dyn FnOnce() + Send>;
+/// Work, and what is to be done once its thread can be given the next. Neither may panic.
+type Job = Box<dyn FnOnce() -> After + Send>;
+type After = Box<dyn FnOnce()>;
 
 /// The threads. When this is dropped each ends after its current job, once no job waits.
 pub(super) struct Workers(Arc<Shared>);
 
-struct Shared {
-    state: Mutex<State>,
-    max_threads: usize,
-    /// By how much lower their priority is than that of the process.
-    niceness: i32,
-}
+#[derive(Default)]
+struct Shared(Mutex<State>);
 
 #[derive(Default)]
 struct State {
     waiting: VecDeque<Job>,
     /// One for each idle thread, in the order in which they became idle.
     idle: Vec<Arc<ParkingSlot>>,
-    threads: usize,
     closed: bool,
 }
 
 impl Workers {
-    /// At most `max_threads` threads, whose priority is lower by `niceness`; none is started yet.
-    pub(super) fn new(max_threads: usize, niceness: i32) -> Self {
-        Self(Arc::new(Shared {
-            state: Mutex::default(),
-            max_threads,
-            niceness,
-        }))
+    /// So many threads, whose priority is lower by `niceness` than that of this thread. They start now: one that a worker
+    /// started would have that worker's priority.
+    ///
+    /// # Errors
+    /// The system gives no more threads.
+    pub(super) fn new(threads: usize, niceness: i32) -> io::Result<Self> {
+        let workers = Self(Arc::default());
+        for _ in 0..threads {
+            let shared = workers.0.clone();
+            let thread = std::thread::Builder::new().name("bagtrack-worker".to_owned());
+            thread.spawn(move || shared.serve(niceness))?;
+        }
+        Ok(workers)
     }
 
-    /// Runs `job` on a thread: at once if one is idle or can be started, else after the jobs that wait already. Drops
-    /// the job if there is no thread at all and the system gives none.
+    /// Runs `job` on a thread: at once if one is idle, else after the jobs that wait already.
     pub(super) fn start(&self, job: Job) {
         let mut state = self.0.lock();
-        if let Some(slot) = state.idle.pop() {
-            drop(state);
-            return slot.give(Some(job));
-        }
-        if state.threads < self.0.max_threads {
-            let shared = self.0.clone();
-            let thread = std::thread::Builder::new().name("bagtrack-worker".to_owned());
-            match thread.spawn(move || shared.serve()) {
-                Ok(_) => state.threads += 1,
-                Err(error) => tracing::error!(%error, "cannot start a worker"),
+        match state.idle.pop() {
+            Some(slot) => {
+                drop(state);
+                slot.give(Some(job));
             }
-        }
-        if state.threads > 0 {
-            state.waiting.push_back(job);
+            None => state.waiting.push_back(job),
         }
     }
 }
@@ -73,38 +66,42 @@ impl Drop for Workers {
 
 impl fmt::Debug for Workers {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let threads = self.0.lock().threads;
-        write!(formatter, "Workers({threads} of {})", self.0.max_threads)
+        write!(formatter, "Workers({} idle)", self.0.lock().idle.len())
     }
 }
 
 impl Shared {
-    /// The main loop of a thread.
-    fn serve(&self) {
-        lower_priority(self.niceness);
+    /// The main loop of a thread. It is idle before what comes after a job, so a job that this starts goes on here.
+    fn serve(&self, niceness: i32) {
+        lower_priority(niceness);
         let slot = Arc::new(ParkingSlot::default());
-        while let Some(job) = self.next(&slot) {
-            job();
+        let mut after: After = Box::new(|| ());
+        loop {
+            let Some(job) = self.next(&slot, after) else {
+                return;
+            };
+            after = job();
         }
     }
 
     /// The next job; none when the thread is to end.
-    fn next(&self, slot: &Arc<ParkingSlot>) -> Option<Job> {
+    fn next(&self, slot: &Arc<ParkingSlot>, after: After) -> Option<Job> {
         let mut state = self.lock();
-        if let Some(job) = state.waiting.pop_front() {
-            return Some(job);
-        }
-        if state.closed {
-            return None;
+        let waiting = state.waiting.pop_front();
+        if waiting.is_some() || state.closed {
+            drop(state);
+            after();
+            return waiting;
         }
         state.idle.push(slot.clone());
         drop(state);
+        after();
         slot.wait()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
         // Nothing panics while it is held.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -155,13 +152,20 @@ mod tests {
     use std::sync::mpsc;
     use std::thread::{self, ThreadId};
 
+    fn job(work: impl FnOnce() + Send + 'static) -> Job {
+        Box::new(|| {
+            work();
+            Box::new(|| ())
+        })
+    }
+
     #[test]
     fn jobs_share_the_threads_and_all_are_done() {
-        let workers = Workers::new(2, 0);
+        let workers = Workers::new(2, 0).expect("two threads");
         let (done, finished) = mpsc::channel();
         for index in 0..50 {
             let done = done.clone();
-            workers.start(Box::new(move || {
+            workers.start(job(move || {
                 done.send((index, thread::current().id()))
                     .expect("the test waits");
             }));
@@ -174,16 +178,16 @@ mod tests {
 
     #[test]
     fn what_waits_is_done_after_the_pool_was_dropped_and_then_the_threads_end() {
-        let workers = Workers::new(1, 0);
+        let workers = Workers::new(1, 0).expect("a thread");
         let shared = Arc::downgrade(&workers.0);
         let (go, wait) = mpsc::channel::<()>();
         let (done, finished) = mpsc::channel();
         let second = done.clone();
-        workers.start(Box::new(move || {
+        workers.start(job(move || {
             wait.recv().expect("the test says when");
             done.send(1).expect("the test waits");
         }));
-        workers.start(Box::new(move || second.send(2).expect("the test waits")));
+        workers.start(job(move || second.send(2).expect("the test waits")));
         drop(workers);
         go.send(()).expect("the job waits");
         assert_eq!(finished.iter().collect::<Vec<u32>>(), [1, 2]);

@@ -5,7 +5,7 @@ use super::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
     BytesFull, InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed,
-    SnapshotError, StartError, Stopped, StoreAway, TooManySessions, WorkLost,
+    SnapshotError, StartError, Stopped, StoreAway, TooManySessions, WorkPanicked,
 };
 use crate::tracker::TrackerError;
 use std::sync::Arc;
@@ -164,8 +164,8 @@ impl From<SessionClosed> for Problem {
     }
 }
 
-impl From<WorkLost> for Problem {
-    fn from(error: WorkLost) -> Self {
+impl From<WorkPanicked> for Problem {
+    fn from(error: WorkPanicked) -> Self {
         Self::internal(Arc::new(error))
     }
 }
