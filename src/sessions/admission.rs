@@ -231,6 +231,10 @@ mod tests {
     #[tokio::test]
     async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
         let admission = Admission::new(9, 1).unwrap();
+        // A thread that starts late would be the one that became idle last.
+        while format!("{:?}", admission.threads[0]) != "Workers(2 idle)" {
+            tokio::task::yield_now().await;
+        }
         let (go, wait) = mpsc::channel::<()>();
         let first = enter(&admission).unwrap();
         let mut first = Box::pin(admission.run(first, move |_| {
