@@ -2,7 +2,7 @@
 
 use crate::tracker::appearance::bag::Entry;
 use crate::tracker::appearance::subspace::AffineSubspace;
-use crate::tracker::features::channels::{CHANNELS, CHROMA, DIRECTIONS, GRAY};
+use crate::tracker::features::hog::channels::{CHANNELS, CHROMA, DIRECTIONS, GRAY};
 use crate::tracker::params::table::{Features, Params};
 
 /// One entry of the bag: an affine subspace (equation 1).

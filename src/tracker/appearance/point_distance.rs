@@ -10,9 +10,8 @@ use std::f64::consts::PI;
 use pulp::{Arch, Simd};
 
 use crate::tracker::appearance::bag_matrix::BagMatrix;
-use crate::tracker::appearance::span::MIN_REMAINDER;
 use crate::tracker::linalg::acos::{LANES, squared_angles};
-use crate::tracker::linalg::{combinations, gemm};
+use crate::tracker::linalg::{combinations, gemm, vector_ops};
 use crate::tracker::params::table::Params;
 
 /// Candidates are worked on in groups of this many.
@@ -91,7 +90,7 @@ impl PointDistance {
         let squares = squares.iter().chain(std::iter::repeat(&0.0));
         for ((norm, scale), square) in self.norms.iter_mut().zip(&mut self.scales).zip(squares) {
             // A remainder that is only rounding counts as the background's mean.
-            (*norm, *scale) = match *norm > square * MIN_REMAINDER {
+            (*norm, *scale) = match *norm > square * vector_ops::MIN_REMAINDER {
                 true => (1.0, 1.0 / norm.sqrt()),
                 false => (0.0, 0.0),
             };
@@ -151,7 +150,6 @@ mod tests {
     use crate::tracker::appearance::bag::Bag;
     use crate::tracker::appearance::{bag_matrix, span};
     use crate::tracker::features::quantized::QuantizedVector;
-    use crate::tracker::linalg::vector_ops;
     use crate::tracker::params::presets::Preset;
     use crate::tracker::params::table::Features;
     use nalgebra::{DMatrix, DVector};

@@ -14,9 +14,6 @@ use crate::tracker::features::quantized::QuantizedVector;
 use crate::tracker::linalg::{combinations, gemm, jacobi, vector_ops};
 use crate::tracker::params::table::Params;
 
-/// A squared length under the metric below this share of the plain one is rounding.
-pub(crate) const MIN_REMAINDER: f32 = 1e-6;
-
 /// The mean, then the basis vectors, of an affine subspace.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Span {
@@ -91,7 +88,7 @@ fn compare_templates_simd<S: Simd>(
         for j in 0..count {
             let plain = gram[i * count + j];
             let product = plain - vector_ops::dot(&coordinates[row(i)], &coordinates[row(j)]);
-            let is_left = i != j || product > plain * MIN_REMAINDER;
+            let is_left = i != j || product > plain * vector_ops::MIN_REMAINDER;
             gram[i * count + j] = if is_left { product } else { 0.0 };
         }
         let square = gram[i * count + i];

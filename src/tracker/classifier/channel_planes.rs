@@ -2,8 +2,8 @@
 
 use pulp::Simd;
 
-use crate::tracker::features::channels::{CHANNELS, GRAY, LANES};
 use crate::tracker::features::extractor::Grid;
+use crate::tracker::features::hog::channels::{CHANNELS, GRAY, LANES};
 
 /// Cells that a dense search goes beyond the window on each side at most: further costs more than the rest of a step.
 pub(crate) const MAX_OFFSET: usize = 24;

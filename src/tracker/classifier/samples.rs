@@ -10,8 +10,6 @@ use crate::tracker::linalg::gemm;
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::linalg::vector_ops;
 
-/// A squared distance from the origin below this share of the squared lengths is rounding: the vector is the origin.
-const MIN_REMAINDER: f32 = 1e-6;
 /// Vectors of a sum that are worked on together, while they are in the cache.
 const GROUP: usize = 8;
 
@@ -53,7 +51,7 @@ impl TrainingSamples {
         let products = of_weights.iter().zip(of_origin);
         for ((of_weights, of_origin), square) in products.zip(squares) {
             let left = square + origin_square - 2.0 * of_origin;
-            let is_left = left > (square + origin_square) * MIN_REMAINDER;
+            let is_left = left > (square + origin_square) * vector_ops::MIN_REMAINDER;
             let scale = if is_left { 1.0 / left.sqrt() } else { 0.0 };
             self.scales.push(scale);
             self.scores.push(scale * (of_weights - origin_score));

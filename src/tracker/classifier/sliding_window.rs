@@ -9,8 +9,8 @@ use pulp::{Arch, Simd};
 use crate::tracker::classifier::channel_planes::{ChannelPlanes, load};
 use crate::tracker::classifier::ridge::Discriminant;
 use crate::tracker::classifier::window_score::Scorer;
-use crate::tracker::features::channels::{CHANNELS, GRAY, Lanes};
 use crate::tracker::features::extractor::Grid;
+use crate::tracker::features::hog::channels::{CHANNELS, GRAY, Lanes};
 
 /// Rows of windows whose sums are in registers at a time.
 const ROWS: usize = 4;
@@ -108,9 +108,9 @@ fn add_products<S: Simd>(
 mod tests {
     use super::*;
     use crate::tracker::classifier::channel_planes::MAX_OFFSET;
-    use crate::tracker::features::channels::GRAY_WEIGHT;
     use crate::tracker::features::extractor::Extractor;
-    use crate::tracker::features::hog_cells::MIN_CONTRAST;
+    use crate::tracker::features::hog::cells::MIN_CONTRAST;
+    use crate::tracker::features::hog::channels::GRAY_WEIGHT;
     use crate::tracker::image::frame::Frame;
     use crate::tracker::linalg::vector_ops;
     use crate::tracker::motion::particles::{Particle, StateBounds};

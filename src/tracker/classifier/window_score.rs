@@ -3,12 +3,9 @@
 use pulp::Simd;
 
 use crate::tracker::classifier::ridge::Discriminant;
-use crate::tracker::features::channels::{CHANNELS, GRAY, GRAY_WEIGHT};
-use crate::tracker::features::hog_cells::MIN_CONTRAST;
+use crate::tracker::features::hog::cells::MIN_CONTRAST;
+use crate::tracker::features::hog::channels::{CHANNELS, GRAY, GRAY_WEIGHT};
 use crate::tracker::linalg::vector_ops;
-
-/// A squared distance from the origin below this share of the squared lengths is rounding, as in a training sample.
-const MIN_REMAINDER: f32 = 1e-6;
 
 /// What the scores of a frame have in common.
 pub(crate) struct Scorer {
@@ -19,7 +16,7 @@ pub(crate) struct Scorer {
     origin_square: f32,
     /// Cells of a window.
     count: f32,
-    least_deviation: f32,
+    min_deviation: f32,
 }
 
 impl Scorer {
@@ -35,7 +32,7 @@ impl Scorer {
             origin_score: vector_ops::dot(weights, origin),
             origin_square: vector_ops::dot(origin, origin),
             count: (weights.len() / CHANNELS) as f32,
-            least_deviation: MIN_CONTRAST * cell_pixels,
+            min_deviation: MIN_CONTRAST * cell_pixels,
         }
     }
 
@@ -58,8 +55,8 @@ impl Scorer {
         let mean = simd.mul_f32s(gray, share);
         let variance = simd.sub_f32s(simd.mul_f32s(square, share), simd.mul_f32s(mean, mean));
         let variance = simd.max_f32s(variance, zero);
-        let least_deviation = simd.splat_f32s(self.least_deviation);
-        let deviation = simd.max_f32s(simd.sqrt_f32s(variance), least_deviation);
+        let min_deviation = simd.splat_f32s(self.min_deviation);
+        let deviation = simd.max_f32s(simd.sqrt_f32s(variance), min_deviation);
         let scale = simd.div_f32s(simd.splat_f32s(GRAY_WEIGHT), deviation);
         for ((whole, grays), sum) in whole.iter_mut().zip(grays).zip(self.grays) {
             let shift = simd.mul_f32s(mean, simd.splat_f32s(sum));
@@ -70,8 +67,10 @@ impl Scorer {
         let square = simd.mul_add_e_f32s(contrast, count, energy);
         let both = simd.add_f32s(square, simd.splat_f32s(self.origin_square));
         let left = simd.sub_f32s(both, simd.add_f32s(of_origin, of_origin));
-        let is_left =
-            simd.less_than_f32s(simd.mul_f32s(both, simd.splat_f32s(MIN_REMAINDER)), left);
+        let is_left = simd.less_than_f32s(
+            simd.mul_f32s(both, simd.splat_f32s(vector_ops::MIN_REMAINDER)),
+            left,
+        );
         let above = simd.sub_f32s(of_weights, simd.splat_f32s(self.origin_score));
         let score = simd.div_f32s(above, simd.sqrt_f32s(left));
         simd.select_f32s(is_left, score, zero)

@@ -3,11 +3,11 @@
 //! [`compute_channels`](Extractor::compute_channels) comes first in each frame. It covers a window of the frame;
 //! feature vectors are for areas in that window.
 
-use crate::tracker::features::channels::{CHANNELS, GRAY};
 use crate::tracker::features::gray::GrayPatches;
-use crate::tracker::features::hog;
-use crate::tracker::features::hog_cells::HogCells;
-use crate::tracker::features::integral::IntegralChannels;
+use crate::tracker::features::hog::cells::HogCells;
+use crate::tracker::features::hog::channels::{CHANNELS, GRAY};
+use crate::tracker::features::hog::descriptor::{self, Layout};
+use crate::tracker::features::hog::integral::IntegralChannels;
 use crate::tracker::image::downsample;
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
@@ -120,9 +120,8 @@ impl Extractor {
             Features::Gray => self.gray.cut(frame, areas, params, out),
             Features::Gradients => {
                 let areas = areas.map(|area| area.in_pixels_of(self.downsample));
-                let size = (params.patch_width as usize, params.patch_height as usize);
-                let size = (size, params.chroma_weight);
-                hog::describe(&mut self.hog, &self.integral, areas, size, out);
+                let (hog, integral) = (&mut self.hog, &self.integral);
+                descriptor::describe(hog, integral, areas, Layout::of(params), out);
             }
         }
     }
@@ -178,8 +177,12 @@ impl Extractor {
         let areas = std::iter::once(area.in_pixels_of(self.downsample));
         let hog = &mut self.grid_hog;
         hog.reserve(max_columns, max_rows);
-        let size = ((columns, rows), params.chroma_weight);
-        hog::describe(hog, &self.integral, areas, size, &mut grid.values);
+        let layout = Layout {
+            columns,
+            rows,
+            ..Layout::of(params)
+        };
+        descriptor::describe(hog, &self.integral, areas, layout, &mut grid.values);
         grid.grays.extend(hog.cells.iter().map(|cell| cell.0[GRAY]));
         for cell in grid.values.as_chunks_mut::<CHANNELS>().0 {
             cell[GRAY] = 0.0;

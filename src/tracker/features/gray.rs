@@ -1,7 +1,7 @@
-//! From a candidate area to its feature vector: the one place that knows what the tracker looks at.
+//! Gray patches (section III-B), the feature vectors of the preset `paper`.
 //!
-//! The area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
-//! gray values in [0, 1] (section III-B). Outside the frame the nearest edge pixel counts.
+//! An area is resized to H₁ x H₂ by bilinear interpolation at the centres of its cells and taken row by row, as
+//! gray values in [0, 1]. Outside the frame the nearest edge pixel counts.
 
 use pulp::{Arch, Simd};
 
@@ -9,8 +9,8 @@ use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::params::table::Params;
 
-/// Most rows or columns of cells.
-const MOST_CELLS: usize = 64;
+/// Rows or columns of cells, at most.
+const MAX_CELLS: usize = 64;
 
 /// Cuts the patches of many areas out of one frame; keeps its buffer.
 #[derive(Debug, Clone, Default)]
@@ -23,9 +23,9 @@ pub(crate) struct GrayPatches {
 /// Where the centres of cells lie along one axis.
 struct Centers {
     /// The pixel at or before each centre.
-    pixels: [usize; MOST_CELLS],
+    pixels: [usize; MAX_CELLS],
     /// The share of the pixel after that one.
-    shares: [f32; MOST_CELLS],
+    shares: [f32; MAX_CELLS],
 }
 
 impl GrayPatches {
@@ -65,7 +65,7 @@ fn cut_simd<S: Simd>(
     // The pixels after the last centre too, where the frame has them.
     let count = (right + 2).min(width) - left;
     let row = |y: usize| &image.pixels()[y.min(height - 1) * width + left..][..count];
-    let mut pairs = [[0.0; 2]; MOST_CELLS];
+    let mut pairs = [[0.0; 2]; MAX_CELLS];
     let centers = down.pixels.iter().zip(&down.shares);
     for (target, (&y, &share)) in patch.chunks_exact_mut(columns).zip(centers) {
         for ((between, &upper), &lower) in between.iter_mut().zip(row(y)).zip(row(y + 1)) {
@@ -91,8 +91,8 @@ fn interpolate(first: f32, second: f32, share: f32) -> f32 {
 #[inline(always)]
 fn centers(start: f64, extent: f64, count: u32, pixels: u32) -> Centers {
     let mut centers = Centers {
-        pixels: [0; MOST_CELLS],
-        shares: [0.0; MOST_CELLS],
+        pixels: [0; MAX_CELLS],
+        shares: [0.0; MAX_CELLS],
     };
     let last = f64::from(pixels - 1);
     for index in 0..count as usize {

@@ -8,26 +8,14 @@
 //! |---|---|
 //! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind |
 //! | [`gray`] | gray patches |
-//! | [`hog`] | the gradient histograms of many areas |
-//! | [`hog_cells`], [`block_norm`] | the cells of one area, and the normalisation of their directions |
-//! | [`integral`] | the integral image that cells are sums of |
-//! | [`gradient`], [`binning`] | a row of gradients, and its row of the integral image |
-//! | [`sample_coords`] | coordinates in the integral image |
-//! | [`channels`] | the order of the channels |
+//! | [`hog`] | gradient histograms, a room of its own |
 //! | [`quantized`] | vectors in 4 or 10 bits a value, as the state keeps them |
 //!
 //! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
 //! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and
 //! black. Areas outside the window that was computed for the frame are treated as if the frame ended there.
 
-pub(crate) mod binning;
-pub(crate) mod block_norm;
-pub(crate) mod channels;
 pub(crate) mod extractor;
-pub(crate) mod gradient;
 pub(crate) mod gray;
 pub(crate) mod hog;
-pub(crate) mod hog_cells;
-pub(crate) mod integral;
 pub(crate) mod quantized;
-pub(crate) mod sample_coords;

@@ -4,6 +4,9 @@
 
 use pulp::Simd;
 
+/// A squared length that is a difference of larger squares, and below this share of them, is rounding: it counts as 0.
+pub(crate) const MIN_REMAINDER: f32 = 1e-6;
+
 /// Adds the sum of `vectors`, each times its factor, to `sum`; all of one length.
 #[inline(always)]
 pub(crate) fn add_all<S: Simd, const N: usize>(

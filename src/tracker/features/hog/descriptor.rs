@@ -1,15 +1,37 @@
 //! The gradient histogram of an area: its feature vector, from the integral image.
 //!
-//! A vector has [`CHANNELS`] values for each cell, cell by cell, row by row: the nine directions, then the gray value.
+//! A vector has [`CHANNELS`] values for each cell, cell by cell, row by row: nine directions, two
+//! of chroma, the gray value.
 //! Each cell's directions are divided by three times the root of the mean energy of the 3 x 3 cells around it, and
 //! clipped. The gray values have the area's mean subtracted and are divided by its standard deviation.
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::features::channels::CHANNELS;
-use crate::tracker::features::hog_cells::HogCells;
-use crate::tracker::features::integral::IntegralChannels;
+use crate::tracker::features::hog::cells::HogCells;
+use crate::tracker::features::hog::channels::CHANNELS;
+use crate::tracker::features::hog::integral::IntegralChannels;
 use crate::tracker::image::rect::Rect;
+use crate::tracker::params::table::Params;
+
+/// The cells that an area is divided into.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    pub columns: usize,
+    pub rows: usize,
+    /// The weight of a cell's mean chroma.
+    pub chroma_weight: f32,
+}
+
+impl Layout {
+    /// That of a candidate.
+    pub fn of(params: &Params) -> Self {
+        Self {
+            columns: params.patch_width as usize,
+            rows: params.patch_height as usize,
+            chroma_weight: params.chroma_weight as f32,
+        }
+    }
+}
 
 /// Writes the feature vectors of `areas` (pixels of the frame, sides above 0, in the window of `integral`) to `out`:
 /// `columns * rows * CHANNELS` values each. `cells` has the last one's cells then.
@@ -20,26 +42,26 @@ pub(crate) fn describe_simd<S: Simd, A: Iterator<Item = Rect>>(
     cells: &mut HogCells,
     integral: &IntegralChannels,
     areas: A,
-    ((columns, rows), chroma_weight): ((usize, usize), f64),
+    layout: Layout,
     out: &mut [f32],
 ) {
-    cells.resize(columns, rows);
-    cells.chroma_weight = chroma_weight as f32;
-    let vectors = out.chunks_exact_mut(columns * rows * CHANNELS);
+    cells.resize(layout.columns, layout.rows);
+    let vectors = out.chunks_exact_mut(layout.columns * layout.rows * CHANNELS);
     for (area, vector) in areas.zip(vectors) {
         cells.sum(simd, integral, &area);
-        cells.normalize(simd, vector);
+        cells.normalize(simd, layout.chroma_weight, vector);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::features::channels::{CHROMA, DIRECTIONS, GRAY, GRAY_WEIGHT, HALF_CHROMA};
-    use crate::tracker::features::hog_cells::{MAX_DIRECTION, MIN_STRENGTH};
+    use crate::tracker::features::hog::cells::{MAX_DIRECTION, MIN_STRENGTH};
+    use crate::tracker::features::hog::channels::{
+        CHROMA, DIRECTIONS, GRAY, GRAY_WEIGHT, HALF_CHROMA,
+    };
     use crate::tracker::image::frame::Frame;
     use crate::tracker::params::presets::Preset;
-    use crate::tracker::params::table::Params;
 
     fn frame() -> Frame {
         let luma = (0..60 * 50).map(|i| ((i * i / 7 + i) % 251) as u8);
@@ -122,11 +144,9 @@ mod tests {
         let mut integral = IntegralChannels::default();
         let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
         integral.compute(frame, &Rect::new(0.0, 0.0, width, height), (4.0, 4.0));
-        let size = (params.patch_width as usize, params.patch_height as usize);
         let mut out = vec![1.0; params.feature_len()];
-        let areas = std::iter::once(area);
-        let size = (size, params.chroma_weight);
-        describe(&mut HogCells::default(), &integral, areas, size, &mut out);
+        let (areas, layout) = (std::iter::once(area), Layout::of(params));
+        describe(&mut HogCells::default(), &integral, areas, layout, &mut out);
         out
     }
 

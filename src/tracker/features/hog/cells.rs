@@ -2,12 +2,12 @@
 
 use pulp::Simd;
 
-use crate::tracker::features::block_norm::BlockNorm;
-use crate::tracker::features::channels::{
+use crate::tracker::features::hog::block_norm::BlockNorm;
+use crate::tracker::features::hog::channels::{
     CHANNELS, CHROMA, GRAY, GRAY_WEIGHT, LANES, Lanes, registers,
 };
-use crate::tracker::features::integral::IntegralChannels;
-use crate::tracker::features::sample_coords::SampleCoords;
+use crate::tracker::features::hog::integral::IntegralChannels;
+use crate::tracker::features::hog::sample_coords::SampleCoords;
 use crate::tracker::image::rect::Rect;
 
 /// The largest normalised value of a direction, so that one strong edge does not outweigh everything else.
@@ -45,8 +45,6 @@ pub(crate) struct HogCells {
     gray_squares: f32,
     /// The area of a cell, in pixels.
     cell_area: f32,
-    /// The weight of the mean chroma of a cell.
-    pub chroma_weight: f32,
     /// The edges of the cells in the integral image.
     x_edges: SampleCoords,
     y_edges: SampleCoords,
@@ -174,9 +172,9 @@ impl HogCells {
         }
     }
 
-    /// Writes the feature vector of the cells to `out`.
+    /// Writes the feature vector of the cells to `out`, their mean chroma times `chroma_weight`.
     #[inline(always)]
-    pub fn normalize<S: Simd>(&mut self, simd: S, out: &mut [f32]) {
+    pub fn normalize<S: Simd>(&mut self, simd: S, chroma_weight: f32, out: &mut [f32]) {
         let (count, cell_area) = (self.cells.len() as f32, self.cell_area);
         let mean = self.gray_sum / count;
         let variance = (self.gray_squares / count - mean * mean).max(0.0);
@@ -185,7 +183,7 @@ impl HogCells {
         // A value is min(cell * factor + offset, limit).
         let mut own_factors = Lanes::single(GRAY, gray_scale);
         for channel in CHROMA {
-            own_factors.0[channel] = self.chroma_weight / cell_area;
+            own_factors.0[channel] = chroma_weight / cell_area;
         }
         let offsets = Lanes::single(GRAY, -mean * gray_scale);
         let (own_factors, offsets) = (own_factors.load::<S>(), offsets.load::<S>());

@@ -4,8 +4,8 @@
 
 use pulp::Simd;
 
-use crate::tracker::features::channels::{CHROMA, DIRECTIONS, GRAY, LANES, Lanes, registers};
-use crate::tracker::features::gradient::GradientRow;
+use crate::tracker::features::hog::channels::{CHROMA, DIRECTIONS, GRAY, LANES, Lanes, registers};
+use crate::tracker::features::hog::gradient::GradientRow;
 
 /// The share of a gradient at `bin` that goes to a channel is max(0, slope · |bin - center| + top). That is a triangle
 /// around the channel's own direction. The first direction is both 0 and 180 degrees: its share grows with the distance

@@ -1,6 +1,6 @@
 //! Evenly spaced coordinates along one axis of the integral image, found 16 at a time and without branches.
 
-use crate::tracker::features::channels::LANES;
+use crate::tracker::features::hog::channels::LANES;
 
 /// A coordinate: the corner before it, and its distance from that corner, 0 to 1.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::tracker::features::channels::{DIRECTIONS, HALF_CHROMA};
+use crate::tracker::features::hog::channels::{DIRECTIONS, HALF_CHROMA};
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::plane::Plane;
 use crate::tracker::image::ycbcr::NEUTRAL;

@@ -1,24 +1,24 @@
 //! The integral image of the gradient histogram's channels, over a window of a frame.
 //!
-//! Each pixel's gradient strength goes to its direction's channels ([`binning`](crate::tracker::features::binning)),
+//! Each pixel's gradient strength goes to its direction's channels ([`binning`](crate::tracker::features::hog::binning)),
 //! and its gray value to a channel beside them. Cells of hundreds of overlapping candidates are sums over the same
 //! pixels. So the channels are summed once a frame, and the sum over a cell is four look-ups. Look-ups between corners
 //! are interpolated: cells of a small target are a few pixels wide, and rounding them would shift the target.
 //!
-//! Sums are single-precision numbers, which hold every whole number up to 2^24 = 16.8 million. A window has at most
-//! 320 x 320 pixels. Gray values are summed minus the window's mean, so no sum is above 7 million, and every sum at a
-//! corner is exact. Strengths are at most 361 a pixel: 37 million, where neighbouring numbers are 4 apart. That takes
-//! stripes of full contrast over the whole window, and a cell of these is then off by less than 1 %. White noise
-//! reaches 2 million in a direction.
+//! Sums are single-precision numbers, which hold every whole number up to 2^24 = 16.8 million. Gray values are summed
+//! minus the window's mean, so sums pass that only in windows of more than 130,000 pixels, half of them black and half
+//! white. The largest window is the first frame's: 1280 x 1280 pixels. There sums reach 104 million of gray, and 418
+//! million of strengths in stripes of full contrast, where neighbouring numbers are 8 and 32 apart: a cell is off by
+//! less than 2 % of its largest value, as the tests measure.
 
 use std::ops::Range;
 
 use pulp::{Arch, Simd};
 
-use crate::tracker::features::binning::sum_row;
-use crate::tracker::features::channels::{LANES, Lanes, Registers, registers};
-use crate::tracker::features::gradient::GradientRow;
-use crate::tracker::features::sample_coords::{SampleCoord, SampleCoords};
+use crate::tracker::features::hog::binning::sum_row;
+use crate::tracker::features::hog::channels::{LANES, Lanes, Registers, registers};
+use crate::tracker::features::hog::gradient::GradientRow;
+use crate::tracker::features::hog::sample_coords::{SampleCoord, SampleCoords};
 use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 
@@ -185,7 +185,7 @@ impl IntegralRow<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::features::channels::{DIRECTIONS, GRAY};
+    use crate::tracker::features::hog::channels::{DIRECTIONS, GRAY};
 
     #[test]
     fn sums_are_those_of_the_pixels_above_and_left() {
@@ -232,29 +232,57 @@ mod tests {
         }
     }
 
-    /// The strengths of one direction pass 2^24 here.
-    #[test]
-    fn cells_of_stripes_over_the_whole_frame_stay_within_a_percent() {
-        let stripes = (0..320 * 320).map(|i| if i % 320 % 4 < 2 { 0 } else { 255 });
-        let frame = Frame::from_luma(320, 320, stripes.collect());
+    /// The cell of 6.5 x 6.5 pixels at (`x`, `y`) in a frame of `side` x `side` pixels, and the sum at its last corner.
+    fn cell(
+        side: usize,
+        luma: impl Fn(usize, usize) -> u8,
+        x: f32,
+        y: f32,
+    ) -> [Registers<pulp::Scalar>; 2] {
+        let luma = (0..side * side).map(|i| luma(i % side, i / side));
+        let frame = Frame::from_luma(side as u32, side as u32, luma.collect());
         let frame = frame.expect("a frame of this size");
         let mut sums = IntegralChannels::default();
-        sums.compute(&frame, &Rect::new(0.0, 0.0, 320.0, 320.0), (4.0, 4.0));
+        let window = Rect::new(0.0, 0.0, side as f64, side as f64);
+        sums.compute(&frame, &window, (4.0, 4.0));
         let (mut rows, mut columns) = (SampleCoords::default(), SampleCoords::default());
         rows.resize(2);
         columns.resize(2);
-        for edge in [260.2, 271.3, 305.7] {
-            sums.y.locate(edge, 6.5, &mut rows);
-            sums.x.locate(edge, 6.5, &mut columns);
-            let corner =
-                |x: usize, y: usize| sums.row(rows.get(y)).at(pulp::Scalar, columns.get(x))[0];
-            assert!(corner(1, 1) > 2_f32.powi(24));
-            let found = (corner(1, 1) - corner(0, 1)) - (corner(1, 0) - corner(0, 0));
-            let expected = 255.0 * 6.5 * 6.5;
-            assert!(
-                (found - expected).abs() < 0.01 * expected,
-                "{found} {expected}"
-            );
+        sums.y.locate(y, 6.5, &mut rows);
+        sums.x.locate(x, 6.5, &mut columns);
+        let corner = |x: usize, y: usize| sums.row(rows.get(y)).at(pulp::Scalar, columns.get(x));
+        let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
+        let cell = std::array::from_fn(|i| (d[i] - c[i]) - (b[i] - a[i]));
+        [cell, d]
+    }
+
+    /// The strengths of one direction pass 2^24 here.
+    #[test]
+    fn cells_of_stripes_over_the_whole_frame_stay_within_two_percent() {
+        let stripes = |x: usize, _| if x % 4 < 2 { 0 } else { 255 };
+        for side in [320, 1280] {
+            for share in [0.82, 0.85, 0.96] {
+                let at = (side as f32 * share).floor() + 0.3;
+                let [cell, corner] = cell(side, stripes, at, at);
+                assert!(corner[0] > 2_f32.powi(24));
+                let expected = 255.0 * 6.5 * 6.5;
+                let off = (cell[0] - expected).abs();
+                assert!(off < 0.02 * expected, "{side}: {} {expected}", cell[0]);
+            }
+        }
+    }
+
+    /// Gray sums pass 2^24 here: the upper half is black, the lower half white.
+    #[test]
+    fn the_gray_of_cells_of_a_large_frame_stays_within_two_percent() {
+        let side = 1280;
+        let halves = |_, y: usize| if y < side / 2 { 0 } else { 255 };
+        for (y, gray) in [(600.3, 0.0), (1250.7, 255.0)] {
+            let [cell, corner] = cell(side, halves, 1260.2, y);
+            assert!(y > 1000.0 || corner[GRAY].abs() > 2_f32.powi(24));
+            let expected = (gray - 127.0) * 6.5 * 6.5;
+            let off = (cell[GRAY] - expected).abs();
+            assert!(off < 0.02 * 128.0 * 6.5 * 6.5, "{} {expected}", cell[GRAY]);
         }
     }
 }
