@@ -2,7 +2,7 @@
 
 mod tracker_scene;
 
-use bagtrack::tracker::{Estimate, Frame, LEAST_BOX_SIDE, Params, Rect, Tracker, TrackerError};
+use bagtrack::tracker::{Estimate, Frame, MIN_BOX_SIDE, Params, Rect, Tracker, TrackerError};
 use proptest::prelude::*;
 use tracker_scene::{flat, frame, params, robust, variants};
 
@@ -209,14 +209,14 @@ fn a_tiny_frame_with_the_largest_box() {
             .collect();
         let side = 4.0 * 4.0_f64.max(f64::from(width.max(height)));
         run_variants(&frames, Rect::centered(0.5, 0.5, side, side), 12);
-        run_variants(&frames, Rect::new(0.0, 0.0, side, LEAST_BOX_SIDE), 13);
+        run_variants(&frames, Rect::new(0.0, 0.0, side, MIN_BOX_SIDE), 13);
     }
 }
 
 #[test]
 fn the_smallest_box_and_what_is_below_it() {
     let frames: Vec<Frame> = (0..8).map(frame).collect();
-    let least = LEAST_BOX_SIDE;
+    let least = MIN_BOX_SIDE;
     run_variants(&frames, Rect::new(30.0, 30.0, least, least), 10);
     let refused = |target| match Tracker::new(&frames[0], target, params(10)) {
         Err(TrackerError::Target(why)) => why,

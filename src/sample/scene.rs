@@ -18,7 +18,7 @@ pub enum Scene {
 
 impl Scene {
     /// The least number of frames: the target must be in full sight before and after.
-    pub fn least_frames(self) -> u32 {
+    pub fn min_frames(self) -> u32 {
         match self {
             Scene::Default => 1,
             Scene::Covered | Scene::Leaves => 90,

@@ -13,7 +13,7 @@ pub const MAX_SIDE: u32 = 4096;
 pub struct Settings {
     /// What happens.
     pub scene: Scene,
-    /// Number of frames, [`Scene::least_frames`] or more.
+    /// Number of frames, [`Scene::min_frames`] or more.
     pub frames: u32,
     /// Width of a frame in pixels, [`MIN_SIDE`] to [`MAX_SIDE`].
     pub width: u32,
@@ -45,7 +45,7 @@ impl Settings {
                 expected,
             })
         };
-        let least = self.scene.least_frames();
+        let least = self.scene.min_frames();
         if self.frames < least {
             let expected = format!("{least} or more in this scene");
             return out_of_range("frames", self.frames, expected);

@@ -39,6 +39,13 @@ fn center_simd<S: Simd>(
     }
 }
 
+/// The frame rotated about a particle, and its channels.
+#[derive(Debug, Default)]
+pub(crate) struct RotatedView {
+    pub image: Frame,
+    pub extractor: Extractor,
+}
+
 /// The particles of a frame, and all that is computed of them.
 #[derive(Debug, Default)]
 pub(crate) struct Candidates {
@@ -153,36 +160,53 @@ impl Candidates {
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
     /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
     pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
-        let mut weights = std::mem::take(&mut self.weights);
-        weights.clear();
-        weights.extend_from_slice(log_priors);
-        self.weigh_from(0, params.sigma, params, &mut weights);
-        self.weights = weights;
+        self.weights.clear();
+        self.weights.extend_from_slice(log_priors);
+        let (likelihoods, scores) = (&mut self.likelihoods, &self.samples.scores);
+        let weights = &mut self.weights;
+        weigh(
+            likelihoods,
+            &self.distances,
+            scores,
+            params.sigma,
+            params,
+            weights,
+        );
         likelihood::arg_max(&self.weights)
     }
 
-    /// The same for the particles from `first` on, with another σ: `weights` are their logarithmic priors, and become
-    /// their weights.
-    pub fn weigh_from(&mut self, first: usize, sigma: f64, params: &Params, weights: &mut [f64]) {
-        // Without a discriminant there are no scores.
-        if let Some(scores @ [_, ..]) = self.samples.scores.get(first..) {
-            let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            for (weight, score) in weights.iter_mut().zip(scores) {
-                *weight += params.discriminant_weight * f64::from(score - max);
-            }
+    /// The weights of one particle in several `views` of the frame, with these logarithmic priors and this σ. The
+    /// particles of the frame stay as they are.
+    pub fn weigh_views<const N: usize>(
+        &mut self,
+        particle: Particle,
+        views: &mut [RotatedView; N],
+        log_priors: [f64; N],
+        sigma: f64,
+        state: &State,
+    ) -> [f64; N] {
+        let (first, entries) = (self.particles.len(), self.entries());
+        for view in views {
+            self.particles.push(particle);
+            self.describe_and_compare(&view.image, &mut view.extractor, state);
         }
-        let pinned = (params.pinned_entries(), params.pinned_weight);
-        let distances = &self.distances[first * self.entries()..];
-        likelihood::weigh(&mut self.likelihoods, distances, sigma, pinned, weights);
-    }
-
-    /// Forgets all particles but the first `count`.
-    pub fn truncate(&mut self, count: usize) {
-        let entries = self.entries();
-        self.particles.truncate(count);
-        self.squares.truncate(count);
-        self.distances.truncate(count * entries);
-        self.samples.truncate(count);
+        let mut weights = log_priors;
+        let distances = &self.distances[first * entries..];
+        let scores = self.samples.scores.get(first..).unwrap_or_default();
+        let likelihoods = &mut self.likelihoods;
+        weigh(
+            likelihoods,
+            distances,
+            scores,
+            sigma,
+            &state.params,
+            &mut weights,
+        );
+        self.particles.truncate(first);
+        self.squares.truncate(first);
+        self.distances.truncate(first * entries);
+        self.samples.truncate(first);
+        weights
     }
 
     /// The distances of particle `index` to the entries of the bag.
@@ -190,15 +214,21 @@ impl Candidates {
         &self.distances[index * self.entries()..][..self.entries()]
     }
 
-    /// What particle `index` says of itself; the running mean is that of the distance to the first entry.
-    pub fn evidence(&self, index: usize, mean_first_distance: f64) -> Evidence {
+    /// The discriminant's score of particle `index`; none without a discriminant.
+    pub fn score_of(&self, index: usize) -> Option<f32> {
+        self.samples.scores.get(index).copied()
+    }
+
+    /// What particle `index` says of an answer of this scale; the running mean is that of the distance to the first
+    /// entry.
+    pub fn evidence(&self, index: usize, mean_first_distance: f64, scale: f64) -> Evidence {
         let distances = self.distances_of(index);
         Evidence {
             first_distance: distances[0],
             mean_first_distance,
             nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
-            discriminant: self.samples.scores.get(index).copied(),
-            scale: self.particles[index].scale,
+            discriminant: self.score_of(index),
+            scale,
         }
     }
 
@@ -206,4 +236,22 @@ impl Candidates {
     fn entries(&self) -> usize {
         self.distances.len() / self.squares.len()
     }
+}
+
+/// Turns `weights`, which are logarithmic priors, into the weights of particles with these distances to the bag's
+/// entries and these scores of the discriminant; there are no scores without one.
+fn weigh(
+    likelihoods: &mut Likelihoods,
+    distances: &[f64],
+    scores: &[f32],
+    sigma: f64,
+    params: &Params,
+    weights: &mut [f64],
+) {
+    let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    for (weight, score) in weights.iter_mut().zip(scores) {
+        *weight += params.discriminant_weight * f64::from(score - max);
+    }
+    let pinned = (params.pinned_entries(), params.pinned_weight);
+    likelihood::weigh(likelihoods, distances, sigma, pinned, weights);
 }

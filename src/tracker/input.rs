@@ -5,7 +5,7 @@ use crate::tracker::image::frame::Frame;
 use crate::tracker::image::rect::Rect;
 
 /// The shortest side of a box, in pixels of the uploaded frame.
-pub const LEAST_BOX_SIDE: f64 = 4.0;
+pub const MIN_BOX_SIDE: f64 = 4.0;
 
 /// From pixels of an upload of size `source` to those of its working image of size `working`, along x and along y.
 pub(crate) fn to_working(source: (u32, u32), working: (u32, u32)) -> (f64, f64) {
@@ -15,7 +15,7 @@ pub(crate) fn to_working(source: (u32, u32), working: (u32, u32)) -> (f64, f64) 
     )
 }
 
-/// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`LEAST_BOX_SIDE`] on each
+/// Checks a box given in the pixels of an uploaded frame of size `source`: finite, at least [`MIN_BOX_SIDE`] on each
 /// side and at least one pixel of the working image of size `working`, at most four times as large as the frame, and on
 /// the frame with at least one pixel of its length and height.
 pub(crate) fn check_target(
@@ -28,7 +28,7 @@ pub(crate) fn check_target(
     if !values.iter().all(|value| value.is_finite()) {
         return refuse("is not finite");
     }
-    if target.width < LEAST_BOX_SIDE || target.height < LEAST_BOX_SIDE {
+    if target.width < MIN_BOX_SIDE || target.height < MIN_BOX_SIDE {
         return refuse("is too small: each side must be at least 4 pixels");
     }
     let (horizontal, vertical) = to_working(source, working);
@@ -41,12 +41,10 @@ pub(crate) fn check_target(
     if target.width > limit || target.height > limit {
         return refuse("is too large: no side may be over four times the frame's longer side");
     }
-    // Neither pixel nor box is narrower than this.
-    let touch = 1.0_f64;
     let (width, height) = (f64::from(source.0), f64::from(source.1));
     let across = (target.x + target.width).min(width) - target.x.max(0.0);
     let down = (target.y + target.height).min(height) - target.y.max(0.0);
-    if across < touch || down < touch {
+    if across < 1.0 || down < 1.0 {
         return refuse("is outside the frame: at least one pixel of it must be inside");
     }
     Ok(())
@@ -54,7 +52,7 @@ pub(crate) fn check_target(
 
 /// The longest side of a box, in pixels of uploaded frames of size `source`: four times the frame's longer side.
 pub(crate) fn max_box_side(source: (u32, u32)) -> f64 {
-    4.0 * f64::from(source.0.max(source.1)).max(LEAST_BOX_SIDE)
+    4.0 * f64::from(source.0.max(source.1)).max(MIN_BOX_SIDE)
 }
 
 /// Checks that `frame` has the size of the session's frames.

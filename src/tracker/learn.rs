@@ -12,13 +12,14 @@ use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::random::{self, Draws};
+use crate::tracker::observe::Views;
 use crate::tracker::scale::{dsst, maximum, pyramid};
 use crate::tracker::state::State;
-use crate::tracker::workspace::Workspace;
+use crate::tracker::workspace::{Learning, Scratch};
 
 /// Where the target was found in frame `number`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Found {
+pub(crate) struct Localization {
     pub number: u64,
     /// In the frame.
     pub answer: Particle,
@@ -30,11 +31,11 @@ pub(crate) struct Found {
 
 impl State {
     /// Keeps what the next frame starts from.
-    pub fn remember(&mut self, found: &Found, is_lost: bool, workspace: &Workspace) {
+    pub fn remember(&mut self, found: &Localization, is_lost: bool, scratch: &Scratch) {
         self.answer = found.answer;
         if self.params.stored_particles() > 0 {
-            self.particles.clone_from(&workspace.candidates.particles);
-            self.weights.clone_from(&workspace.candidates.weights);
+            self.particles.clone_from(&scratch.candidates.particles);
+            self.weights.clone_from(&scratch.candidates.weights);
         }
         if is_lost {
             self.frames_lost = self.frames_lost.saturating_add(1);
@@ -42,47 +43,40 @@ impl State {
             self.orientation = 0.0;
         } else {
             self.frames_lost = 0;
-            self.record_seen(workspace);
+            self.record_seen(scratch);
         }
     }
 
     /// Records that the target is at the answer in the frame that the change test has loaded.
-    pub fn record_seen(&mut self, workspace: &Workspace) {
+    pub fn record_seen(&mut self, scratch: &Scratch) {
         if self.params.static_penalty > 0.0 {
             self.last_seen
-                .record(self.answer, &workspace.change_test.image);
+                .record(self.answer, &scratch.change_test.image);
         }
     }
 
-    /// Updates all models from a frame in which the target was found: `image` is its rectified view.
-    pub fn learn(
-        &mut self,
-        original: &Frame,
-        image: &Frame,
-        found: &Found,
-        workspace: &mut Workspace,
-    ) {
+    /// Updates all models from a frame in which the target was found.
+    pub fn learn(&mut self, views: &Views<'_>, found: &Localization, scratch: &mut Scratch) {
+        let image = views.rectified;
         let at = &found.rectified;
-        self.orientation = self.measure_orientation(original, found, workspace);
-        self.learn_discriminant(at, workspace);
-        self.learn_color(image, at, workspace);
-        self.learn_scale(image, at, workspace);
+        self.orientation = self.measure_orientation(views.original, found, scratch);
+        self.learn_discriminant(at, scratch);
+        self.learn_color(image, at, scratch);
+        self.learn_scale(image, at, scratch);
         let samples = Background::wanted(found.number, &self.params);
         if samples > 0 {
             let mut draws = random::generator(self.params.seed, found.number, Draws::Samples);
-            let areas = &mut workspace.learning.areas;
+            let areas = &mut scratch.learning.areas;
             background::areas(at, &self.bounds, samples, &mut draws, areas);
-            self.learn_background(image, workspace);
-            let bag = &mut workspace.learning.bag;
+            self.learn_background(image, scratch);
+            let bag = &mut scratch.learning.bag;
             self.bag.rebuild(&self.background, &self.params, bag);
         }
-        self.describe_at(image, at, workspace);
-        let learning = &mut workspace.learning;
-        let features = &mut learning.features;
+        let Learning { features, bag, .. } = &mut scratch.learning;
+        self.describe_at(image, at, &mut scratch.extractor, features);
         if Bag::admits(found.number, &self.params) {
             // V: the answer and the previous frames (equation 2).
             self.history.append_to(features, &self.params);
-            let bag = &mut learning.bag;
             self.bag
                 .admit(features, &self.background, &self.params, bag);
         }
@@ -93,38 +87,32 @@ impl State {
     fn measure_orientation(
         &self,
         original: &Frame,
-        found: &Found,
-        workspace: &mut Workspace,
+        found: &Localization,
+        scratch: &mut Scratch,
     ) -> f64 {
         let tried = orientation::hypotheses(self.orientation, found.distance, &self.params);
         let Some(tried) = tried else {
             return self.orientation;
         };
-        let (candidates, rotated) = (&mut workspace.candidates, &mut workspace.rotated);
         let (answer, bounds, params) = (found.answer, &self.bounds, &self.params);
         let window = Extractor::window(&[answer], 0.0, bounds, params);
-        let first = candidates.particles.len();
-        for (angle, _) in tried {
-            let scratch = std::mem::take(&mut rotated.frame);
+        for (view, (angle, _)) in scratch.rotated.iter_mut().zip(tried) {
             let rotation = Rotation::about((answer.x, answer.y), angle);
-            let image = rotation.apply(original, &window, scratch);
-            let extractor = &mut rotated.extractor;
-            extractor.compute_channels(&image, &[answer], 0.0, bounds, params);
-            candidates.particles.push(answer);
-            candidates.describe_and_compare(&image, extractor, self);
-            rotated.frame = image;
+            view.image = rotation.apply(original, &window, std::mem::take(&mut view.image));
+            view.extractor
+                .compute_channels(&view.image, &[answer], 0.0, bounds, params);
         }
-        let mut weights = tried.map(|(_, log_prior)| log_prior);
+        let (views, log_priors) = (&mut scratch.rotated, tried.map(|(_, log_prior)| log_prior));
         let sigma = orientation::SIGMA_FACTOR * params.sigma;
-        candidates.weigh_from(first, sigma, params, &mut weights);
-        candidates.truncate(first);
+        let candidates = &mut scratch.candidates;
+        let weights = candidates.weigh_views(answer, views, log_priors, sigma, self);
         orientation::updated(self.orientation, weights)
     }
 
     /// Fits the discriminant to the frame's particles, labelled by their distance from `at`.
-    fn learn_discriminant(&mut self, at: &Particle, workspace: &mut Workspace) {
+    fn learn_discriminant(&mut self, at: &Particle, scratch: &mut Scratch) {
         if self.discriminant.is_on() {
-            let (candidates, fit) = (&workspace.candidates, &mut workspace.learning.fit);
+            let (candidates, fit) = (&scratch.candidates, &mut scratch.learning.fit);
             labels::label_all(&candidates.particles, at, &self.bounds, &mut fit.labels);
             self.discriminant
                 .learn(&candidates.samples, candidates.vectors(), fit);
@@ -132,31 +120,26 @@ impl State {
     }
 
     /// Updates the colour histograms with the box `at`.
-    pub fn learn_color(&mut self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
+    pub fn learn_color(&mut self, image: &Frame, at: &Particle, scratch: &mut Scratch) {
         if self.params.histogram_weight > 0.0 {
             let pixels = ColorPixels::of(image, self.format.has_color);
-            let scratch = &mut workspace.learning.color;
-            self.color.learn(pixels, at, &self.bounds, scratch);
+            let memory = &mut scratch.learning.color;
+            self.color.learn(pixels, at, &self.bounds, memory);
         }
     }
 
     /// Updates the scale filter with the pyramid around `at`.
-    pub fn learn_scale(&mut self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
+    pub fn learn_scale(&mut self, image: &Frame, at: &Particle, scratch: &mut Scratch) {
         let rate = self.params.scale_learning_rate;
         if rate > 0.0 {
-            self.describe_pyramid(image, at, workspace);
-            let pyramid = &mut workspace.learning.pyramid;
+            self.describe_pyramid(image, at, scratch);
+            let pyramid = &mut scratch.learning.pyramid;
             dsst::learn(&mut self.scale_filter, pyramid, rate);
         }
     }
 
     /// `found` with the scale that the filter measures there, against the last answer's; clamped.
-    pub fn measure_scale(
-        &self,
-        image: &Frame,
-        found: Particle,
-        workspace: &mut Workspace,
-    ) -> Particle {
+    pub fn measure_scale(&self, image: &Frame, found: Particle, scratch: &mut Scratch) -> Particle {
         if !self.scale_filter.has_learned() {
             return self.bounds.clamp(found);
         }
@@ -167,8 +150,8 @@ impl State {
         };
         let scale = found.scale * (self.answer.scale / found.scale).powf(reliance);
         let center = Particle { scale, ..found };
-        self.describe_pyramid(image, &center, workspace);
-        let found_at = self.scale_filter.find(&mut workspace.learning.pyramid);
+        self.describe_pyramid(image, &center, scratch);
+        let found_at = self.scale_filter.find(&mut scratch.learning.pyramid);
         self.bounds.clamp(Particle {
             scale: scale
                 * (maximum::reliance(self.bounds.side(&center)) * found_at.gated_change()).exp(),
@@ -177,33 +160,36 @@ impl State {
     }
 
     /// The feature vectors of the pyramid around `center`.
-    fn describe_pyramid(&self, image: &Frame, center: &Particle, workspace: &mut Workspace) {
+    fn describe_pyramid(&self, image: &Frame, center: &Particle, scratch: &mut Scratch) {
         let pyramid::Scratch {
             areas, features, ..
-        } = &mut workspace.learning.pyramid;
+        } = &mut scratch.learning.pyramid;
         pyramid::areas(center, areas);
         let params = pyramid::params(&self.params);
-        workspace
+        scratch
             .extractor
             .features(image, areas, &self.bounds, &params, features);
     }
 
-    /// Replaces samples of the background by those of the areas in the workspace.
-    pub fn learn_background(&mut self, image: &Frame, workspace: &mut Workspace) {
-        let learning = &mut workspace.learning;
+    /// Replaces samples of the background by those of the areas in `scratch`.
+    pub fn learn_background(&mut self, image: &Frame, scratch: &mut Scratch) {
+        let learning = &mut scratch.learning;
         let (areas, features) = (&learning.areas, &mut learning.features);
-        workspace
+        scratch
             .extractor
             .features(image, areas, &self.bounds, &self.params, features);
         self.background
             .rebuild(features, &self.params, &mut learning.background);
     }
 
-    /// The feature vector of what is at `at`, as the only one in the workspace.
-    pub fn describe_at(&self, image: &Frame, at: &Particle, workspace: &mut Workspace) {
-        let features = &mut workspace.learning.features;
-        workspace
-            .extractor
-            .features(image, &[*at], &self.bounds, &self.params, features);
+    /// Makes `features` the feature vector of what is at `at`.
+    pub fn describe_at(
+        &self,
+        image: &Frame,
+        at: &Particle,
+        extractor: &mut Extractor,
+        features: &mut Vec<f32>,
+    ) {
+        extractor.features(image, &[*at], &self.bounds, &self.params, features);
     }
 }

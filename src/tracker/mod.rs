@@ -51,6 +51,7 @@ mod grassmann;
 mod hypotheses;
 mod image;
 mod input;
+mod judge;
 mod learn;
 mod linalg;
 mod motion;
@@ -79,7 +80,7 @@ pub use image::rect::Rect;
 pub use image::resolution::{MAX_WORKING_SIDE, MIN_WORKING_SIDE};
 #[cfg(feature = "ingest")]
 pub(crate) use image::{area_average::area_average, ycbcr};
-pub use input::LEAST_BOX_SIDE;
+pub use input::MIN_BOX_SIDE;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
 pub use seen::Seen;

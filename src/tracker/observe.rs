@@ -1,83 +1,112 @@
 //! What is seen of a frame: the displacement of the image, where the target is searched, and in which pixels.
 
-use std::borrow::Cow;
-
 use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::downsample::downsampled;
 use crate::tracker::image::frame::Frame;
-use crate::tracker::image::warp::Rotation;
-use crate::tracker::motion::particles::Particle;
+use crate::tracker::image::plane::Plane;
+use crate::tracker::motion::orientation;
 use crate::tracker::motion::search::SearchContext;
 use crate::tracker::state::State;
-use crate::tracker::workspace::Workspace;
+use crate::tracker::workspace::Scratch;
+
+/// The views of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Views<'a> {
+    /// The frame, in larger pixels where the target is large.
+    pub original: &'a Frame,
+    /// The same with a rotated target upright, within the window of the search.
+    pub rectified: &'a Frame,
+}
+
+/// The memory of the views that are not the frame itself.
+#[derive(Debug, Default)]
+pub(crate) struct ViewBuffers {
+    downsampled: Frame,
+    rectified: Frame,
+}
+
+impl ViewBuffers {
+    /// Reserves the memory of a rectified view of `frame`, so that the first rotation does not allocate.
+    pub fn reserve_rectified(&mut self, frame: &Frame) {
+        let memory = std::mem::take(&mut self.rectified);
+        self.rectified = frame.map_planes(memory, |plane, mut pixels| {
+            pixels.resize(plane.pixels.len(), 0);
+            Plane::new(plane.size(), pixels, plane.pixel_side)
+        });
+    }
+}
 
 impl State {
     /// The displacement of the whole image since the last frame, in working pixels.
-    pub fn displacement(&mut self, frame: &Frame, workspace: &mut Workspace) -> (f64, f64) {
+    pub fn displacement(&mut self, frame: &Frame, scratch: &mut Scratch) -> (f64, f64) {
         match &mut self.global_motion {
-            Some(profiles) => profiles.displacement(frame, &mut workspace.global_motion),
+            Some(profiles) => profiles.displacement(frame, &mut scratch.global_motion),
             None => (0.0, 0.0),
         }
     }
 
-    /// The search in an image displaced by so much, in the view that `rotation` makes.
-    pub fn search(
-        &self,
-        displacement: (f64, f64),
-        rotation: Option<&Rotation>,
-    ) -> SearchContext<'_> {
+    /// The search in frame `number`, whose image is displaced by so much.
+    pub fn search(&self, number: u64, displacement: (f64, f64)) -> SearchContext<'_> {
+        let rotation = orientation::rotation(&self.answer, self.orientation);
+        let samples_radius = match Background::wanted(number, &self.params) {
+            0 => 0.0,
+            _ => background::radius(&self.answer, &self.bounds),
+        };
         SearchContext {
             last: self.answer,
             displacement: rotation.map_or(displacement, |rotation| {
                 rotation.rotated_displacement(displacement)
             }),
+            rotation,
             spread: self.spread(),
+            samples_radius,
             params: &self.params,
             bounds: &self.bounds,
         }
     }
 
-    /// How far around the last answer frame `number` is looked at, in working pixels.
-    pub fn radius(&self, search: &SearchContext<'_>, number: u64) -> f64 {
-        let samples = match Background::wanted(number, &self.params) {
-            0 => 0.0,
-            _ => background::radius(&self.answer, &self.bounds),
+    /// The views of `frame` for this search.
+    pub fn views<'a>(
+        &self,
+        frame: &'a Frame,
+        search: &SearchContext<'_>,
+        buffers: &'a mut ViewBuffers,
+    ) -> Views<'a> {
+        let ViewBuffers {
+            downsampled,
+            rectified,
+        } = buffers;
+        let original = self.original(frame, downsampled);
+        let Some(rotation) = search.rotation else {
+            let rectified = original;
+            return Views {
+                original,
+                rectified,
+            };
         };
-        (search.radius() + samples).max(search.dense_radius())
-    }
-
-    /// `frame`, or the frame in larger pixels where the target is large. [`Workspace::give_back`] takes its memory
-    /// again; otherwise the next frame allocates.
-    pub fn view<'a>(&self, frame: &'a Frame, workspace: &mut Workspace) -> Cow<'a, Frame> {
-        match Extractor::downsample_factor(&self.answer, &self.bounds, &self.params) {
-            1 => Cow::Borrowed(frame),
-            factor => {
-                let scratch = std::mem::take(&mut workspace.downsampled);
-                Cow::Owned(downsampled(frame, factor, scratch))
-            }
+        let radius = search.window_radius();
+        let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
+        *rectified = rotation.apply(original, &window, std::mem::take(rectified));
+        Views {
+            original,
+            rectified,
         }
     }
 
-    /// `view` with a rotated target upright, within the window of the search.
-    pub fn rectified(
-        &self,
-        view: &Frame,
-        rotation: Option<&Rotation>,
-        radius: f64,
-        workspace: &mut Workspace,
-    ) -> Option<Frame> {
-        let rotation = rotation?;
-        let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
-        let scratch = std::mem::take(&mut workspace.rectified);
-        Some(rotation.apply(view, &window, scratch))
+    /// The views of `frame` with an upright target.
+    pub fn upright_view<'a>(&self, frame: &'a Frame, buffers: &'a mut ViewBuffers) -> &'a Frame {
+        self.original(frame, &mut buffers.downsampled)
     }
-}
 
-/// `particle` of the rotated image where it is in the frame.
-pub(crate) fn to_original(particle: Particle, rotation: Option<&Rotation>) -> Particle {
-    rotation.map_or(particle, |rotation| {
-        let (x, y) = rotation.to_original((particle.x, particle.y));
-        Particle { x, y, ..particle }
-    })
+    /// `frame`, or the frame in larger pixels where the target is large.
+    fn original<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
+        match Extractor::downsample_factor(&self.answer, &self.bounds, &self.params) {
+            1 => frame,
+            factor => {
+                *memory = downsampled(frame, factor, std::mem::take(memory));
+                memory
+            }
+        }
+    }
 }

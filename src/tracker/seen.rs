@@ -17,7 +17,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Of a step with these candidates.
+    /// What a step with these candidates saw.
     pub(crate) fn of(state: &State, candidates: &Candidates) -> Self {
         let boxes = candidates.particles.iter();
         let boxes = boxes.map(|particle| state.target_of(particle));

@@ -74,7 +74,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
 /// Computes what a snapshot does not carry.
 fn restore(state: &mut State) {
     workspace::with(|workspace| {
-        let learning = &mut workspace.learning;
+        let learning = &mut workspace.scratch.learning;
         let params = &state.params;
         background::learn(&mut state.background, params, &mut learning.background);
         state

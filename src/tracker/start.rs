@@ -22,7 +22,7 @@ use crate::tracker::motion::random::{self, Draws};
 use crate::tracker::params::table::Params;
 use crate::tracker::scale::dsst::ScaleFilter;
 use crate::tracker::state::State;
-use crate::tracker::workspace::Workspace;
+use crate::tracker::workspace::{Learning, Scratch, Workspace};
 
 /// The answer to a frame whose box came from the user.
 fn given(frame: u64, target: Rect) -> Estimate {
@@ -82,15 +82,21 @@ impl State {
 
     /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
     fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
+        let Workspace { views, scratch } = workspace;
+        views.reserve_rectified(frame);
+        let image = self.upright_view(frame, views);
         // All particles are there, with equal weights.
         let count = self.params.stored_particles();
         self.particles = vec![self.answer; count];
         self.weights = vec![1.0 / count.max(1) as f64; count];
         let profiles = || GlobalMotion::new(frame);
         self.global_motion = self.params.global_motion.then(profiles);
-        self.init_models(frame, given.frame, workspace);
-        let learning = &mut workspace.learning;
-        let (features, bag) = (&learning.features, &mut learning.bag);
+        scratch.change_test.load(frame, &self.answer, &self.bounds);
+        self.record_seen(scratch);
+        self.init_models(image, given.frame, scratch);
+        let Learning { features, bag, .. } = &mut scratch.learning;
+        self.describe_at(image, &self.answer, &mut scratch.extractor, features);
+        self.describe_augmented(image, &mut scratch.extractor, features);
         self.bag.rebuild(&self.background, &self.params, bag);
         self.history.clear();
         self.update_gate = UpdateGate::default();
@@ -100,82 +106,68 @@ impl State {
         self.estimate = given;
     }
 
-    /// Learns everything that a box given by the user says about the surroundings, and describes the box and its
-    /// augmented views.
-    fn init_models(&mut self, frame: &Frame, number: u64, workspace: &mut Workspace) {
-        let (bounds, answer) = (&self.bounds, &self.answer);
-        workspace.change_test.load(frame, answer, bounds);
-        self.record_seen(workspace);
-        let everywhere = f64::from(frame.width().max(frame.height())) * 2.0;
-        workspace.reserve_rectified(frame);
-        let view = self.view(frame, workspace);
-        let (image, answer) = (&*view, self.answer);
-        workspace.extractor.compute_channels(
-            image,
-            &[answer],
-            everywhere,
-            &self.bounds,
-            &self.params,
-        );
+    /// Fits the models of the target against its surroundings to a box that the user gave, in frame `number`.
+    fn init_models(&mut self, image: &Frame, number: u64, scratch: &mut Scratch) {
+        let (answer, bounds) = (self.answer, &self.bounds);
+        let everywhere = 2.0 * bounds.frame_width.max(bounds.frame_height);
+        scratch
+            .extractor
+            .compute_channels(image, &[answer], everywhere, bounds, &self.params);
         let mut draws = random::generator(self.params.seed, number, Draws::Samples);
         let samples = self.params.metric_samples();
         if samples > 0 {
-            let areas = &mut workspace.learning.areas;
+            let areas = &mut scratch.learning.areas;
             background::areas(&answer, &self.bounds, samples, &mut draws, areas);
-            self.learn_background(image, workspace);
+            self.learn_background(image, scratch);
         }
         if self.params.discriminant_weight > 0.0 {
-            self.init_discriminant(image, &mut draws, workspace);
+            self.init_discriminant(image, &mut draws, scratch);
         }
-        self.color.forget();
-        self.learn_color(image, &answer, workspace);
-        self.scale_filter.forget();
-        self.learn_scale(image, &answer, workspace);
-        self.describe_at(image, &answer, workspace);
-        self.describe_augmented(image, workspace);
-        workspace.give_back(view, None);
+        self.color.reset();
+        self.learn_color(image, &answer, scratch);
+        self.scale_filter.reset();
+        self.learn_scale(image, &answer, scratch);
     }
 
-    /// Appends the feature vectors of the augmented views of the answer. The extractor has the channels of the last of
+    /// Appends the feature vectors of the augmented views of the answer to `features`. The extractor has the channels of the last of
     /// them then.
-    fn describe_augmented(&self, image: &Frame, workspace: &mut Workspace) {
+    fn describe_augmented(
+        &self,
+        image: &Frame,
+        extractor: &mut Extractor,
+        features: &mut Vec<f32>,
+    ) {
         let (answer, params) = ([self.answer], &self.params);
-        let (extractor, learning) = (&mut workspace.extractor, &mut workspace.learning);
         let window = Extractor::window(&answer, 0.0, &self.bounds, params);
         for angle in augmentation::angles(params) {
             let rotation = Rotation::about((self.answer.x, self.answer.y), angle);
             let rotated = rotation.apply(image, &window, Frame::default());
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
-            let first = learning.features.len();
-            learning.features.resize(first + params.feature_len(), 0.0);
-            let view = &mut learning.features[first..];
+            let first = features.len();
+            features.resize(first + params.feature_len(), 0.0);
+            let view = &mut features[first..];
             extractor.describe(&rotated, &answer, &self.bounds, params, view);
         }
     }
 
     /// Fits the discriminant to the target and to areas around it.
-    fn init_discriminant(
-        &mut self,
-        image: &Frame,
-        draws: &mut ChaCha8Rng,
-        workspace: &mut Workspace,
-    ) {
+    fn init_discriminant(&mut self, image: &Frame, draws: &mut ChaCha8Rng, scratch: &mut Scratch) {
         if !self.discriminant.is_on() {
             let mut origin = self.background.mean.clone();
             origin.resize(self.params.feature_len(), 0.0);
             self.discriminant = Discriminant::new(origin);
         }
-        let learning = &mut workspace.learning;
+        let learning = &mut scratch.learning;
         let (areas, features, fit) = (
             &mut learning.areas,
             &mut learning.features,
             &mut learning.fit,
         );
         labels::first_areas(&self.answer, &self.bounds, draws, areas);
-        workspace
+        scratch
             .extractor
             .features(image, areas, &self.bounds, &self.params, features);
-        let samples = &mut workspace.candidates.samples;
+        let samples = &mut scratch.candidates.samples;
         let Discriminant { weights, origin } = &self.discriminant;
         samples.begin(weights, origin, &[], areas.len());
         samples.score_vectors(features);

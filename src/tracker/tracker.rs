@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use crate::tracker::bag_view::BagEntry;
+use crate::tracker::candidates::Candidates;
 use crate::tracker::confidence::score::Evidence;
 use crate::tracker::error::TrackerError;
 use crate::tracker::estimate::Estimate;
@@ -28,9 +29,9 @@ impl Tracker {
     /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
     ///
     /// # Errors
-    /// A parameter out of its range; a frame that was reduced to less than [`Params::frame_format`]; a box that is not finite, has a side below
-    /// [`LEAST_BOX_SIDE`](crate::tracker::LEAST_BOX_SIDE) pixels (or below one pixel of the working image) or above
-    /// four times the frame's longer side, or lies outside the frame.
+    /// A parameter out of its range; a frame that was reduced to less than [`Params::frame_format`]; a box that is not
+    /// finite, has a side below [`MIN_BOX_SIDE`](crate::tracker::MIN_BOX_SIDE) pixels (or below one pixel of the
+    /// working image) or above four times the frame's longer side, or lies outside the frame.
     pub fn new(frame: &Frame, target: Rect, params: Params) -> Result<Self, TrackerError> {
         params.validate()?;
         let source = frame.source_size();
@@ -53,9 +54,7 @@ impl Tracker {
     /// A frame whose uploaded size is not that of the session's first frame, or that was reduced to less than
     /// [`frame_format`](Self::frame_format).
     pub fn step(&mut self, frame: &Frame) -> Result<Estimate, TrackerError> {
-        let frame = self.checked(frame)?;
-        let (estimate, evidence) = workspace::with(|workspace| self.state.step(&frame, workspace));
-        self.evidence = Some(evidence);
+        let (estimate, ()) = self.advance(frame, |_, _| ())?;
         Ok(estimate)
     }
 
@@ -64,10 +63,21 @@ impl Tracker {
     /// # Errors
     /// As for [`step`](Self::step).
     pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
-        let estimate = self.step(frame)?;
-        // This thread's workspace still has the candidates of the step.
-        let seen = workspace::with(|workspace| Seen::of(&self.state, &workspace.candidates));
-        Ok((estimate, seen))
+        self.advance(frame, Seen::of)
+    }
+
+    /// Steps, and has a look at the candidates of the step.
+    fn advance<T>(
+        &mut self,
+        frame: &Frame,
+        look: impl FnOnce(&State, &Candidates) -> T,
+    ) -> Result<(Estimate, T), TrackerError> {
+        let frame = self.checked(frame)?;
+        workspace::with(|workspace| {
+            let (estimate, evidence) = self.state.step(&frame, workspace);
+            self.evidence = Some(evidence);
+            Ok((estimate, look(&self.state, &workspace.scratch.candidates)))
+        })
     }
 
     /// The user corrects the box: `frame` counts as the next frame, with the answer given.

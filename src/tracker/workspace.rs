@@ -2,30 +2,35 @@
 //! many and threads few, so each thread has one workspace and sessions have none. A step that finds its thread's
 //! workspace warm allocates nothing.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
 
 use crate::tracker::appearance::foreground_map::ForegroundMap;
 use crate::tracker::appearance::{background, color_histogram, span};
-use crate::tracker::candidates::Candidates;
+use crate::tracker::candidates::{Candidates, RotatedView};
 use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
 use crate::tracker::features::extractor::Extractor;
-use crate::tracker::image::frame::Frame;
-use crate::tracker::image::plane::Plane;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
+use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
+use crate::tracker::observe::ViewBuffers;
 use crate::tracker::scale::pyramid;
 
-/// The scratch memory of one frame, room by room.
+/// The memory of one frame.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
+    /// What the frame is looked at in.
+    pub views: ViewBuffers,
+    /// What is computed from that.
+    pub scratch: Scratch,
+}
+
+/// What is computed of a frame, room by room.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
     /// The profiles of the present frame.
     pub global_motion: GlobalMotion,
-    /// The frame in larger pixels, and rotated.
-    pub downsampled: Frame,
-    pub rectified: Frame,
     pub extractor: Extractor,
     pub dense_search: DenseSearch,
     pub foreground: ForegroundMap,
@@ -38,7 +43,8 @@ pub(crate) struct Workspace {
     pub original: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
-    pub rotated: Rotated,
+    /// The frame at other angles of the target.
+    pub rotated: [RotatedView; orientation::HYPOTHESES],
 }
 
 /// What is learned from a frame, before it goes into the models.
@@ -52,34 +58,6 @@ pub(crate) struct Learning {
     pub color: color_histogram::Scratch,
     pub fit: ridge::Scratch,
     pub pyramid: pyramid::Scratch,
-}
-
-/// The answer in images that are rotated further.
-#[derive(Debug, Default)]
-pub(crate) struct Rotated {
-    pub extractor: Extractor,
-    pub frame: Frame,
-}
-
-impl Workspace {
-    /// Reserves the memory of a rectified view of `frame`, so that the first rotation does not allocate.
-    pub fn reserve_rectified(&mut self, frame: &Frame) {
-        let scratch = std::mem::take(&mut self.rectified);
-        self.rectified = frame.map_planes(scratch, |plane, mut pixels| {
-            pixels.resize(plane.pixels.len(), 0);
-            Plane::new(plane.size(), pixels, plane.pixel_side)
-        });
-    }
-
-    /// Takes back the memory of views.
-    pub fn give_back(&mut self, view: Cow<'_, Frame>, rectified: Option<Frame>) {
-        if let Cow::Owned(downsampled) = view {
-            self.downsampled = downsampled;
-        }
-        if let Some(rectified) = rectified {
-            self.rectified = rectified;
-        }
-    }
 }
 
 thread_local! {

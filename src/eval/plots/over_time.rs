@@ -13,7 +13,7 @@ const MOST: usize = 3;
 /// Annotated frames further apart than this are not joined by a line: the error between them is unknown.
 const LONGEST_GAP: f64 = 10.0;
 /// The least height of the plane in pixels of error: small errors should look small.
-const LEAST_HEIGHT: f64 = 40.0;
+const MIN_HEIGHT: f64 = 40.0;
 const SIZE: (u32, u32) = (860, 300);
 
 /// The centre errors of a frame over the seeds.
@@ -32,7 +32,7 @@ pub(super) fn figure(evaluated: &[Evaluated], index: usize) -> Drawn {
     let spreads: Vec<Vec<Spread>> = shown.iter().map(|v| spread(&v.runs[index])).collect();
     let medians = spreads.iter().flatten().map(|at| at.median);
     let band = spreads[0].iter().map(|at| at.most);
-    let highest = medians.chain(band).fold(LEAST_HEIGHT, f64::max);
+    let highest = medians.chain(band).fold(MIN_HEIGHT, f64::max);
     let seeds = sequence.seeds.len();
     let title = if seeds == 1 {
         format!("{}: centre error over time, 1 seed", sequence.name)

@@ -13,7 +13,7 @@ use std::thread::{self, JoinHandle};
 /// The kinds of uploads that are read: MP4, Matroska and WebM, GIF, JPEG files in a row.
 const FORMATS: &str = "mov,matroska,gif,mjpeg";
 /// More pictures than any video has.
-const MOST_PICTURES: usize = 1 << 30;
+const MAX_PICTURES: usize = 1 << 30;
 /// Most bytes of a line of what the program says.
 const MAX_SAID: usize = 200;
 
@@ -85,7 +85,7 @@ impl VideoDecoder {
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
         let pixels = limits.max_pixels.to_string();
-        let count = limits.max_pictures.min(MOST_PICTURES) + 1;
+        let count = limits.max_pictures.min(MAX_PICTURES) + 1;
         let count = count.to_string();
         let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
         let limit = ["-max_pixels", &pixels];

@@ -173,7 +173,7 @@ impl ColorHistogram {
     }
 
     /// Forgets everything.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         *self = Self::default();
     }
 

@@ -17,7 +17,7 @@ use crate::tracker::classifier::sliding_window::window_scores;
 use crate::tracker::features::extractor::{Extractor, Grid};
 use crate::tracker::linalg::scratch::clear_and_reserve;
 use crate::tracker::motion::particles::Particle;
-use crate::tracker::motion::search::{MAX_SLACK, SearchContext};
+use crate::tracker::motion::search::{MAX_PRIOR_WIDTH, SearchContext};
 use crate::tracker::params::table::{Features, Params};
 
 /// Multiplications of a dense search at most: as many as [`MAX_OFFSET`] takes with 8 x 8 cells.
@@ -92,7 +92,7 @@ fn weigh_simd<S: Simd>(
             let place = places.at(column, row);
             let color = foreground.mean(&place, place.scale, bounds);
             let prior =
-                search.log_prior(&place, MAX_SLACK) + search.params.histogram_weight * color;
+                search.log_prior(&place, MAX_PRIOR_WIDTH) + search.params.histogram_weight * color;
             *value = (weight * f64::from(*value) + prior) as f32;
         }
     }

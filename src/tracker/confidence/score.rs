@@ -34,10 +34,10 @@ const UNCERTAIN_BELOW: f64 = 0.5;
 const LOST_BELOW: f64 = 0.2;
 
 /// The share of the newest frame in the running mean.
-const RENEWAL: f64 = 0.05;
+const RATE: f64 = 0.05;
 
 /// The least mean distance: after still frames the first flicker must not count as a loss.
-const MIN_USUAL: f64 = 1e-3;
+const MIN_BASELINE: f64 = 1e-3;
 
 /// What the score of one frame is made of: the tracker's answer, measured by the tracker itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,16 +109,16 @@ pub(crate) struct DistanceBaseline {
 }
 
 impl DistanceBaseline {
-    /// The score in [0, 1] and the status of an answer; `lost` when the target is lost, `trusted` when the
-    /// frame may be learned from. The frame counts for those to come if it was tracked.
-    pub fn judge(&mut self, evidence: &Evidence, lost: bool, trusted: bool) -> (f32, Status) {
+    /// The score in [0, 1] and the status of an answer; `lost` when the target is lost, `near` when it is as
+    /// near the first subspace as the update gate asks for. The frame counts for those to come if it was tracked.
+    pub fn judge(&mut self, evidence: &Evidence, lost: bool, near: bool) -> (f32, Status) {
         let Some(predictors) = evidence.predictors() else {
             return self.judge_distance(evidence.nearest_distance);
         };
         let score = ScoreModel::TRACKER.score(&predictors, lost);
         let status = if lost {
             Status::Lost
-        } else if score < UNCERTAIN_BELOW || !trusted {
+        } else if score < UNCERTAIN_BELOW || !near {
             Status::Uncertain
         } else {
             Status::Tracking
@@ -127,8 +127,8 @@ impl DistanceBaseline {
     }
 
     fn judge_distance(&mut self, distance: f64) -> (f32, Status) {
-        let usual = self.distance.unwrap_or(distance).max(MIN_USUAL);
-        let ratio = distance / usual / HALF_RATIO;
+        let baseline = self.distance.unwrap_or(distance).max(MIN_BASELINE);
+        let ratio = distance / baseline / HALF_RATIO;
         let score = 1.0 / (1.0 + ratio * ratio);
         let status = if score < LOST_BELOW {
             Status::Lost
@@ -138,7 +138,7 @@ impl DistanceBaseline {
             Status::Tracking
         };
         if status == Status::Tracking {
-            self.distance = Some(usual + (distance - usual) * RENEWAL);
+            self.distance = Some(baseline + (distance - baseline) * RATE);
         }
         (score as f32, status)
     }
@@ -149,35 +149,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_score_falls_with_the_distance_and_the_usual_follows_only_tracked_frames() {
-        let mut usual = DistanceBaseline::default();
-        assert_eq!(usual.judge_distance(0.02), (0.9, Status::Tracking));
+    fn a_score_falls_with_the_distance_and_the_baseline_follows_only_tracked_frames() {
+        let mut baseline = DistanceBaseline::default();
+        assert_eq!(baseline.judge_distance(0.02), (0.9, Status::Tracking));
         let mut last = 1.0;
         for step in 0..40 {
-            let (score, _) = usual.clone().judge_distance(f64::from(step) * 0.01);
+            let (score, _) = baseline.clone().judge_distance(f64::from(step) * 0.01);
             assert!(score <= last && (0.0..=1.0).contains(&score));
             last = score;
         }
-        assert_eq!(usual.judge_distance(0.08).1, Status::Uncertain);
-        assert_eq!(usual.judge_distance(0.3).1, Status::Lost);
-        assert_eq!(usual.distance, Some(0.02));
-        assert_eq!(usual.judge_distance(0.03).1, Status::Tracking);
-        assert!(usual.distance > Some(0.02));
+        assert_eq!(baseline.judge_distance(0.08).1, Status::Uncertain);
+        assert_eq!(baseline.judge_distance(0.3).1, Status::Lost);
+        assert_eq!(baseline.distance, Some(0.02));
+        assert_eq!(baseline.judge_distance(0.03).1, Status::Tracking);
+        assert!(baseline.distance > Some(0.02));
     }
 
     #[test]
     fn a_still_picture_does_not_make_a_flicker_a_loss() {
-        let mut usual = DistanceBaseline::default();
+        let mut baseline = DistanceBaseline::default();
         for _ in 0..100 {
-            assert_eq!(usual.judge_distance(0.0).1, Status::Tracking);
+            assert_eq!(baseline.judge_distance(0.0).1, Status::Tracking);
         }
-        assert_eq!(usual.judge_distance(0.001).1, Status::Tracking);
+        assert_eq!(baseline.judge_distance(0.001).1, Status::Tracking);
     }
 
     #[test]
     fn the_evidence_of_a_discriminant_orders_scores_and_a_loss_is_never_likely() {
-        let mut usual = DistanceBaseline::default();
-        let mut judge = |discriminant, first_distance, scale, lost, trusted| {
+        let mut baseline = DistanceBaseline::default();
+        let mut judge = |discriminant, first_distance, scale, lost, near| {
             let evidence = Evidence {
                 first_distance,
                 mean_first_distance: 0.2,
@@ -185,7 +185,7 @@ mod tests {
                 discriminant: Some(discriminant),
                 scale,
             };
-            usual.judge(&evidence, lost, trusted)
+            baseline.judge(&evidence, lost, near)
         };
         let (sure, status) = judge(1.0, 0.1, 1.0, false, true);
         assert!(sure > 0.9 && status == Status::Tracking);

@@ -1,15 +1,14 @@
 //! The update gate: whether the target is lost, and whether a frame may update the models.
 //!
-//! What is learned while something covers the target is the cover. The first box's subspace does not change, so the
-//! distance of the answer to it tells: it jumps when the target is covered, and creeps when the target turns. A frame
-//! passes while that distance is below a multiple of its running mean. The mean follows slowly in frames that do not
-//! pass, too, so a lasting change is accepted in the end.
+//! A tracker that learns during an occlusion learns the occluder. The first box's subspace does not change, so the
+//! distance of the answer to it shows an occlusion: it jumps when the target is covered, and creeps when the target
+//! turns. A frame passes while that distance is below a multiple of its running mean. The mean follows slowly in frames
+//! that do not pass, too, so a lasting change is accepted in the end.
 //!
-//! Where such jumps are usual the score tells: a frame passes only if its box is more likely right than wrong.
+//! Where such jumps are usual the score decides: a frame passes only if its box is more likely right than wrong.
 
 use serde::{Deserialize, Serialize};
 
-use crate::tracker::confidence::score::Evidence;
 use crate::tracker::params::table::Params;
 
 /// Frames before the running mean means anything. All of them pass, or a target that changes fast from the start would
@@ -62,24 +61,25 @@ impl Default for UpdateGate {
 }
 
 impl UpdateGate {
-    /// Whether the best particle is not the target. The target has been lost for `frames_lost` frames, and the search
-    /// was `spread` times as wide as usual. A wide search finds more that resembles the target a little, so a target
-    /// that is found again needs a better score and a recognised distance.
+    /// Whether the best particle, with this score of the discriminant and this distance to the first subspace, is not
+    /// the target. The target has been lost for `frames_lost` frames, and the search was `spread` times as wide as
+    /// usual. A wide search finds more that resembles the target a little, so a target that is found again needs a
+    /// better score and a recognised distance. Without a discriminant no target is lost.
     pub fn is_lost(
         &self,
-        evidence: &Evidence,
+        score: Option<f32>,
+        distance: f64,
         frames_lost: u32,
         spread: f64,
         params: &Params,
     ) -> bool {
-        let Some(score) = evidence.discriminant.map(f64::from) else {
+        let Some(score) = score.map(f64::from) else {
             return false;
         };
         if frames_lost == 0 {
             return score < LOST_THRESHOLD;
         }
-        score < LOST_THRESHOLD + FOUND_MARGIN
-            || !self.recognizes(evidence.first_distance, spread, params)
+        score < LOST_THRESHOLD + FOUND_MARGIN || !self.recognizes(distance, spread, params)
     }
 
     /// Whether what is found at `distance` from the first subspace is the target that was lost. A search that is hardly
@@ -93,7 +93,13 @@ impl UpdateGate {
 
     /// Whether frame `number`, whose answer is at `distance` from the first subspace, may update the models as far as
     /// the distance tells; updates the statistics.
-    pub fn judge(&mut self, distance: f64, has_color: bool, number: u64, params: &Params) -> bool {
+    pub fn admit_distance(
+        &mut self,
+        distance: f64,
+        has_color: bool,
+        number: u64,
+        params: &Params,
+    ) -> bool {
         let strictness = if has_color { COLOR_STRICTNESS } else { 1.0 };
         let limit =
             (strictness * params.update_distance_ratio * self.mean_distance).max(ALWAYS_ACCEPTED);
@@ -115,8 +121,9 @@ mod tests {
     fn a_jump_does_not_pass_until_it_has_lasted() {
         let params = Preset::Robust.params();
         let mut gate = UpdateGate::default();
-        assert!((1..50).all(|number| gate.judge(0.2, false, number, &params)));
-        let rejected = (50..500).take_while(|&number| !gate.judge(0.6, false, number, &params));
+        assert!((1..50).all(|number| gate.admit_distance(0.2, false, number, &params)));
+        let rejected =
+            (50..500).take_while(|&number| !gate.admit_distance(0.6, false, number, &params));
         let rejected = rejected.count();
         assert!((10..100).contains(&rejected), "{rejected}");
     }
@@ -144,7 +151,7 @@ mod tests {
     fn a_creeping_change_passes_all_along() {
         let params = Preset::Robust.params();
         let mut gate = UpdateGate::default();
-        assert!((1..200).all(|number| gate.judge(
+        assert!((1..200).all(|number| gate.admit_distance(
             0.2 + number as f64 * 0.003,
             false,
             number,

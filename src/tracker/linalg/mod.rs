@@ -7,7 +7,7 @@
 //! | `combinations` | linear combinations of f32 vectors |
 //! | `vector_ops` | inner products, sums and lengths of single f32 vectors |
 //! | `jacobi` | eigenvalues and eigenvectors of one small symmetric matrix, f64 |
-//! | `scratch` | nothing: the buffers of the others |
+//! | `scratch` | nothing: reusable, aligned buffers |
 //! | `acos` | arccos² of many numbers at once, f64 |
 //!
 //! In and out: plain slices. A set of n vectors of length D is one slice of n D values, one vector after the other; a

@@ -13,8 +13,8 @@ use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::particles::Particle;
 use crate::tracker::params::table::{Params, Search};
 
-/// How many angles are tried beside the last one, which says no more: where it is right, the two look alike.
-pub(crate) const TRIED: usize = 2;
+/// How many angles are tried: one either way. The last angle itself does not tell which way to turn.
+pub(crate) const HYPOTHESES: usize = 2;
 /// By how many degrees, either way, a further rotation is tried: heads tilt by some degrees a frame.
 const STEP: f64 = 6.0;
 /// The share of a measured change that is applied, so that noise evens out.
@@ -51,7 +51,7 @@ pub(crate) fn hypotheses(
     angle: f64,
     distance: f64,
     params: &Params,
-) -> Option<[(f64, f64); TRIED]> {
+) -> Option<[(f64, f64); HYPOTHESES]> {
     let step = STEP.to_radians();
     let log_prior = |angle: f64| -0.5 * (angle / PRIOR_STD.to_radians()).powi(2);
     let tried = [angle - step, angle + step].map(|angle| (angle, log_prior(angle)));
@@ -59,7 +59,7 @@ pub(crate) fn hypotheses(
 }
 
 /// `angle` moved towards the [`hypotheses`] by their weights, which sum to 1.
-pub(crate) fn updated(angle: f64, weights: [f64; TRIED]) -> f64 {
+pub(crate) fn updated(angle: f64, weights: [f64; HYPOTHESES]) -> f64 {
     let change = (weights[1] - weights[0]) * STEP.to_radians();
     // Half a turn is as far as there is.
     (angle + GAIN * change).clamp(-PI, PI)

@@ -16,8 +16,8 @@ const AROUND_MAXIMUM: usize = 6;
 const MODES: usize = 5;
 /// Standard deviation, in the second round, of the logarithm of the scale.
 const REFINED_STD_SCALE: f64 = 0.01;
-/// To how many working pixels the size of a box is known, before and after the first round. Of a box of ten pixels it is
-/// a larger share than the scale changes by.
+/// The uncertainty of a box's side, in working pixels, before and after the first round. For a box of ten pixels it
+/// exceeds the usual change of scale.
 const BLUR: f64 = 0.4;
 const REFINED_BLUR: f64 = 0.3;
 /// An answer is the mean of the particles this near to the most likely one, in working pixels: steadier than one.
@@ -63,15 +63,18 @@ impl SearchContext<'_> {
         }
     }
 
-    /// Appends the particles of the second round, around those of `particles` with the greatest `weights`.
+    /// Appends the particles of the second round, around those of `particles` with the greatest `weights`. Whether
+    /// there is a second round.
     pub fn refine(
         &self,
         weights: &[f64],
         generator: &mut ChaCha8Rng,
         particles: &mut Vec<Particle>,
-    ) {
+    ) -> bool {
         let (all, first) = self.counts();
-        let all = all.min(particles.len() + all - first);
+        if all == first {
+            return false;
+        }
         let mut modes = [0; MODES];
         let modes = &mut modes[..MODES.min(particles.len())];
         greatest(weights, modes);
@@ -87,6 +90,7 @@ impl SearchContext<'_> {
             let drawn = self.draw(&particles[mode], std, generator);
             particles.push(drawn);
         }
+        true
     }
 
     /// The answer: the particle at `best` (equation 12) or, searching from the last answer, the weighted mean of those
@@ -117,10 +121,7 @@ impl SearchContext<'_> {
     /// The standard deviation of the logarithm of the scale: `std`, and more for a box so small that `blur` working pixels
     /// are a notable share of its sides.
     fn scale_std(&self, std: f64, blur: f64) -> f64 {
-        match self.params.search {
-            Search::Resampled => std,
-            Search::Answer => std.hypot(blur / self.bounds.side(&self.last)),
-        }
+        std.hypot(blur / self.bounds.side(&self.last))
     }
 
     /// A draw around `center`; the standard deviations are of x, of y and of the logarithm of the scale.

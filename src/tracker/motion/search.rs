@@ -1,5 +1,6 @@
 //! The search around the last answer: how wide it is, how many particles it draws, and the prior on the displacement.
 
+use crate::tracker::image::warp::Rotation;
 use crate::tracker::motion::particles::{Particle, StateBounds};
 use crate::tracker::params::table::{Params, Search};
 
@@ -15,17 +16,21 @@ pub(crate) const REFINED_STD: f64 = 2.0;
 /// still seen.
 const DENSE_RADIUS: f64 = 1.0;
 /// How many times as wide as usual the prior on the displacement is at most.
-pub(crate) const MAX_SLACK: f64 = 2.0;
+pub(crate) const MAX_PRIOR_WIDTH: f64 = 2.0;
 
 /// The search of one frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SearchContext<'a> {
     /// The last answer.
     pub last: Particle,
-    /// The displacement of the whole image, in working pixels.
+    /// The displacement of the whole image, in working pixels of the rectified view.
     pub displacement: (f64, f64),
+    /// What makes a rotated target upright: particles are in the view that it makes. None where the target is upright.
+    pub rotation: Option<Rotation>,
     /// How many times as wide as usual the search is: more than once while the target is lost.
     pub spread: f64,
+    /// How far from the last answer background is sampled in this frame, in working pixels.
+    pub samples_radius: f64,
     pub params: &'a Params,
     pub bounds: &'a StateBounds,
 }
@@ -62,6 +67,19 @@ impl SearchContext<'_> {
         self.radius().max(DENSE_RADIUS * longer)
     }
 
+    /// How far around the last answer the frame is looked at, in working pixels.
+    pub fn window_radius(&self) -> f64 {
+        (self.radius() + self.samples_radius).max(self.dense_radius())
+    }
+
+    /// `particle` of the rectified view where it is in the frame.
+    pub fn to_original(&self, particle: Particle) -> Particle {
+        self.rotation.map_or(particle, |rotation| {
+            let (x, y) = rotation.to_original((particle.x, particle.y));
+            Particle { x, y, ..particle }
+        })
+    }
+
     /// How many particles are drawn in all, and how many of these in the first round. A wider search draws more.
     pub fn counts(&self) -> (usize, usize) {
         let (all, first) = usual_counts(self.params);
@@ -71,9 +89,9 @@ impl SearchContext<'_> {
     }
 
     /// The logarithm of the prior on the displacement of a particle: from the last answer, or from where that would be
-    /// had it moved with the image. The prior is `slack` times as wide as usual.
+    /// had it moved with the image. The prior is `prior_width` times as wide as usual.
     #[inline(always)]
-    pub fn log_prior(&self, particle: &Particle, slack: f64) -> f64 {
+    pub fn log_prior(&self, particle: &Particle, prior_width: f64) -> f64 {
         if self.params.displacement_std <= 0.0 || self.params.search == Search::Resampled {
             return 0.0;
         }
@@ -81,16 +99,16 @@ impl SearchContext<'_> {
             |from: &Particle| (particle.x - from.x).powi(2) + (particle.y - from.y).powi(2);
         let nearest = squared(&self.last).min(squared(&self.displaced()));
         // The square of a tiny deviation is 0, and 0 / 0 would be no prior.
-        let variance = (slack * self.spread * self.params.displacement_std).powi(2);
+        let variance = (prior_width * self.spread * self.params.displacement_std).powi(2);
         -0.5 * nearest / variance.max(f64::MIN_POSITIVE)
     }
 }
 
 /// How many times as wide as usual the prior on the displacement is at a place whose distance to the first subspace is
-/// `distance`; that of the last answer was `last`. What covers a target looks less like the first image than the target
-/// that comes out beside it.
-pub(crate) fn slack(last: f64, distance: f64) -> f64 {
-    (last / distance.max(f64::MIN_POSITIVE)).clamp(1.0, MAX_SLACK)
+/// `distance`; that of the last answer was `last`. An occluder resembles the first image less than the
+/// target that reappears beside it.
+pub(crate) fn prior_width(last: f64, distance: f64) -> f64 {
+    (last / distance.max(f64::MIN_POSITIVE)).clamp(1.0, MAX_PRIOR_WIDTH)
 }
 
 /// How many particles a search of the usual width draws in all, and how many of these in the first round.
@@ -134,7 +152,9 @@ mod tests {
         SearchContext {
             last: LAST,
             displacement: (0.0, 0.0),
+            rotation: None,
             spread,
+            samples_radius: 0.0,
             params,
             bounds: &BOUNDS,
         }
@@ -175,10 +195,10 @@ mod tests {
 
     #[test]
     fn only_a_place_nearer_the_first_image_may_be_further_away() {
-        assert_eq!(slack(0.0, 0.0), 1.0);
-        assert_eq!(slack(0.3, 0.5), 1.0);
-        assert_eq!(slack(0.45, 0.3), 1.5);
-        assert_eq!(slack(0.5, 0.0), MAX_SLACK);
+        assert_eq!(prior_width(0.0, 0.0), 1.0);
+        assert_eq!(prior_width(0.3, 0.5), 1.0);
+        assert_eq!(prior_width(0.45, 0.3), 1.5);
+        assert_eq!(prior_width(0.5, 0.0), MAX_PRIOR_WIDTH);
     }
 
     #[test]

@@ -38,7 +38,7 @@ impl ScaleFilter {
     }
 
     /// Forgets everything: the next pyramid is learned with η = 1.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.numerators.clear();
         self.energies.clear();
     }
