@@ -129,7 +129,7 @@ def main():
                         before = time.perf_counter()
                         replica.send("POST", f"/sessions/{name}/frames?frame={number}", file)
                         times[kind].append(time.perf_counter() - before)
-                    state = calls.call("HGET", f"bagtrack:session:{ids[2]}", "state")
+                    state = calls.call("HGET", f"bagtrack:session:{{{ids[2]}}}", "state")
                     sizes.append(len(state))
                     before = time.perf_counter()
                     calls.call("SET", "probe", state)

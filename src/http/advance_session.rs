@@ -12,10 +12,10 @@ use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::store_config::SharedStore;
+use super::stored_writes::{Written, write};
 use super::{stored, work};
 use crate::sessions::{
-    LockedSession, QueuePermit, Record, Reply, SessionBusy, SessionPermit, SessionState, StoreAway,
-    Version, WorkMeter,
+    LockedSession, QueuePermit, Reply, SessionBusy, SessionPermit, SessionState, Version, WorkMeter,
 };
 use std::sync::Arc;
 use tokio::time::timeout;
@@ -79,65 +79,87 @@ async fn advance_stored(
         true => newest::lock(state, permit, client, true).await?,
         false => permit.lock().await?,
     };
-    let mut was_late = false;
+    // Whether another frame was there first, the state is what the store told, and the store has lost the record.
+    let (mut was_late, mut is_told, mut is_lost) = (false, false, false);
     for _ in 0..MAX_ATTEMPTS {
         let outcome;
-        (locked, outcome) = attempt(state, store, queue.clone(), locked, next.clone()).await?;
+        let queue = queue.clone();
+        (locked, outcome) = attempt(state, store, queue, locked, next.clone(), is_lost).await?;
         let session = locked.session().clone();
-        let lives = state.registry.idle_lease();
+        let idle = state.registry.idle_lease();
         let reply = match &outcome {
             Outcome::Tracked(tracked, _, bytes) => {
-                write(
-                    store,
-                    &session.id(),
-                    &locked,
-                    tracked,
-                    bytes.as_deref(),
-                    lives,
-                )
-                .await
+                let written = Written {
+                    frame: tracked.latest_frame(),
+                    bytes: bytes.as_deref(),
+                    is_lost,
+                    // A frame that comes late, after others that only another replica has, takes nothing back.
+                    goes_on: is_told || next.number.is_none(),
+                    lives: idle,
+                };
+                write(store, &session, written).await
             }
             Outcome::Settled(Err(problem)) if !depends_on_state(problem) => {
                 return Err(problem.clone());
             }
             Outcome::Settled(settled) => match session.version() {
                 Some(version) => {
-                    let lives = settled.is_ok().then_some(lives);
-                    store.calls.check(session.id(), version, true, lives).await
+                    let latest = locked.state().latest_frame();
+                    let is_past = next.number.is_some_and(|number| number <= latest);
+                    let (name, lives) = (session.name(), settled.is_ok().then_some(idle));
+                    let checked = store.calls.check(name, version, !is_past, lives).await;
+                    match checked {
+                        // The store may have later frames that only another replica has; this one is before them.
+                        Ok(Reply::Other(_)) if is_past && is_told => {
+                            Ok((Reply::Done(idle), version))
+                        }
+                        checked => checked.map(|reply| (reply, version)),
+                    }
                 }
-                None => Ok(Reply::Done(lives)),
+                // Whatever was answered is written, so this is a problem, of a session that only this replica has.
+                None => Ok((Reply::Done(idle), Version::first(0))),
             },
         };
-        let lacks_frame = match reply {
-            Ok(Reply::Done(_)) => false,
-            Ok(Reply::Gone) => return Err(stored::gone(state, &session)),
-            Ok(Reply::Other(record)) => {
+        let version = match reply {
+            Ok((Reply::Done(_), version)) => Some(version),
+            Ok((Reply::Ended, _)) => return Err(stored::ended(state, &session)),
+            Ok((Reply::Missing, _)) => {
+                stored::missing(state, &session)?;
+                let latest = locked.state().latest_frame();
+                match outcome {
+                    // The client has got further answers: another replica may have a later state.
+                    Outcome::Settled(Err(_)) if next.number > Some(latest + 1) => {
+                        return Err(Problem::record_lost(latest));
+                    }
+                    Outcome::Settled(Err(problem)) => return Err(problem),
+                    _ => is_lost = true,
+                }
+                continue;
+            }
+            Ok((Reply::Other(record), _)) => {
                 was_late |= matches!(outcome, Outcome::Tracked(..));
+                (is_told, is_lost) = (true, false);
                 stored::take_over(state, &mut locked, *record, client).await?;
                 if is_unordered {
                     return Err(Problem::not_in_order());
                 }
                 continue;
             }
-            Err(_) if store.best_effort => true,
+            // The frame is in memory only.
+            Err(_) if store.best_effort => session.version(),
             Err(away) => return Err(away.into()),
-        };
-        let durability = |session| match lacks_frame {
-            true => Durability::lacking_frame(session),
-            false => Durability::of(session),
         };
         if !matches!(outcome, Outcome::Settled(Err(_))) {
             session.renew();
         }
         return match outcome {
-            Outcome::Tracked(tracked, mut answered, bytes) => {
-                let version = session.version();
-                let version = match lacks_frame {
-                    true => version,
-                    false => Some(version_after(&locked, version, &tracked, bytes.is_some())),
-                };
+            Outcome::Tracked(tracked, mut answered, _) => {
+                let is_new = is_lost || session.version().is_none();
                 locked.replace(*tracked, version);
-                answered.durability = durability(&session);
+                if let (true, Some(stream)) = (is_new, &next.stream) {
+                    stream.begin(&session);
+                }
+                answered.durability = Durability::of(&session, true);
                 Ok(answered)
             }
             // Another frame with its number won, at another replica.
@@ -145,7 +167,7 @@ async fn advance_stored(
                 Err(problem.with_kind(Kind::FrameOutOfOrder))
             }
             Outcome::Settled(settled) => settled.map(|mut answered| {
-                answered.durability = durability(&session);
+                answered.durability = Durability::of(&session, true);
                 answered
             }),
         };
@@ -153,13 +175,14 @@ async fn advance_stored(
     Err(SessionBusy.into())
 }
 
-/// Looks at the frames on a worker.
+/// Looks at the frames on a worker. What the store has not, or has lost, is written, also where it was answered before.
 async fn attempt(
     state: &AppState,
     store: &SharedStore,
     queue: QueuePermit,
     mut locked: LockedSession,
     next: Arc<NextFrames>,
+    is_lost: bool,
 ) -> Result<(LockedSession, Outcome), Problem> {
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
@@ -169,12 +192,13 @@ async fn attempt(
         let session = locked.session().clone();
         next.check_stream(&session)?;
         let mut tracked = locked.state().clone();
+        let version = session.version().filter(|_| !is_lost);
+        let is_stored = version.is_some_and(|version| version.frame >= tracked.latest_frame());
         let outcome = match next.advance_state(&mut tracked, &limits, meter, &metrics) {
-            Ok(answered) if !answered.replayed => {
+            Ok(answered) if !(answered.replayed && is_stored) => {
                 let frame = tracked.latest_frame();
                 let is_due = |version: Version| frame >= version.checkpoint + every;
-                let bytes = session.version().is_none_or(is_due);
-                let bytes = bytes.then(|| tracked.stored());
+                let bytes = version.is_none_or(is_due).then(|| tracked.stored());
                 Outcome::Tracked(Box::new(tracked), answered, bytes)
             }
             settled => Outcome::Settled(settled),
@@ -182,43 +206,6 @@ async fn attempt(
         Ok((locked, outcome))
     })
     .await
-}
-
-/// Moves the record on to the tracked state; makes one where there is none.
-async fn write(
-    store: &SharedStore,
-    id: &uuid::Uuid,
-    locked: &LockedSession,
-    tracked: &SessionState,
-    bytes: Option<&[u8]>,
-    lives: std::time::Duration,
-) -> Result<Reply, StoreAway> {
-    let (session, frame) = (locked.session(), tracked.latest_frame());
-    if let Some(before) = session.version() {
-        return store.calls.advance(*id, before, frame, bytes, lives).await;
-    }
-    let record = Record {
-        version: Version::first(session.opening(), frame),
-        owner: session.owner().clone(),
-        opening: session.opening().clone(),
-        state: bytes.map(<[u8]>::to_vec).unwrap_or_default(),
-        lives,
-    };
-    store.calls.create(*id, &record).await
-}
-
-fn version_after(
-    locked: &LockedSession,
-    before: Option<Version>,
-    tracked: &SessionState,
-    wrote_state: bool,
-) -> Version {
-    let frame = tracked.latest_frame();
-    match before {
-        None => Version::first(locked.session().opening(), frame),
-        Some(before) if wrote_state => before.written(frame),
-        Some(before) => Version { frame, ..before },
-    }
 }
 
 /// Whether another state might have answered otherwise.

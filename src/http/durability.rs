@@ -12,24 +12,18 @@ const DURABLE: HeaderName = HeaderName::from_static("durable");
 pub struct Durability {
     /// The last frame whose state is in the store.
     checkpoint: Option<u64>,
-    /// Whether the frame of the answer is not in the store, although it should be.
-    lacks_frame: bool,
+    /// The first frame that is not in the store, where there is a store.
+    lacks_from: Option<u64>,
 }
 
 impl Durability {
-    /// Of a session, as it stands.
-    pub fn of(session: &Session) -> Self {
+    /// Of a session, as it stands, of a service with or without a store.
+    pub fn of(session: &Session, has_store: bool) -> Self {
+        let version = session.version();
+        let lacks_from = version.map_or(0, |version| version.frame + 1);
         Self {
-            checkpoint: session.version().map(|version| version.checkpoint),
-            lacks_frame: false,
-        }
-    }
-
-    /// Of a session whose last frame could not be written.
-    pub fn lacking_frame(session: &Session) -> Self {
-        Self {
-            lacks_frame: true,
-            ..Self::of(session)
+            checkpoint: version.map(|version| version.checkpoint),
+            lacks_from: has_store.then_some(lacks_from),
         }
     }
 
@@ -38,18 +32,18 @@ impl Durability {
         self.checkpoint
     }
 
-    /// Whether the frame of the answer is not in the store, although it should be.
-    pub fn lacks_frame(&self) -> bool {
-        self.lacks_frame
+    /// Whether this frame is not in the store, although it should be.
+    pub fn lacks(&self, frame: u64) -> bool {
+        self.lacks_from.is_some_and(|first| frame >= first)
     }
 
-    /// Adds the headers to an answer.
-    pub fn write(self, mut response: Response) -> Response {
+    /// Adds the headers to the answer to this frame.
+    pub fn write(self, frame: u64, mut response: Response) -> Response {
         let headers = response.headers_mut();
         if let Some(frame) = self.checkpoint {
             headers.insert(CHECKPOINT, HeaderValue::from(frame));
         }
-        if self.lacks_frame {
+        if self.lacks(frame) {
             headers.insert(DURABLE, HeaderValue::from_static("false"));
         }
         response

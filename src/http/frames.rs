@@ -152,7 +152,9 @@ pub async fn post(
             let answered = advance_session(&state, permit, queue, &client, next).await?;
             let answers = Json(FrameAnswers::from(&answered.estimates[..])).into_response();
             let response = replayed_header(answered.replayed, answers);
-            return Ok(answered.durability.write(response));
+            let last = answered.estimates.last();
+            let last = last.map_or(0, |last| last.first().frame);
+            return Ok(answered.durability.write(last, response));
         }
     };
     let work = LineWork {

@@ -37,7 +37,7 @@ pub async fn live() -> Json<Health> {
 /// Whether the service wants requests
 ///
 /// A load balancer should send none while this answers 503: the service was asked to end, its queue is full, or the store
-/// of its sessions gives no answer. A queue that was full counts as full until half of it is free.
+/// of its sessions gives no answer or takes no writes. A queue that was full counts as full until half of it is free.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health), ReadyProblems)
@@ -49,7 +49,7 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     let (free, all) = (state.admission.queue_places(), state.config.queue);
     if let Some(store) = &state.store
         && !store.best_effort
-        && !store.calls.is_up()
+        && !store.calls.is_ready()
     {
         return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));
     }

@@ -8,6 +8,7 @@ use super::accept;
 use super::advance::NextFrames;
 use super::advance_session::advance_session;
 use super::client::Client;
+use super::durability::Durability;
 use super::json;
 use super::newest;
 use super::problems::document::ProblemDocument;
@@ -108,7 +109,8 @@ impl LineWork {
             };
             let estimates = newest::look(state, permit, queue, &self.client, look).await?;
             self.number = Some(number + 1);
-            return Ok(StreamAnswer::new(&estimates, 0, true, state.is_draining()));
+            let answer = StreamAnswer::new(&estimates, 0, true, state.is_draining());
+            return Ok(answer.with_durability(Durability::of(&session, state.store.is_some())));
         }
         if matches!(self.frames, FrameSource::Video(_)) {
             self.count_frame().await?;

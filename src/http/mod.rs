@@ -85,6 +85,7 @@ mod snapshot;
 mod state;
 mod store_config;
 mod stored;
+mod stored_writes;
 mod stream;
 mod target;
 mod target_box;

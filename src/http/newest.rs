@@ -6,6 +6,7 @@ use super::client::Client;
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
+use super::stored_writes::save;
 use super::{stored, work};
 use crate::sessions::{
     LockedSession, QueuePermit, Reply, Session, SessionBusy, SessionPermit, WorkMeter,
@@ -30,10 +31,17 @@ pub async fn lock(
     let (Some(store), Some(version)) = (&state.store, locked.session().version()) else {
         return Ok(locked);
     };
-    let id = locked.session().id();
-    match store.calls.check(id, version, goes_on, None).await {
+    let name = locked.session().name();
+    match store.calls.check(name, version, goes_on, None).await {
         Ok(Reply::Done(lives)) => locked.session().set_lives(lives),
-        Ok(Reply::Gone) => return Err(stored::gone(state, locked.session())),
+        Ok(Reply::Ended) => return Err(stored::ended(state, locked.session())),
+        Ok(Reply::Missing) => {
+            stored::missing(state, locked.session())?;
+            // Nothing tells whether this is the newest state, unless frames were answered that are nowhere else.
+            if goes_on && locked.session().is_stored() {
+                return Err(Problem::record_lost(locked.state().latest_frame()));
+            }
+        }
         Ok(Reply::Other(record)) => stored::take_over(state, &mut locked, *record, client).await?,
         Err(_) if store.best_effort => {}
         Err(away) => return Err(away.into()),
@@ -68,9 +76,14 @@ async fn is_behind(state: &AppState, session: &Arc<Session>) -> Result<bool, Pro
     let (Some(store), Some(version)) = (&state.store, session.version()) else {
         return Ok(false);
     };
-    match store.calls.check(session.id(), version, false, None).await {
+    match store
+        .calls
+        .check(session.name(), version, false, None)
+        .await
+    {
         Ok(Reply::Done(lives)) => session.set_lives(lives),
-        Ok(Reply::Gone) => return Err(stored::gone(state, session)),
+        Ok(Reply::Ended) => return Err(stored::ended(state, session)),
+        Ok(Reply::Missing) => stored::missing(state, session)?,
         // It may be this replica that is about to note the newer frame.
         Ok(Reply::Other(_)) => return Ok(true),
         Err(_) if store.best_effort => {}
@@ -109,27 +122,50 @@ pub async fn catch_up(
     Ok(())
 }
 
-/// Waits for the session with its newest state, and lets no other replica go on from its own copy.
+/// Waits for the session with its newest state, and lets no other replica go on from its own copy. `from` is the first
+/// frame whose answer the client has not got, where it says so.
 ///
 /// # Errors
-/// The session has ended, or the store gives no answer.
+/// The session has ended, or the store gives no answer, or it has lost the session, which the client has got further
+/// answers of.
 pub async fn lock_fenced(
     state: &AppState,
     permit: SessionPermit,
     client: &Client,
+    from: Option<u64>,
 ) -> Result<LockedSession, Problem> {
     let mut locked = permit.lock().await?;
+    let Some(store) = &state.store else {
+        return Ok(locked);
+    };
     for _ in 0..MAX_ATTEMPTS {
-        let (Some(store), Some(version)) = (&state.store, locked.session().version()) else {
-            return Ok(locked);
+        let reply = match locked.session().version() {
+            Some(version) => store.calls.fence(locked.session().name(), version).await,
+            None => Ok(Reply::Missing),
         };
-        match store.calls.fence(locked.session().id(), version).await {
+        let reply = match reply {
+            Ok(Reply::Missing) => {
+                stored::missing(state, locked.session())?;
+                let latest = locked.state().latest_frame();
+                if from.is_some_and(|from| from > latest + 1) {
+                    return Err(Problem::record_lost(latest));
+                }
+                match save(store, &mut locked).await {
+                    Ok(Reply::Done(_)) => continue,
+                    reply => reply,
+                }
+            }
+            reply => reply,
+        };
+        match reply {
             Ok(Reply::Done(lives)) => {
                 locked.session().set_lives(lives);
                 locked.fenced();
                 return Ok(locked);
             }
-            Ok(Reply::Gone) => return Err(stored::gone(state, locked.session())),
+            Ok(Reply::Ended) => return Err(stored::ended(state, locked.session())),
+            // Another replica was there between.
+            Ok(Reply::Missing) => {}
             Ok(Reply::Other(record)) => {
                 stored::take_over(state, &mut locked, *record, client).await?;
             }
@@ -151,6 +187,9 @@ pub async fn renew_if_busy(state: &AppState, session: &Session, problem: &Proble
     {
         let lives = Some(state.registry.idle_lease());
         // Without an answer it lives as long as before.
-        let _ = store.calls.check(session.id(), version, false, lives).await;
+        let _ = store
+            .calls
+            .check(session.name(), version, false, lives)
+            .await;
     }
 }

@@ -73,11 +73,12 @@ impl CreatedSession {
 }
 
 /// The answer to the request that opened a session.
-pub fn created(session: &Session, replayed: bool, is_verbose: bool) -> Response {
+pub fn created(state: &AppState, session: &Session, replayed: bool, is_verbose: bool) -> Response {
     let location = [(LOCATION, format!("/sessions/{}", session.id()))];
     let body = Json(CreatedSession::of(session, is_verbose));
     let response = (StatusCode::CREATED, location, body).into_response();
-    Durability::of(session).write(replayed_header(replayed, response))
+    let frame = session.opening().estimates.first().frame;
+    Durability::of(session, state.store.is_some()).write(frame, replayed_header(replayed, response))
 }
 
 /// Opens the session of a request, under this id.
@@ -140,7 +141,7 @@ async fn create_record(
     let Some(store) = &state.store else {
         return Ok(None);
     };
-    let version = Version::first(&opening, opening.estimates.first().frame);
+    let version = Version::first(opening.estimates.first().frame);
     let record = Record {
         version,
         owner: owner.clone(),

@@ -19,7 +19,7 @@ use super::problems::problem::Problem;
 use super::router::router;
 use super::state::AppState;
 use super::store_config::SharedStore;
-use super::stored;
+use super::stored_writes;
 use crate::sessions::Clock;
 use axum::body::Body;
 use axum::{Extension, Router};
@@ -162,7 +162,7 @@ impl Application {
                     state.drain();
                     tokio::spawn({
                         let state = state.clone();
-                        async move { stored::flush(&state).await }
+                        async move { stored_writes::flush(&state).await }
                     });
                     // New connections are still served: a load balancer asks for /readyz on them.
                     if how.into() == Shutdown::Gradual {
@@ -177,7 +177,7 @@ impl Application {
         // Each connection, and each stream that took one over, holds a receiver.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
-        stored::flush(&state).await;
+        stored_writes::flush(&state).await;
         ended.is_ok()
     }
 }

@@ -84,12 +84,13 @@ pub async fn delete(
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     refuse_query(&uri)?;
-    let session = path.find(&state).await?;
-    match stored::remove(&state, &session).await? {
-        true => {
+    // What is in memory may be a session that had the id before.
+    for _ in 0..2 {
+        let session = path.find(&state).await?;
+        if stored::end(&state, &session).await? {
             tracing::info!(session = session.short_id(), "deleted");
-            Ok(StatusCode::NO_CONTENT)
+            return Ok(StatusCode::NO_CONTENT);
         }
-        false => Err(Problem::session_not_found()),
     }
+    Err(Problem::session_not_found())
 }

@@ -3,14 +3,17 @@
 use super::client::Client;
 use super::problems::problem::Problem;
 use super::state::AppState;
-use super::store_config::SharedStore;
 use super::work;
 use crate::sessions::{
     LockedSession, NewSession, NoSession, Owner, Record, Reply, Session, SessionBusy, SessionState,
     StoreAway,
 };
 use std::sync::Arc;
+use std::time::Duration;
 use uuid::Uuid;
+
+/// A session without a record has expired if it had so little time left: answers and clocks are not exact.
+const LATE: Duration = Duration::from_secs(1);
 
 /// The live session of this id and owner, from memory or from the store.
 ///
@@ -45,18 +48,30 @@ pub async fn live(
     let Some(session) = state.registry.live(id) else {
         return load(state, id, client).await;
     };
-    match (&state.store, session.version()) {
-        (Some(store), Some(version)) => match store.calls.check(id, version, false, None).await {
-            Ok(Reply::Gone) => {
-                state.registry.remove(id);
-                Ok(None)
-            }
-            Ok(_) => Ok(Some(session)),
-            Err(_) if store.best_effort => Ok(Some(session)),
-            Err(away) => Err(away.into()),
-        },
-        _ => Ok(Some(session)),
+    let (Some(store), Some(version)) = (&state.store, session.version()) else {
+        return Ok(Some(session));
+    };
+    match store
+        .calls
+        .check(session.name(), version, false, None)
+        .await
+    {
+        Ok(Reply::Done(_)) => Ok(Some(session)),
+        Ok(Reply::Other(record)) if is_of(&record, &session) => Ok(Some(session)),
+        Ok(Reply::Other(record)) => insert(state, id, *record, client).await.map(Some),
+        Ok(Reply::Missing) if is_alive(&session) => Ok(Some(session)),
+        Ok(Reply::Missing | Reply::Ended) => {
+            state.registry.forget(&session);
+            Ok(None)
+        }
+        Err(_) if store.best_effort => Ok(Some(session)),
+        Err(away) => Err(away.into()),
     }
+}
+
+/// Whether a record is that of this session. Another one may have had its id before, or have it by now.
+fn is_of(record: &Record, session: &Session) -> bool {
+    record.opening.birth == session.opening().birth
 }
 
 /// The session of this id from the store, which is then in memory too.
@@ -68,12 +83,26 @@ async fn load(
     let Some(store) = &state.store else {
         return Ok(None);
     };
-    let record = match store.calls.load(id).await {
-        Ok(Some(record)) => record,
-        Err(away) if !store.best_effort => return Err(away.into()),
-        Ok(None) | Err(_) => return Ok(None),
-    };
+    // Without an answer nobody knows whether there is one, whatever the store's mode.
+    match store.calls.load(id).await? {
+        Some(record) => insert(state, id, record, client).await.map(Some),
+        None => Ok(None),
+    }
+}
+
+/// The session of a record, which is then in memory.
+async fn insert(
+    state: &AppState,
+    id: Uuid,
+    record: Record,
+    client: &Client,
+) -> Result<Arc<Session>, Problem> {
     let (opened, record) = decode(state, record, client).await?;
+    if let Some(session) = state.registry.live(id)
+        && !is_of(&record, &session)
+    {
+        state.registry.forget(&session);
+    }
     let new = NewSession {
         id,
         opening: record.opening,
@@ -84,12 +113,9 @@ async fn load(
         held: Box::new(()),
     };
     match state.registry.insert(new) {
-        Ok(session) => Ok(Some(session)),
+        Ok(session) => Ok(session),
         // Another request has loaded it in the meantime.
-        Err(error) => match state.registry.live(id) {
-            Some(session) => Ok(Some(session)),
-            None => Err(error.into()),
-        },
+        Err(error) => state.registry.live(id).ok_or_else(|| error.into()),
     }
 }
 
@@ -121,9 +147,9 @@ pub async fn take_over(
     client: &Client,
 ) -> Result<(), Problem> {
     let session = locked.session().clone();
-    if record.opening.birth != session.opening().birth {
+    if !is_of(&record, &session) {
         // The next request finds the new one.
-        state.registry.remove(session.id());
+        state.registry.forget(&session);
         return Err(SessionBusy.into());
     }
     let (newest, record) = decode(state, record, client).await?;
@@ -132,55 +158,40 @@ pub async fn take_over(
     Ok(())
 }
 
-/// The session is no longer in the store.
-pub fn gone(state: &AppState, session: &Session) -> Problem {
-    state.registry.remove(session.id());
+/// Whether a session lives whose record is missing: then the store has lost it.
+pub fn is_alive(session: &Session) -> bool {
+    session.lives() > LATE
+}
+
+/// The store has no record of a session.
+///
+/// # Errors
+/// The session has expired.
+pub fn missing(state: &AppState, session: &Arc<Session>) -> Result<(), Problem> {
+    if is_alive(session) {
+        return Ok(());
+    }
+    state.registry.forget(session);
+    Err(NoSession::Expired.into())
+}
+
+/// The session was ended at another replica.
+pub fn ended(state: &AppState, session: &Arc<Session>) -> Problem {
+    state.registry.forget(session);
     NoSession::Unknown.into()
 }
 
-/// Ends a session everywhere. Whether it was there.
+/// Ends a session everywhere. False where it had ended before: another one may have its id.
 ///
 /// # Errors
 /// The store gives no answer.
-pub async fn remove(state: &AppState, session: &Session) -> Result<bool, StoreAway> {
+pub async fn end(state: &AppState, session: &Arc<Session>) -> Result<bool, StoreAway> {
     if let Some(store) = &state.store {
-        store.calls.remove(session.id()).await?;
-    }
-    Ok(state.registry.remove(session.id()))
-}
-
-/// Writes the states of all sessions whose last frames are in memory only.
-pub async fn flush(state: &AppState) {
-    let Some(store) = &state.store else { return };
-    for session in state.registry.all() {
-        let is_behind = |session: &Session| {
-            let checkpoint = session.version().map(|version| version.checkpoint);
-            checkpoint.is_some_and(|checkpoint| checkpoint < session.latest_frame())
-        };
-        if is_behind(&session)
-            && let Ok(permit) = session.visit()
-            && let Ok(mut locked) = permit.lock().await
-            && is_behind(&session)
-        {
-            write(store, &mut locked).await;
+        let lives = state.registry.idle_lease();
+        if !store.calls.end(session.name(), lives).await? {
+            state.registry.forget(session);
+            return Ok(false);
         }
     }
-}
-
-/// Writes a session's state as it is.
-async fn write(store: &SharedStore, locked: &mut LockedSession) {
-    let session = locked.session().clone();
-    let (current, lives) = (locked.state().clone(), session.lives());
-    let (Some(before), frame) = (session.version(), current.latest_frame()) else {
-        return;
-    };
-    let bytes = current.stored();
-    let written = store
-        .calls
-        .advance(session.id(), before, frame, Some(&bytes), lives);
-    match written.await {
-        Ok(Reply::Done(_)) => locked.replace(current, Some(before.written(frame))),
-        Ok(_) => tracing::debug!(session = session.short_id(), "another replica has it"),
-        Err(error) => tracing::error!(%error, session = session.short_id(), "not written"),
-    }
+    Ok(state.registry.remove(session.id()))
 }

@@ -121,5 +121,6 @@ pub async fn put(
         ..
     } = advance_session(&state, request.permit, queue, &request.client, next).await?;
     let answer = Json(Answer::from(&estimates[0])).into_response();
-    Ok(durability.write(replayed_header(replayed, answer)))
+    let frame = estimates[0].first().frame;
+    Ok(durability.write(frame, replayed_header(replayed, answer)))
 }

@@ -64,7 +64,9 @@ pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermi
 pub use short_id::short_id;
 pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
 pub use state::{SessionState, StepError};
-pub use store::{AddressError, Record, Reply, Store, StoreAddress, StoreAway, Version};
+pub use store::{
+    AddressError, Record, Reply, SessionName, Store, StoreAddress, StoreAway, Version,
+};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
 };

@@ -7,6 +7,7 @@ use super::lease::Lease;
 use super::owner::Owner;
 use super::session::Session;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 use uuid::Uuid;
@@ -126,6 +127,15 @@ impl Registry {
         let live = !self.has_ended(&session);
         session.close();
         live
+    }
+
+    /// Removes this session from memory, unless another one has its id by now. It may live on in the store.
+    pub fn forget(&self, session: &Arc<Session>) {
+        // What is freed is freed after the lock.
+        let _forgotten = match self.map().entry(session.id()) {
+            Entry::Occupied(entry) if Arc::ptr_eq(entry.get(), session) => Some(entry.remove()),
+            _ => None,
+        };
     }
 
     /// Removes the sessions that have expired. Returns their number.

@@ -8,7 +8,7 @@ use super::opening::Opening;
 use super::owner::Owner;
 use super::short_id::short_id;
 use super::state::SessionState;
-use super::store::Version;
+use super::store::{SessionName, Version};
 use super::targets::Estimates;
 use crate::tracker::Params;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -121,6 +121,14 @@ impl Session {
     /// How the session was opened.
     pub fn opening(&self) -> &Opening {
         &self.opening
+    }
+
+    /// What the store calls it.
+    pub fn name(&self) -> SessionName {
+        SessionName {
+            id: self.id,
+            birth: self.opening.birth,
+        }
     }
 
     /// Width and height of the session's frames as uploaded.

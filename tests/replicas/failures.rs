@@ -173,6 +173,31 @@ async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
 
 #[tokio::test]
 #[ignore = "needs redis and haproxy"]
+async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
+    let redis = Redis::start();
+    let replica = || Replica::with_store(&redis.url(), &["--store-every", "10"]);
+    let (first, second) = (replica(), replica());
+    let session = Session::open(&first, 20).await;
+    // The second has the first frame.
+    let early = session.post(&second, 19).await;
+    assert_eq!(early.body["expected_frame"], 1);
+    for number in 1..=14 {
+        session.post(&first, number).await;
+    }
+    for number in [1, 2, 10] {
+        let late = session.post(&second, number).await;
+        let is_known = number == 10;
+        assert_eq!(late.status == StatusCode::OK, is_known, "frame {number}");
+    }
+    let next = session.post(&first, 15).await;
+    assert_eq!(
+        (next.status, &next.body["frame"]),
+        (StatusCode::OK, &15.into())
+    );
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
 async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
     let mut redis = Redis::start();
     let replica = Replica::with_store(&redis.url(), &["--store-timeout", "300ms"]);

@@ -2,7 +2,7 @@
 
 use crate::server::{Process, free_port, wait_for};
 use reqwest::StatusCode;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use std::net::SocketAddr;
 use std::process::Command;
 
@@ -51,7 +51,10 @@ impl Replica {
             "--client-requests",
             "200",
         ]);
-        command.args(["--shutdown-delay", "0s"]).args(flags);
+        if !flags.iter().any(|flag| flag == "--shutdown-delay") {
+            command.args(["--shutdown-delay", "0s"]);
+        }
+        command.args(flags);
         let mut process = Process::start(&mut command);
         wait_for(address, &mut process.0);
         process
@@ -66,11 +69,14 @@ impl Replica {
         self.process.kill();
     }
 
+    /// Asks it to end.
+    pub fn ask_to_end(&self) {
+        self.process.signal(Signal::TERM);
+    }
+
     /// Asks it to end, and waits until it has.
     pub fn end(&mut self) {
-        let id = i32::try_from(self.process.0.id()).expect("a process id");
-        let id = Pid::from_raw(id).expect("a process id");
-        kill_process(id, Signal::TERM).expect("it runs");
+        self.ask_to_end();
         self.process.0.wait().expect("it was started");
     }
 

@@ -1,5 +1,6 @@
 //! Other programs that the tests start: on free ports, with their files in a folder that goes with them.
 
+use rustix::process::{Pid, Signal, kill_process};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -28,6 +29,12 @@ impl Process {
     pub fn start(command: &mut Command) -> Self {
         let started = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
         Self(started.unwrap_or_else(|error| panic!("{command:?}: {error}")))
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        let id = i32::try_from(self.0.id()).expect("a process id");
+        let id = Pid::from_raw(id).expect("a process id");
+        kill_process(id, signal).expect("it runs");
     }
 
     /// `kill -9`.
@@ -79,6 +86,25 @@ impl Redis {
 
     pub fn stop(&mut self) {
         self.process.kill();
+    }
+
+    /// It is there, and answers nothing.
+    pub fn pause(&self) {
+        self.process.signal(Signal::STOP);
+    }
+
+    pub fn go_on(&self) {
+        self.process.signal(Signal::CONT);
+    }
+
+    /// What it answers to a command.
+    pub fn ask(&self, words: &[&str]) -> String {
+        let mut command = Command::new("redis-cli");
+        command.args(["-p", &self.address.port().to_string()]);
+        let output = command.args(words).output();
+        let output = output.unwrap_or_else(|error| panic!("{command:?}: {error}"));
+        assert!(output.status.success(), "{command:?}: {output:?}");
+        String::from_utf8(output.stdout).expect("redis-cli writes UTF-8")
     }
 
     pub fn start_again(&mut self) {

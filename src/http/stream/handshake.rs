@@ -168,7 +168,7 @@ async fn stand(
     place: &StreamPlace,
     from: Option<u64>,
 ) -> Result<Stand, Problem> {
-    let waiting = newest::lock_fenced(state, session.visit()?, client);
+    let waiting = newest::lock_fenced(state, session.visit()?, client, from);
     let waiting = timeout(state.config.work_timeout, waiting);
     let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
     place.begin(session);
@@ -182,6 +182,6 @@ async fn stand(
     Ok(Stand {
         next,
         stored,
-        durability: Durability::of(session),
+        durability: Durability::of(session, state.store.is_some()),
     })
 }

@@ -147,7 +147,7 @@ impl StreamAnswer {
     /// With what the store has.
     pub fn with_durability(mut self, durability: Durability) -> Self {
         self.checkpoint = durability.checkpoint();
-        self.durable = !durability.lacks_frame();
+        self.durable = !durability.lacks(self.answer.frame());
         self
     }
 

@@ -4,7 +4,7 @@
 use crate::sessions::Session;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
 use uuid::Uuid;
 
@@ -26,7 +26,7 @@ pub struct StreamPlace {
     session: Uuid,
     replacement: Arc<Replacement>,
     /// The generation of the session's record in the store, which began with the stream.
-    generation: OnceLock<u64>,
+    generation: Mutex<Option<u64>>,
 }
 
 impl OpenStreams {
@@ -42,7 +42,7 @@ impl OpenStreams {
             streams: self.clone(),
             session,
             replacement,
-            generation: OnceLock::new(),
+            generation: Mutex::default(),
         }
     }
 
@@ -53,19 +53,22 @@ impl OpenStreams {
 }
 
 impl StreamPlace {
-    /// The stream begins at the session as it stands.
+    /// The stream begins at the session as it stands, or goes on with it after the store has lost its record.
     pub fn begin(&self, session: &Session) {
-        if let Some(version) = session.version() {
-            // A stream begins once.
-            let _ = self.generation.set(version.generation);
-        }
+        *self.generation() = session.version().map(|version| version.generation);
+    }
+
+    fn generation(&self) -> MutexGuard<'_, Option<u64>> {
+        // Nothing panics while it is held.
+        let own = self.generation.lock();
+        own.unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the stream has ended, since another one has the place now, here or at another replica.
     pub fn has_ended(&self, session: &Session) -> bool {
-        let own = self.generation.get();
+        let own = *self.generation();
         let now = session.version().map(|version| version.generation);
-        if own.is_some_and(|own| now != Some(*own)) {
+        if own.is_some() && own != now {
             self.replacement.done.store(true, Ordering::Release);
         }
         self.is_replaced()

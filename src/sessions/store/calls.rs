@@ -2,22 +2,27 @@
 
 use super::address::StoreAddress;
 use super::connection::{Call, Connection, StoreAway};
-use super::record::{Fields, Record, Version};
+use super::record::{Fields, Record, SessionName, Version};
 use super::scripts::Scripts;
 use crate::sessions::owner::Owner;
-use redis::{FromRedisValue, ScriptInvocation};
-use std::sync::Arc;
+use redis::{FromRedisValue, Script, ScriptInvocation};
+use std::sync::{Arc, Weak};
 use std::time::Duration;
+use tokio::time::sleep;
 use uuid::Uuid;
 
 /// How long an idempotency key names its session.
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+/// How often the store is asked whether it is there.
+const PROBE: Duration = Duration::from_millis(250);
 
 /// What the store says to a call about a record.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reply {
-    /// There is no such record.
-    Gone,
+    /// There is no such record. The store has lost it, if the session lives.
+    Missing,
+    /// The session was ended.
+    Ended,
     /// It was done, or the version is the newest. The record lives as long as this without a frame.
     Done(Duration),
     /// The record has another version; nothing was written.
@@ -29,9 +34,26 @@ pub enum Reply {
 pub struct Store(Arc<Shared>);
 
 struct Shared {
-    connection: Arc<Connection>,
+    connection: Connection,
     scripts: Scripts,
     prefix: String,
+}
+
+impl Shared {
+    async fn probe(&self) {
+        let key = format!("{}:probe", self.prefix);
+        let write = self.scripts.probe.key(key);
+        self.connection.probe(Call::Script(write)).await;
+    }
+}
+
+/// Finds out whether the store is there, as long as somebody uses it.
+async fn probe(store: Weak<Shared>) {
+    while let Some(store) = store.upgrade() {
+        store.probe().await;
+        drop(store);
+        sleep(PROBE).await;
+    }
 }
 
 /// What scripts answer.
@@ -43,7 +65,8 @@ impl FromRedisValue for Answer {
         let mut parts = parts.into_iter();
         let mut next = || parts.next().ok_or("too few values");
         let reply = match i64::from_redis_value(next()?)? {
-            0 => Reply::Gone,
+            0 => Reply::Missing,
+            3 => Reply::Ended,
             kind => {
                 let lives = i64::from_redis_value(next()?)?;
                 let lives = Duration::from_millis(u64::try_from(lives).unwrap_or(0));
@@ -74,20 +97,22 @@ impl Store {
     ) -> Result<Self, StoreAway> {
         let connection = Connection::new(address, timeout);
         let connection = connection.map_err(|error| StoreAway::because(&error))?;
-        let _ = connection.ping().await;
-        Ok(Self(Arc::new(Shared {
+        let shared = Arc::new(Shared {
             connection,
             scripts: Scripts::new(),
             prefix: prefix.to_owned(),
-        })))
+        });
+        shared.probe().await;
+        tokio::spawn(probe(Arc::downgrade(&shared)));
+        Ok(Self(shared))
     }
 
-    /// Whether the store answers.
-    pub fn is_up(&self) -> bool {
-        self.0.connection.is_up()
+    /// Whether the store answers and takes writes.
+    pub fn is_ready(&self) -> bool {
+        self.0.connection.is_ready()
     }
 
-    /// How many calls got no answer since the start.
+    /// How many calls got no answer or were refused since the start.
     pub fn failures(&self) -> u64 {
         self.0.connection.failures()
     }
@@ -97,39 +122,51 @@ impl Store {
         Ok(reply)
     }
 
+    /// Of a record. Braces make a cluster keep the keys of a session at one node.
     fn key(&self, id: Uuid) -> String {
-        format!("{}:session:{id}", self.0.prefix)
+        format!("{}:session:{{{id}}}", self.0.prefix)
     }
 
-    /// Adds the record of a session. [`Reply::Other`] where its id is taken.
+    /// Runs a script on a session.
+    fn on<'a>(&self, script: &'a Script, name: SessionName) -> ScriptInvocation<'a> {
+        let SessionName { id, birth } = name;
+        let mut invocation = script.key(self.key(id));
+        invocation.key(format!("{}:ended:{{{id}}}:{birth:016x}", self.0.prefix));
+        invocation
+    }
+
+    /// Adds the record of the session with this id. [`Reply::Other`] where there is one.
     ///
     /// # Errors
     /// The store gives no answer.
     pub async fn create(&self, id: Uuid, record: &Record) -> Result<Reply, StoreAway> {
-        let (version, token) = (record.version, token());
+        let (version, token, birth) = (record.version, token(), record.opening.birth);
         let head = Record::head(&record.owner, &record.opening);
-        let mut script = self.0.scripts.create.key(self.key(id));
+        let mut script = self.on(&self.0.scripts.create, SessionName { id, birth });
         script.arg(version.generation).arg(version.frame).arg(token);
-        script.arg(&head[..]).arg(&record.state[..]);
+        script.arg(birth).arg(&head[..]).arg(&record.state[..]);
         script.arg(milliseconds(record.lives));
         self.about_record(script).await
     }
 
-    /// Moves a record from `before` to the frame `to`, with the state where it is given.
+    /// Moves a record from `before` to the frame `to`, with the state where it is given. `goes_on` says that this replica
+    /// goes on with the session from what it gets, where the record has another version.
     ///
     /// # Errors
     /// The store gives no answer. It may have done it nevertheless.
     pub async fn advance(
         &self,
-        id: Uuid,
+        name: SessionName,
         before: Version,
         to: u64,
         state: Option<&[u8]>,
+        goes_on: bool,
         lives: Duration,
     ) -> Result<Reply, StoreAway> {
-        let mut script = self.0.scripts.advance.key(self.key(id));
+        let mut script = self.on(&self.0.scripts.advance, name);
         script.arg(before.generation).arg(before.frame).arg(to);
         script.arg(token()).arg(milliseconds(lives));
+        script.arg(if goes_on { "1" } else { "" });
         if let Some(state) = state {
             script.arg(state);
         }
@@ -143,12 +180,12 @@ impl Store {
     /// The store gives no answer.
     pub async fn check(
         &self,
-        id: Uuid,
+        name: SessionName,
         version: Version,
         goes_on: bool,
         lives: Option<Duration>,
     ) -> Result<Reply, StoreAway> {
-        let mut script = self.0.scripts.check.key(self.key(id));
+        let mut script = self.on(&self.0.scripts.check, name);
         script.arg(version.generation).arg(version.frame);
         script.arg(if goes_on { "1" } else { "" });
         if let Some(lives) = lives {
@@ -162,8 +199,8 @@ impl Store {
     ///
     /// # Errors
     /// The store gives no answer. It may have done it nevertheless.
-    pub async fn fence(&self, id: Uuid, version: Version) -> Result<Reply, StoreAway> {
-        let mut script = self.0.scripts.fence.key(self.key(id));
+    pub async fn fence(&self, name: SessionName, version: Version) -> Result<Reply, StoreAway> {
+        let mut script = self.on(&self.0.scripts.fence, name);
         script.arg(version.generation).arg(version.frame);
         self.about_record(script).await
     }
@@ -174,22 +211,24 @@ impl Store {
     /// The store gives no answer.
     pub async fn load(&self, id: Uuid) -> Result<Option<Record>, StoreAway> {
         let mut script = self.0.scripts.check.key(self.key(id));
-        // No record has these.
+        // Whether a session was ended does not matter, and no record has this version.
+        script.key(self.key(id));
         script.arg("").arg("").arg("");
         Ok(match self.about_record(script).await? {
             Reply::Other(record) => Some(*record),
-            Reply::Gone | Reply::Done(_) => None,
+            Reply::Missing | Reply::Ended | Reply::Done(_) => None,
         })
     }
 
-    /// Removes the record of a session.
+    /// Ends a session: no replica brings its record back within `lives`, the time that a copy may live. False where it had
+    /// ended before.
     ///
     /// # Errors
     /// The store gives no answer.
-    pub async fn remove(&self, id: Uuid) -> Result<(), StoreAway> {
-        let mut command = redis::cmd("DEL");
-        command.arg(self.key(id));
-        self.0.connection.call(Call::Command(command)).await
+    pub async fn end(&self, name: SessionName, lives: Duration) -> Result<bool, StoreAway> {
+        let mut script = self.on(&self.0.scripts.end, name);
+        script.arg(name.birth).arg(milliseconds(lives));
+        self.0.connection.call(Call::Script(script)).await
     }
 
     /// The id that an owner's idempotency key names: `id`, if it names none yet.
@@ -217,6 +256,6 @@ fn milliseconds(time: Duration) -> u64 {
 
 impl std::fmt::Debug for Store {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(formatter, "Store(up: {})", self.is_up())
+        write!(formatter, "Store(ready: {})", self.is_ready())
     }
 }

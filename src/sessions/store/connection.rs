@@ -9,12 +9,10 @@ use redis::{
     ScriptInvocation, ServerErrorKind, Value,
 };
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep, timeout_at};
 
-/// How often a store is asked whether it is there.
-const PROBE: Duration = Duration::from_millis(250);
 /// Between two attempts of one call.
 const PAUSE: Duration = Duration::from_millis(10);
 
@@ -59,6 +57,10 @@ pub(super) struct Connection {
     /// With the number of links before it.
     link: Mutex<(u64, Link)>,
     is_up: AtomicBool,
+    /// Whether the store refused the last write of a probe.
+    refuses: AtomicBool,
+    /// Whether the next probe is a write: at the start, and after a call was refused.
+    is_doubtful: AtomicBool,
     failures: AtomicU64,
 }
 
@@ -113,25 +115,30 @@ impl ConnectionLike for Link {
 
 impl Connection {
     /// To the store at this address, whose calls end after `timeout`. Nothing is sent yet.
-    pub(super) fn new(address: StoreAddress, timeout: Duration) -> RedisResult<Arc<Self>> {
+    pub(super) fn new(address: StoreAddress, timeout: Duration) -> RedisResult<Self> {
         let link = Link::new(&address, timeout)?;
-        let connection = Arc::new(Self {
+        Ok(Self {
             address,
             timeout,
             link: Mutex::new((0, link)),
             is_up: AtomicBool::new(true),
+            refuses: AtomicBool::new(false),
+            is_doubtful: AtomicBool::new(true),
             failures: AtomicU64::new(0),
-        });
-        tokio::spawn(probe(Arc::downgrade(&connection)));
-        Ok(connection)
+        })
     }
 
-    /// Whether the last call got an answer.
-    pub(super) fn is_up(&self) -> bool {
+    /// Whether the last call got an answer, and the last probe found that the store takes writes.
+    pub(super) fn is_ready(&self) -> bool {
+        self.is_up() && !self.refuses.load(Ordering::Acquire)
+    }
+
+    /// Whether the last call got an answer, a refusal too.
+    fn is_up(&self) -> bool {
         self.is_up.load(Ordering::Acquire)
     }
 
-    /// How many calls got no answer.
+    /// How many calls got no answer, or were refused.
     pub(super) fn failures(&self) -> u64 {
         self.failures.load(Ordering::Relaxed)
     }
@@ -157,15 +164,17 @@ impl Connection {
             let (number, mut link) = self.lock().clone();
             match timeout_at(deadline, call.send(&mut link)).await {
                 Ok(Ok(value)) => {
-                    if !self.is_up.swap(true, Ordering::AcqRel) {
-                        tracing::info!("the store answers again");
-                    }
+                    self.answers();
                     return Ok(value);
                 }
                 // It answers, but will not do this, however often it is asked.
                 Ok(Err(error)) if is_refusal(&error) => {
-                    tracing::error!(%error, "the store refuses a call");
+                    self.answers();
+                    self.is_doubtful.store(true, Ordering::Release);
                     self.failures.fetch_add(1, Ordering::Relaxed);
+                    if !self.refuses.load(Ordering::Acquire) {
+                        tracing::error!(%error, "the store refuses a call");
+                    }
                     return Err(StoreAway::because(&error));
                 }
                 Ok(Err(error)) => reason = Some(error),
@@ -182,6 +191,12 @@ impl Connection {
         Err(StoreAway(reason))
     }
 
+    fn answers(&self) {
+        if !self.is_up.swap(true, Ordering::AcqRel) {
+            tracing::info!("the store answers again");
+        }
+    }
+
     fn replace(&self, number: u64) {
         let mut link = self.lock();
         if link.0 == number
@@ -196,14 +211,15 @@ impl Connection {
         self.link.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks the store whether it is there.
-    pub(super) async fn ping(&self) -> Result<(), StoreAway> {
-        let answer = self.attempt(Call::Command(redis::cmd("PING"))).await;
-        // A store that refuses even this takes no frame: the password is wrong, say.
-        if answer.is_err() {
-            self.is_up.store(false, Ordering::Release);
+    /// Asks the store whether it is there; with this write, where it may not take any.
+    pub(super) async fn probe(&self, write: Call<'_>) {
+        let is_doubtful = self.is_doubtful.swap(false, Ordering::AcqRel);
+        if is_doubtful || !self.is_ready() {
+            let is_refused = self.attempt(write).await.is_err();
+            self.refuses.store(is_refused, Ordering::Release);
+        } else {
+            let _ = self.attempt(Call::Command(redis::cmd("PING"))).await;
         }
-        answer.map(|_| ())
     }
 }
 
@@ -214,14 +230,5 @@ fn is_refusal(error: &RedisError) -> bool {
         ErrorKind::Server(BusyLoading | ClusterDown | MasterDown | ReadOnly | TryAgain) => false,
         ErrorKind::Server(_) | ErrorKind::Extension => true,
         _ => false,
-    }
-}
-
-/// Finds out whether the store is there, as long as somebody uses it.
-async fn probe(connection: Weak<Connection>) {
-    while let Some(connection) = connection.upgrade() {
-        let _ = connection.ping().await;
-        drop(connection);
-        sleep(PROBE).await;
     }
 }

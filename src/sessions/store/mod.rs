@@ -19,7 +19,15 @@
 //!   comes again with it does nothing.
 //! - The store is away or slow. A call ends after a bounded time with [`StoreAway`]; the next ones fail at once, until
 //!   a probe in the background has got an answer.
+//! - The store takes no writes, since its memory is used up, say. It refuses them one by one, and a probe that writes
+//!   finds out when that is over.
 //! - Nobody ends a session. Each write renews the record's time to live.
+//! - The store loses a record, or is out of reach until the record's time to live is over. A replica that has a copy in
+//!   memory makes the record again, with a generation that no other had. It does so for a frame only whose number
+//!   follows its copy: another replica may have a newer one.
+//! - A session is ended, and copies of it are in the memory of other replicas. A mark stays for as long as these may
+//!   live, and no record is made from them meanwhile. A new session may be opened under the same id; each has a random
+//!   number of its own, its *birth*, which tells them apart.
 
 mod address;
 mod calls;
@@ -30,4 +38,4 @@ mod scripts;
 pub use address::{AddressError, StoreAddress};
 pub use calls::{Reply, Store};
 pub use connection::StoreAway;
-pub use record::{Record, Version};
+pub use record::{Record, SessionName, Version};

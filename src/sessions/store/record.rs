@@ -4,6 +4,16 @@ use crate::sessions::opening::Opening;
 use crate::sessions::owner::Owner;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
+use uuid::Uuid;
+
+/// Names a session. The id alone may be another session's later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SessionName {
+    /// Its id.
+    pub id: Uuid,
+    /// The random number that it was opened with.
+    pub birth: u64,
+}
 
 /// Which state of a record a replica has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,11 +27,12 @@ pub struct Version {
 }
 
 impl Version {
-    /// A new record's, at this frame.
-    pub fn first(opening: &Opening, frame: u64) -> Self {
+    /// A new record's, at this frame. No other record has had its generation: what was tracked from another one, also of
+    /// the same session, does not go on from this.
+    pub fn first(frame: u64) -> Self {
         Self {
             // Below 2⁶², so that it can be counted up as a signed number.
-            generation: opening.birth >> 2,
+            generation: rand::random::<u64>() >> 2,
             frame,
             checkpoint: frame,
         }
