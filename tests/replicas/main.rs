@@ -11,6 +11,7 @@ mod lost_records;
 mod outage;
 mod pair;
 mod prefix;
+mod refusing;
 mod replica;
 mod server;
 mod sharing;

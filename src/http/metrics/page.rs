@@ -55,6 +55,10 @@ pub async fn get(
     gauges
         .draining
         .set(if state.is_draining() { 1.0 } else { 0.0 });
+    if let Some(store) = &state.store {
+        let calls = &store.calls;
+        state.metrics.store(calls.is_ready(), calls.failures());
+    }
     if let Some(memory) = memory_stats::memory_stats() {
         gauges.resident_memory.set(memory.physical_mem as f64);
     }

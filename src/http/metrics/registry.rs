@@ -110,6 +110,22 @@ impl Metrics {
             .increment(1);
     }
 
+    /// Of a service with a store: whether it is ready, and how many calls failed.
+    pub fn store(&self, is_ready: bool, failures: u64) {
+        let make = Maker(&self.recorder);
+        let up = make.gauge(
+            "bagtrack_store_up",
+            "1 while the store answers and takes writes.",
+        );
+        up.set(if is_ready { 1.0 } else { 0.0 });
+        let failed = make.counter(
+            "bagtrack_store_failures_total",
+            "Calls that the store did not answer or refused, probes among them.",
+            &[],
+        );
+        failed.absolute(failures);
+    }
+
     /// The text for Prometheus.
     pub fn render(&self) -> String {
         self.recorder.handle().render()

@@ -1,0 +1,122 @@
+//! A store that is there, but takes no writes, or is slow.
+
+use crate::pair::{Pair, json};
+use reqwest::{Response, StatusCode};
+use std::time::{Duration, Instant};
+
+async fn must_come_again(answer: Response) {
+    assert!(answer.headers().contains_key("retry-after"));
+    let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
+    assert_eq!(problem["type"], "urn:bagtrack:problem:store-unavailable");
+}
+
+/// The value of a metric of the first replica; none if it has no such metric.
+async fn metric(pair: &Pair, name: &str) -> Option<f64> {
+    let page = pair.client.get(pair.replicas[0].url("/metrics")).send();
+    let text = page.await.unwrap().text().await.unwrap();
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.trim().parse().ok()
+}
+
+/// What Redis is told, so that it takes no writes, and how it is told otherwise.
+async fn is_not_ready_while(refuse: &[&str], take: &[&str]) {
+    let pair = Pair::open(&[], 5).await;
+    json(pair.post(0, 1).await, StatusCode::OK).await;
+    assert_eq!(metric(&pair, "bagtrack_store_up").await, Some(1.0));
+    assert_eq!(
+        metric(&pair, "bagtrack_store_failures_total").await,
+        Some(0.0)
+    );
+    pair.redis.ask(refuse);
+    must_come_again(pair.post(0, 2).await).await;
+    while pair.replicas[0].readiness().await == StatusCode::OK {}
+    // It stays so, for more than two probes.
+    let found = Instant::now();
+    while found.elapsed() < Duration::from_millis(700) {
+        assert_ne!(pair.replicas[0].readiness().await, StatusCode::OK);
+    }
+    assert_eq!(metric(&pair, "bagtrack_store_up").await, Some(0.0));
+    assert!(metric(&pair, "bagtrack_store_failures_total").await > Some(0.0));
+    // What needs no write is answered.
+    assert_eq!(json(pair.view(0).await, StatusCode::OK).await["frames"], 2);
+    must_come_again(pair.post(0, 2).await).await;
+    pair.redis.ask(take);
+    while pair.replicas[0].readiness().await != StatusCode::OK {}
+    assert_eq!(metric(&pair, "bagtrack_store_up").await, Some(1.0));
+    json(pair.post(0, 2).await, StatusCode::OK).await;
+    json(pair.post(1, 3).await, StatusCode::OK).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_store_whose_memory_is_used_up_is_not_ready() {
+    let refuse = ["config", "set", "maxmemory", "1"];
+    is_not_ready_while(&refuse, &["config", "set", "maxmemory", "0"]).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_store_that_does_not_allow_writes_is_not_ready() {
+    let refuse = ["acl", "setuser", "default", "-hset"];
+    is_not_ready_while(&refuse, &["acl", "setuser", "default", "+hset"]).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_session_can_be_ended_where_the_memory_is_used_up() {
+    let pair = Pair::open(&[], 3).await;
+    pair.redis.ask(&["config", "set", "maxmemory", "1"]);
+    let ended = pair.client.delete(pair.url(0, "")).send().await.unwrap();
+    assert_eq!(ended.status(), StatusCode::NO_CONTENT);
+    json(pair.post(1, 1).await, StatusCode::NOT_FOUND).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_store_that_gives_no_answer_is_waited_for_once() {
+    let pair = Pair::open(&["--store-timeout", "500ms"], 8).await;
+    let expected = pair.undisturbed().await;
+    for number in 1..4 {
+        json(pair.post(0, number).await, StatusCode::OK).await;
+    }
+    pair.redis.pause();
+    let asked = Instant::now();
+    must_come_again(pair.post(0, 4).await).await;
+    let first = asked.elapsed();
+    while pair.replicas[0].readiness().await == StatusCode::OK {}
+    let asked = Instant::now();
+    for _ in 0..4 {
+        must_come_again(pair.post(0, 4).await).await;
+    }
+    let others = asked.elapsed();
+    // The rest is tracking, and a busy machine.
+    assert!(first < Duration::from_millis(2500), "{first:?}");
+    assert!(others < Duration::from_millis(2000), "{others:?}");
+    pair.redis.go_on();
+    while pair.replicas[0].readiness().await != StatusCode::OK {}
+    for number in 4..8 {
+        let answer = json(pair.post(0, number).await, StatusCode::OK).await;
+        assert_eq!(answer, expected[number - 1], "frame {number}");
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_frame_that_is_taken_renews_the_time_to_live_and_a_refused_one_does_not() {
+    let flags = ["--session-first", "20s", "--session-idle", "100s"];
+    let pair = Pair::open(&flags, 3).await;
+    let key = format!("bagtrack:session:{{{}}}", pair.id);
+    let lives = || -> u64 { pair.redis.ask(&["pttl", &key]).trim().parse().unwrap() };
+    assert!(lives() <= 20_000);
+    json(pair.post_as(0, 5, 1).await, StatusCode::CONFLICT).await;
+    assert!(lives() <= 20_000);
+    for number in 1..3 {
+        json(pair.post(0, number).await, StatusCode::OK).await;
+        assert!(lives() > 50_000, "{}", lives());
+        pair.redis.ask(&["pexpire", &key, "20000"]);
+        // Sent again, to a replica that has not answered it.
+        json(pair.post(1, number).await, StatusCode::OK).await;
+        assert!(lives() > 50_000, "{}", lives());
+        pair.redis.ask(&["pexpire", &key, "20000"]);
+    }
+}
