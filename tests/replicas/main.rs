@@ -18,3 +18,4 @@ mod sharing;
 mod stream_client;
 mod streams;
 mod tracking_client;
+mod trouble;

@@ -1,0 +1,132 @@
+//! The configurations of docker/ before replicas that are about to end, or whose store is away; and streams.
+
+use crate::balancers::{Balancer, haproxy, nginx};
+use crate::clip::Clip;
+use crate::pair::{Pair, json};
+use crate::replica::Replica;
+use crate::stream_client::StreamClient;
+use reqwest::{Client, Response, StatusCode};
+use std::time::Instant;
+
+async fn open(client: &Client, front: &Balancer, clip: &Clip) -> Response {
+    let url = format!("http://{}/sessions?box={}", front.address, clip.first_box);
+    let request = client.post(url).body(clip.frames[0].clone());
+    request.send().await.unwrap()
+}
+
+fn location(opened: &Response) -> String {
+    let location = opened.headers().get("location");
+    let location = location.unwrap_or_else(|| panic!("{opened:?}"));
+    location.to_str().unwrap().to_owned()
+}
+
+/// Without a store: what goes to another replica would not find its session.
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions_and_no_new_ones() {
+    let replicas = [(); 3].map(|()| Replica::start(&["--shutdown-delay", "60s"]));
+    let front = haproxy(&replicas.each_ref().map(|replica| replica.address));
+    let (client, clip) = (Client::new(), Clip::of(0, 60));
+    let session = location(&open(&client, &front, &clip).await);
+    let mut own = None;
+    for replica in &replicas {
+        let view = client.get(replica.url(&session)).send().await.unwrap();
+        if view.status() == StatusCode::OK {
+            own = Some(replica);
+        }
+    }
+    let own = own.expect("a replica has the session");
+    own.ask_to_end();
+    while own.readiness().await == StatusCode::OK {}
+    // Longer than HAProxy needs to find out: twice the interval of its checks.
+    let (asked, mut number, mut opened) = (Instant::now(), 0, 0);
+    while asked.elapsed().as_secs() < 3 || number < 20 {
+        number += 1;
+        let frame = clip.frames[number % 60].clone();
+        let url = format!("http://{}{session}/frames?frame={number}", front.address);
+        let answer = client.post(url).body(frame).send().await.unwrap();
+        assert_eq!(answer.headers()["draining"], "true");
+        json(answer, StatusCode::OK).await;
+        // Until HAProxy has found out, the replica refuses some; then the others take all.
+        if asked.elapsed().as_secs() >= 2 {
+            let new = open(&client, &front, &clip).await;
+            let path = location(&new);
+            json(new, StatusCode::CREATED).await;
+            let view = client.get(own.url(&path)).send().await.unwrap();
+            assert_eq!(view.status(), StatusCode::NOT_FOUND);
+            opened += 1;
+        }
+    }
+    assert!(opened > 0);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
+    let mut pair = Pair::open(&["--store-timeout", "300ms"], 4).await;
+    let front = haproxy(&pair.replicas.each_ref().map(|replica| replica.address));
+    let url = |path: &str| format!("http://{}/sessions{path}", front.address);
+    let post = async |number: usize| {
+        let url = url(&format!("/{}/frames?frame={number}", pair.id));
+        let request = pair.client.post(url).body(pair.clip.frames[number].clone());
+        request.send().await.unwrap()
+    };
+    json(post(1).await, StatusCode::OK).await;
+    pair.redis.stop();
+    for replica in &pair.replicas {
+        while replica.readiness().await == StatusCode::OK {}
+    }
+    let (stopped, mut told) = (Instant::now(), Vec::new());
+    while stopped.elapsed().as_secs() < 3 {
+        // The replica's own answer to a frame, and in the end HAProxy's to a request that opens a session.
+        for (answer, is_new) in [
+            (post(2).await, false),
+            (open(&pair.client, &front, &pair.clip).await, true),
+        ] {
+            assert!(answer.headers().contains_key("retry-after"));
+            let media_type = answer.headers()["content-type"].to_str().unwrap();
+            assert_eq!(media_type, "application/problem+json");
+            let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
+            let kind = problem["type"].as_str().unwrap().rsplit(':').next();
+            if is_new {
+                told.push(kind.unwrap().to_owned());
+            } else {
+                assert_eq!(kind, Some("store-unavailable"));
+            }
+        }
+    }
+    assert_eq!(told.last().unwrap(), "not-ready");
+    pair.redis.start_again();
+    while post(2).await.status() != StatusCode::OK {}
+    while open(&pair.client, &front, &pair.clip).await.status() != StatusCode::CREATED {}
+}
+
+/// A stream through a balancer, and its frames again through another stream.
+async fn a_stream_passes(balance: fn(&[std::net::SocketAddr]) -> Balancer) {
+    let pair = Pair::open(&[], 12).await;
+    let expected = pair.undisturbed().await;
+    let [first, second] = pair.replicas.each_ref().map(|replica| replica.address);
+    let front = balance(&[first, second, first]);
+    let mut stream = StreamClient::open(front.address, pair.id, "").await;
+    for number in 1..10 {
+        let answer = stream.track(&pair.clip.frames[number]).await;
+        assert_eq!(answer["box"], expected[number - 1]["box"]);
+        assert_eq!(answer["checkpoint"], number);
+    }
+    let mut again = StreamClient::open(front.address, pair.id, "?from=9").await;
+    assert_eq!(again.message().await["frame"], 9);
+    let answer = again.track(&pair.clip.frames[10]).await;
+    assert_eq!(answer["box"], expected[9]["box"]);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_stream_passes_through_haproxy() {
+    a_stream_passes(haproxy).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and nginx"]
+async fn a_stream_passes_through_nginx() {
+    a_stream_passes(nginx).await;
+}
