@@ -42,15 +42,21 @@ impl Progress {
     }
 }
 
-/// The boxes without a store and without failures.
-async fn undisturbed(clips: &[Clip]) -> Vec<Vec<Answer>> {
-    let alone = Replica::start(&[]);
-    let mut answers = Vec::new();
+/// With the same secret, snapshots of the same state are the same bytes.
+const SECRET: [&str; 2] = ["--snapshot-keys", "a secret of these tests"];
+
+/// The boxes without a store and without failures, which are rounded, and the states that they lead to, which are not.
+async fn undisturbed(clips: &[Clip]) -> Vec<(Vec<Answer>, Vec<u8>)> {
+    let alone = Replica::start(&SECRET);
+    let mut tracks = Vec::new();
     for (number, clip) in clips.iter().enumerate() {
         let track = Track::open(alone.url(""), Client::new(), number, clip.clone());
-        answers.push(track.await.follow().await);
+        let mut track = track.await;
+        while track.advance().await {}
+        let state = track.snapshot().await;
+        tracks.push((track.answers, state));
     }
-    answers
+    tracks
 }
 
 /// Kills and starts replicas, and Redis, while the clients go on.
@@ -90,9 +96,10 @@ where
     let expected = undisturbed(&clips).await;
 
     let mut redis = Redis::start();
-    let lossy_store = Lossy::before(vec![redis.address], 4 << 20..16 << 20).await;
+    let lossy_store = Lossy::before(vec![redis.address], 128 << 10..1 << 20).await;
     let url = format!("redis://{}", lossy_store.address);
-    let replica = || Replica::with_store(&url, &["--store-timeout", "2s"]);
+    let flags = [&["--store-timeout", "2s"], &SECRET[..]].concat();
+    let replica = || Replica::with_store(&url, &flags);
     let mut replicas = vec![replica(), replica(), replica()];
     let (address, _front) = front(replicas.iter().map(|replica| replica.address).collect()).await;
     // A connection for one frame is cut in the middle of it, or not at all.
@@ -116,7 +123,8 @@ where
                 progress.frames.fetch_add(1, Ordering::AcqRel);
                 progress.moved.notify_waiters();
             }
-            (number, track)
+            let state = track.snapshot().await;
+            (number, track, state)
         });
     }
     let all = clients * frames;
@@ -129,19 +137,22 @@ where
     tokio::join!(finish, disturb(&progress, &mut replicas, &mut redis, all));
 
     assert_eq!(done.len(), clients);
-    for (number, track) in done {
+    for (number, track, state) in done {
         assert!(
             !track.went_back(),
             "client {number}: an answered frame was lost"
         );
         assert_eq!(track.answers.len(), frames, "client {number}");
-        for (answer, expected) in track.answers.iter().zip(&expected[number]) {
+        let (answers, last) = &expected[number];
+        for (answer, expected) in track.answers.iter().zip(answers) {
             assert_eq!(answer, expected, "client {number}");
         }
+        assert!(state == *last, "client {number}: another state");
     }
     let cuts = [&lossy, &lossy_store].map(|proxy| proxy.cuts.load(Ordering::Relaxed));
     println!("{clients} clients, {frames} frames each; connections cut: {cuts:?}");
-    assert!(cuts[0] > 0, "the network was not lossy");
+    assert!(cuts[0] > 0, "the clients' network was not lossy");
+    assert!(cuts[1] > 0, "the store's network was not lossy");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -76,6 +76,13 @@ impl Track {
         self.session.resent() > 0 || self.session.id() != self.id
     }
 
+    /// The whole session as bytes: two are the same exactly if all boxes that follow are.
+    pub async fn snapshot(&mut self) -> Vec<u8> {
+        let snapshot = self.session.snapshot().await;
+        let snapshot = snapshot.unwrap_or_else(|error| panic!("session {}: {error}", self.id));
+        snapshot.to_vec()
+    }
+
     /// The answers to all frames.
     pub async fn follow(mut self) -> Vec<Answer> {
         while self.advance().await {}
