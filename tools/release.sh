@@ -21,8 +21,11 @@ for program in docker podman; do
     # A client alone builds nothing.
     if [ -z "$builder" ] && "$program" info >/dev/null 2>&1; then builder=$program; fi
 done
+# The format of OCI images has no HEALTHCHECK.
+format=()
+[ "$builder" != podman ] || format=(--format docker)
 if [ -n "$builder" ]; then
-    "$builder" build --file docker/Dockerfile --tag "bagtrack:$version" \
+    "$builder" build "${format[@]}" --file docker/Dockerfile --tag "bagtrack:$version" \
         --build-arg "VERSION=$version" --build-arg "REVISION=$(git rev-parse HEAD)" .
     "$builder" save "bagtrack:$version" | gzip >"$files/bagtrack-$version-image.tar.gz"
 else
