@@ -59,10 +59,11 @@ export class Client {
    * Opens a session that goes on where a snapshot was taken, here or at another instance with the same secret.
    * @param {Frame} snapshot
    * @param {AbortSignal} [signal]
+   * @param {number} [patience] Milliseconds in which a call that fails for a moment is made again; as the client's.
    * @returns {Promise<Session>}
    */
-  restore(snapshot, signal) {
-    return this.create({ body: snapshot, type: SNAPSHOT, signal });
+  restore(snapshot, signal, patience) {
+    return this.create({ body: snapshot, type: SNAPSHOT, signal, patience });
   }
 
   /**

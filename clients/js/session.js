@@ -30,6 +30,8 @@ import { FrameStream } from "./stream.js";
 
 /** Most requests that are kept until the store has their frames. */
 const MOST_KEPT = 256;
+/** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
+const TRIES_TO_MOVE = 1000;
 
 /** @param {Box} box */
 export function boxText({ x, y, width, height }) {
@@ -49,8 +51,10 @@ export class Session {
     this.id = id;
     this.frame = frame;
     this.box = box;
-    /** Whether the service is about to end: take a snapshot, and restore it elsewhere. */
+    /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     this.isDraining = false;
+    /** When that was tried last. */
+    this.triedToMove = 0;
     /** @type {Sent[]} What a service with a store may ask for again. */
     this.kept = [];
     /** @type {Promise<unknown>} The requests before. */
@@ -191,7 +195,17 @@ export class Session {
     this.box = answer.box;
     this.kept.push(sent);
     this.note(response.headers);
+    // With a store, any replica has the session.
+    const isAlone = this.isDraining && !response.headers.has("checkpoint");
+    if (isAlone && Date.now() - this.triedToMove >= TRIES_TO_MOVE) await this.moveOn();
     return answer;
+  }
+
+  /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
+  async moveOn() {
+    this.triedToMove = Date.now();
+    const moved = await this.snapshot().then((bytes) => this.client.restore(bytes, undefined, 0)).catch(() => undefined);
+    if (moved) [this.id, this.isDraining] = [moved.id, moved.isDraining];
   }
 
   /**

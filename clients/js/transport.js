@@ -13,6 +13,7 @@ const ATTEMPT = 30_000;
  * @property {BodyInit} [body]
  * @property {string} [type] The media type of the body.
  * @property {AbortSignal} [signal]
+ * @property {number} [patience] Milliseconds in which the call is made again; as the client's when left out.
  */
 
 /**
@@ -68,7 +69,7 @@ export class Transport {
    * @returns {Promise<Response>} A good answer.
    */
   async call(method, path, request = {}) {
-    const late = Date.now() + this.patience;
+    const late = Date.now() + (request.patience ?? this.patience);
     for (let wait = FIRST_PAUSE; ; wait = Math.min(2 * wait, LONGEST_PAUSE)) {
       try {
         return await this.attempt(method, this.at(path, request.query), request);

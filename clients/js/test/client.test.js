@@ -1,6 +1,7 @@
 // The client against the program: the boxes must be those of the library.
 
 import assert from "node:assert/strict";
+import { createServer, request as forward } from "node:http";
 import { after, before, test } from "node:test";
 import { Client, Problem } from "../bagtrack.js";
 import { SEED, openLine, rounded, sampleClip, startService } from "./service.js";
@@ -157,5 +158,56 @@ test("keys and session tokens", async () => {
     own.close();
   } finally {
     await closed.stop();
+  }
+});
+
+test("a session leaves a service that is about to end", async () => {
+  const secret = { BAGTRACK_SNAPSHOT_KEYS: "a secret of this test" };
+  const [first, second] = await Promise.all([startService([], secret), startService([], secret)]);
+  // As a balancer does: requests that open sessions go to a service that takes them, the others to their session's.
+  /** @type {Map<string, number>} */
+  const ports = new Map();
+  let opensAt = first.port;
+  const balancer = createServer((request, response) => {
+    const id = /sessions\/([^/?]+)/.exec(request.url ?? "")?.[1] ?? "";
+    if (!ports.has(id)) ports.set(id, opensAt);
+    const { method, url, headers } = request;
+    const options = { host: "127.0.0.1", port: ports.get(id), method, path: url, headers };
+    const passed = forward(options, (answer) => {
+      response.writeHead(answer.statusCode ?? 502, answer.headers);
+      answer.pipe(response);
+    });
+    passed.on("error", () => response.destroy());
+    request.pipe(passed);
+  });
+  await new Promise((resolve) => balancer.listen(0, "127.0.0.1", () => resolve(undefined)));
+  try {
+    const client = new Client(`http://127.0.0.1:${/** @type {any} */ (balancer.address()).port}`);
+    const session = await client.open(clip.frames[0], clip.box, { seed: SEED });
+    const opened = session.id;
+    const answers = [];
+    for (const [index, frame] of clip.frames.slice(1, 21).entries()) {
+      if (index === 8) {
+        first.ask();
+        while ((await fetch(`${first.url}/readyz`)).ok);
+        // It is the only one for now.
+        assert.equal(session.isDraining, false);
+      }
+      if (index === 12) {
+        assert.ok(session.isDraining && session.id === opened);
+        opensAt = second.port;
+        session.triedToMove = 0;
+      }
+      if (index === 14) {
+        assert.ok(!session.isDraining && session.id !== opened);
+        await first.stop();
+      }
+      answers.push(await session.track(frame));
+    }
+    assert.deepEqual(answers.map(rounded), clip.answers.slice(1, 21));
+  } finally {
+    balancer.close();
+    balancer.closeAllConnections();
+    await Promise.all([first.stop(), second.stop()]);
   }
 });

@@ -49,9 +49,10 @@ export declare class Client {
      * Opens a session that goes on where a snapshot was taken, here or at another instance with the same secret.
      * @param {Frame} snapshot
      * @param {AbortSignal} [signal]
+     * @param {number} [patience] Milliseconds in which a call that fails for a moment is made again; as the client's.
      * @returns {Promise<Session>}
      */
-    restore(snapshot: Frame, signal?: AbortSignal): Promise<Session>;
+    restore(snapshot: Frame, signal?: AbortSignal, patience?: number): Promise<Session>;
     /**
      * A session that is open already, such as one that a page was given a token for.
      * @param {string} id

@@ -41,8 +41,10 @@ export declare class Session {
     id: string;
     frame: number;
     box: Box;
-    /** Whether the service is about to end: take a snapshot, and restore it elsewhere. */
+    /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     isDraining: boolean;
+    /** When that was tried last. */
+    triedToMove: number;
     /** @type {Sent[]} What a service with a store may ask for again. */
     kept: Sent[];
     /** @type {Promise<unknown>} The requests before. */
@@ -125,6 +127,8 @@ export declare class Session {
      * @param {Sent["make"]} make
      */
     send(count: number, make: Sent["make"]): Promise<any>;
+    /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
+    moveOn(): Promise<void>;
     /**
      * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
      * @param {unknown} error

@@ -6,6 +6,10 @@ export type Request = {
      */
     type?: string;
     signal?: AbortSignal;
+    /**
+     * Milliseconds in which the call is made again; as the client's when left out.
+     */
+    patience?: number;
 };
 /**
  * @typedef {object} Request
@@ -13,6 +17,7 @@ export type Request = {
  * @property {BodyInit} [body]
  * @property {string} [type] The media type of the body.
  * @property {AbortSignal} [signal]
+ * @property {number} [patience] Milliseconds in which the call is made again; as the client's when left out.
  */
 /**
  * Waits, or fails as soon as the signal says so.
