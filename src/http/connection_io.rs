@@ -1,6 +1,6 @@
 //! A connection's bytes, with what hyper's own handling of them lacks.
 //!
-//! - *A client that takes nothing* of an answer is let go after a time.
+//! - *A client that takes an answer slowly*, or nothing of it, is let go.
 //! - *A client that has closed its side* may still wait for its answer, or have gone: TCP does not tell. It gets some
 //!   time for the answer to a whole request; then it counts as gone, and its request is dropped. Whether the request is
 //!   whole shows when its handler has read the body, for which there is a moment.
@@ -8,7 +8,10 @@
 
 use super::activity::Activity;
 use super::head_problems;
+use super::least_rate::LeastRate;
+use super::state::AppState;
 use std::io::{self, IoSlice};
+use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
@@ -16,15 +19,19 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep_until};
-use tokio_io_timeout::TimeoutStream;
 
 /// Time for a handler to read the body that has come.
 const READING: Duration = Duration::from_millis(500);
 
 /// The stream of a connection.
+#[derive(Debug)]
 pub struct ConnectionIo {
-    stream: Pin<Box<TimeoutStream<TcpStream>>>,
+    stream: TcpStream,
+    client: IpAddr,
     activity: Arc<Activity>,
+    state: AppState,
+    /// At which the client takes answers.
+    rate: LeastRate,
     half_close_timeout: Duration,
     /// Set when the client has closed its side: since when, and what wakes the connection.
     half_closed: Option<(Instant, Pin<Box<Sleep>>)>,
@@ -34,19 +41,21 @@ pub struct ConnectionIo {
 }
 
 impl ConnectionIo {
-    /// For a stream whose service tells `activity` what it does.
+    /// For a stream to this client, whose service tells `activity` what it does.
     pub fn new(
         stream: TcpStream,
+        client: IpAddr,
         activity: Arc<Activity>,
-        write_timeout: Duration,
-        half_close_timeout: Duration,
+        state: AppState,
     ) -> Self {
-        let mut stream = TimeoutStream::new(stream);
-        stream.set_write_timeout(Some(write_timeout));
+        let limits = &state.config.limits;
         Self {
-            stream: Box::pin(stream),
+            stream,
+            client,
             activity,
-            half_close_timeout,
+            rate: LeastRate::new(limits.write_timeout, limits.min_answer_rate),
+            half_close_timeout: limits.half_close_timeout,
+            state,
             half_closed: None,
             document: Vec::new(),
             written: 0,
@@ -58,9 +67,10 @@ impl ConnectionIo {
         if self.activity.idle_since().is_none() {
             return false;
         }
-        match head_problems::document_for(bytes) {
-            Some(document) => {
-                self.document = document;
+        match head_problems::problem_of(bytes) {
+            Some(problem) => {
+                let metrics = &self.state.metrics;
+                self.document = head_problems::answer_of(&problem, self.client, metrics);
                 self.written = 0;
                 true
             }
@@ -68,10 +78,33 @@ impl ConnectionIo {
         }
     }
 
+    /// What came of writing: an error where the client is too slow.
+    fn paced(
+        &mut self,
+        cx: &mut Context<'_>,
+        written: Poll<io::Result<usize>>,
+    ) -> Poll<io::Result<usize>> {
+        match &written {
+            Poll::Ready(Ok(bytes)) => self.rate.moved(*bytes),
+            Poll::Ready(Err(_)) => {}
+            Poll::Pending => {
+                ready!(self.rate.poll_late(cx));
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
+        written
+    }
+
+    fn poll_bytes(&mut self, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        self.paced(cx, written)
+    }
+
     fn poll_document(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         while self.written < self.document.len() {
             let rest = &self.document[self.written..];
-            let written = ready!(self.stream.as_mut().poll_write(cx, rest))?;
+            let written = Pin::new(&mut self.stream).poll_write(cx, rest);
+            let written = ready!(self.paced(cx, written))?;
             if written == 0 {
                 return Poll::Ready(Err(io::ErrorKind::WriteZero.into()));
             }
@@ -88,7 +121,7 @@ impl AsyncRead for ConnectionIo {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
-        ready!(self.stream.as_mut().poll_read(cx, buffer))?;
+        ready!(Pin::new(&mut self.stream).poll_read(cx, buffer))?;
         let is_closed = buffer.filled().len() == before && buffer.remaining() > 0;
         let waits = self.activity.idle_since().is_none() && !self.activity.is_stream();
         if is_closed && waits {
@@ -119,7 +152,7 @@ impl AsyncWrite for ConnectionIo {
         if self.takes_over(bytes) {
             return Poll::Ready(Ok(bytes.len()));
         }
-        self.stream.as_mut().poll_write(cx, bytes)
+        self.poll_bytes(cx, bytes)
     }
 
     fn poll_write_vectored(
@@ -133,7 +166,8 @@ impl AsyncWrite for ConnectionIo {
         {
             return Poll::Ready(Ok(bytes.len()));
         }
-        self.stream.as_mut().poll_write_vectored(cx, slices)
+        let written = Pin::new(&mut self.stream).poll_write_vectored(cx, slices);
+        self.paced(cx, written)
     }
 
     fn is_write_vectored(&self) -> bool {
@@ -142,11 +176,11 @@ impl AsyncWrite for ConnectionIo {
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         ready!(self.poll_document(cx))?;
-        self.stream.as_mut().poll_flush(cx)
+        Pin::new(&mut self.stream).poll_flush(cx)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         ready!(self.poll_document(cx))?;
-        self.stream.as_mut().poll_shutdown(cx)
+        Pin::new(&mut self.stream).poll_shutdown(cx)
     }
 }

@@ -5,6 +5,7 @@
 
 use super::activity::Activity;
 use super::client::Client;
+use metrics::Counter;
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -28,6 +29,8 @@ pub struct Connections {
     open: Mutex<Open>,
     /// Told when one has ended.
     pub ended: Notify,
+    /// Counts those that were closed for others.
+    shed: Counter,
 }
 
 #[derive(Debug, Default)]
@@ -47,13 +50,14 @@ pub struct ConnectionPermit {
 }
 
 impl Connections {
-    /// At most `max` together and `max_of_address` of one address.
-    pub fn new(max: usize, max_of_address: usize) -> Arc<Self> {
+    /// At most `max` together and `max_of_address` of one address. `shed` counts those that are closed for others.
+    pub fn new(max: usize, max_of_address: usize, shed: Counter) -> Arc<Self> {
         Arc::new(Self {
             max,
             max_of_address,
             open: Mutex::default(),
             ended: Notify::new(),
+            shed,
         })
     }
 
@@ -72,8 +76,10 @@ impl Connections {
         if !shared && of_address >= self.max_of_address {
             let shed = open.shed(|other| *other == client);
             shed.ok_or(NoRoom::Address)?;
+            self.shed.increment(1);
         } else if open.connections.len() >= self.max {
             open.shed(|_| true).ok_or(NoRoom::All)?;
+            self.shed.increment(1);
         }
         let number = open.next;
         open.next += 1;
@@ -135,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_address_with_most_connections_loses_the_one_that_was_idle_longest() {
-        let connections = Connections::new(4, 3);
+        let connections = Connections::new(4, 3, Counter::noop());
         let address = |last: u8| IpAddr::from([192, 0, 2, last]);
         let enter = |last: u8| connections.enter(address(last), false);
         let busy = enter(1).unwrap();

@@ -36,7 +36,14 @@ pub struct LimitsConfig {
         value_parser = parse_duration
     ))]
     pub body_grace: Duration,
-    /// A connection whose client takes no byte of an answer for this long is closed.
+    /// Least bytes a second at which a client takes answers, after `write-timeout` of waiting for it.
+    #[cfg_attr(feature = "cli", arg(
+        long, env = "BAGTRACK_MIN_ANSWER_RATE",
+        default_value_t = LimitsConfig::default().min_answer_rate
+    ))]
+    pub min_answer_rate: u32,
+    /// A connection is closed when its client was waited for this long while it took no byte of an answer, or took them
+    /// more slowly than `min-answer-rate`.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_WRITE_TIMEOUT",
         default_value = shown(LimitsConfig::default().write_timeout),
@@ -121,6 +128,7 @@ impl Default for LimitsConfig {
             max_request_cpu: Duration::from_secs(5),
             min_body_rate: 4096,
             body_grace: Duration::from_secs(5),
+            min_answer_rate: 4096,
             write_timeout: Duration::from_secs(30),
             half_close_timeout: Duration::from_secs(5),
             ping_interval: Duration::from_secs(20),
@@ -144,7 +152,7 @@ impl LimitsConfig {
         &self,
         moment: &std::ops::RangeInclusive<Duration>,
         body: usize,
-    ) -> [(&'static str, bool, &'static str); 13] {
+    ) -> [(&'static str, bool, &'static str); 14] {
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let share = |share: Option<usize>| share.is_none_or(|share| share >= 1);
@@ -157,6 +165,7 @@ impl LimitsConfig {
             ),
             ("max-video-frames", self.max_video_frames >= 1, positive),
             ("min-body-rate", self.min_body_rate >= 1, positive),
+            ("min-answer-rate", self.min_answer_rate >= 1, positive),
             ("body-grace", moment.contains(&self.body_grace), duration),
             (
                 "write-timeout",

@@ -61,6 +61,7 @@ mod host;
 mod idempotency;
 mod identify;
 mod json;
+mod least_rate;
 mod limits_config;
 mod lines;
 mod memory_bound;
@@ -95,6 +96,7 @@ mod trace_context;
 mod track;
 mod upload;
 mod video_frames;
+mod video_place;
 mod work;
 
 pub use auth::access::AccessError;

@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 /// What a policy has to begin with that a page sets for itself. Nothing may be loaded, and no page may frame it.
-const STRICT: &str =
+pub const STRICT: &str =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// The page at `/`: its own style sheet, scripts and pictures, files that the user opens, and calls to this service.
@@ -21,7 +21,8 @@ pub const DOCS_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 
     script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self'; \
     connect-src 'self'";
 
-const HEADERS: [(HeaderName, &str); 5] = [
+/// What every answer has.
+pub const HEADERS: [(HeaderName, &str); 5] = [
     (X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (X_FRAME_OPTIONS, "DENY"),
     (REFERRER_POLICY, "no-referrer"),

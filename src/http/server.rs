@@ -124,7 +124,8 @@ impl Application {
         self.state.access.keys.clone()
     }
 
-    /// Serves these routes too, behind the same layers.
+    /// Serves these routes too: behind the layers that all requests pass, but not behind those that ask for a key, or
+    /// check the origin and the host.
     pub fn with_routes(mut self, routes: Router) -> Self {
         self.extra = self.extra.merge(routes);
         self
@@ -153,7 +154,7 @@ impl Application {
         let sweeper = tokio::spawn(sweep(state.clone()));
         {
             let service = router(state.clone(), extra);
-            let accepting = accept(&listener, config, service, &ending, cut_off);
+            let accepting = accept(&listener, &state, service, &ending, cut_off);
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
@@ -185,15 +186,19 @@ impl Application {
 /// Accepts connections for ever. They end when `cut_off` loses its sender.
 async fn accept(
     listener: &TcpListener,
-    config: &Config,
+    state: &AppState,
     service: Router,
     ending: &watch::Sender<bool>,
     cut_off: watch::Receiver<()>,
 ) {
-    let limits = &config.limits;
+    let (config, limits) = (&state.config, &state.config.limits);
     let of_address = limits.client_connections;
     let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
-    let connections = Connections::new(config.max_connections, of_address);
+    let connections = Connections::new(
+        config.max_connections,
+        of_address,
+        state.metrics.shed_connections.clone(),
+    );
     let mut builder = http1::Builder::new();
     builder
         .timer(TokioTimer::new())
@@ -219,19 +224,14 @@ async fn accept(
             }
         };
         let Ok(permit) = permit else {
-            refuse(stream);
+            refuse(stream, peer, state);
             continue;
         };
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
         let activity = permit.activity.clone();
-        let io = ConnectionIo::new(
-            stream,
-            activity.clone(),
-            limits.write_timeout,
-            limits.half_close_timeout,
-        );
+        let io = ConnectionIo::new(stream, peer.ip(), activity.clone(), state.clone());
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
         let service = service.clone().layer(Extension(Peer(peer)));
         let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
@@ -247,8 +247,9 @@ async fn accept(
 }
 
 /// Tells a client that it has too many connections, as far as its system takes that at once.
-fn refuse(stream: TcpStream) {
-    let answer = head_problems::answer_of(&Problem::too_many_connections());
+fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
+    let problem = Problem::too_many_connections();
+    let answer = head_problems::answer_of(&problem, peer.ip(), &state.metrics);
     if let Ok(mut stream) = stream.into_std() {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);

@@ -8,7 +8,7 @@ use reqwest::StatusCode;
 use serde_json::Value;
 use std::time::Duration;
 
-const HEALTH: &str = "GET /healthz HTTP/1.1\r\nHost: test\r\n\r\n";
+const HEALTH: &str = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
 #[tokio::test]
 async fn a_client_that_never_reads_loses_its_connection() {
@@ -17,12 +17,32 @@ async fn a_client_that_never_reads_loses_its_connection() {
     });
     let app = app.await;
     let mut connection = RawConnection::open(app.address).await;
-    let ask = "GET /openapi.json HTTP/1.1\r\nHost: test\r\n\r\n".repeat(50);
+    let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(50);
     // It sends without end, which fails when the service has closed the connection.
     let refused = async { while connection.try_send(&ask).await.is_ok() {} };
     tokio::time::timeout(Duration::from_secs(60), refused)
         .await
         .expect("the connection ends");
+    expect(app.get("/healthz").await, StatusCode::OK).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_that_reads_too_slowly_loses_its_connection() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.write_timeout = Duration::from_secs(1);
+        config.limits.min_answer_rate = 1_000_000_000;
+    });
+    let app = app.await;
+    let connection = RawConnection::open(app.address).await;
+    let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(20_000);
+    // It reads some bytes of each answer, and never as much as would have been sent meanwhile.
+    let trickle = connection.trickle(ask, 64 << 10, Duration::from_millis(20));
+    let ended = tokio::time::timeout(Duration::from_secs(60), trickle).await;
+    let read = ended.expect("the connection ends");
+    assert!(
+        read > 1 << 20,
+        "it was ended for reading nothing: {read} bytes"
+    );
     expect(app.get("/healthz").await, StatusCode::OK).await;
 }
 
@@ -100,7 +120,7 @@ async fn a_half_closed_connection_gets_its_answer() {
     let mut client = RawConnection::open(app.address).await;
     let frame = pictures::png(1);
     let head = format!(
-        "POST /sessions/{id}/frames HTTP/1.1\r\nHost: test\r\nContent-Length: {}\r\n\r\n",
+        "POST /sessions/{id}/frames HTTP/1.1\r\nHost: localhost\r\nContent-Length: {}\r\n\r\n",
         frame.len() + 1
     );
     client.send(head).await;
@@ -119,12 +139,12 @@ async fn a_head_that_is_not_http_gets_a_problem_document() {
     for (head, status, slug) in [
         ("NONSENSE\r\n\r\n".to_owned(), "400", "malformed-request"),
         (
-            "GET / HTTP/1.1\r\nHost: test\r\nbad header: x\r\n\r\n".to_owned(),
+            "GET / HTTP/1.1\r\nHost: localhost\r\nbad header: x\r\n\r\n".to_owned(),
             "400",
             "malformed-request",
         ),
         (
-            format!("GET / HTTP/1.1\r\nHost: test\r\nx: {long}\r\n\r\n"),
+            format!("GET / HTTP/1.1\r\nHost: localhost\r\nx: {long}\r\n\r\n"),
             "431",
             "head-too-large",
         ),

@@ -28,6 +28,26 @@ impl RawConnection {
         self.stream.write_all(bytes.as_ref()).await
     }
 
+    /// Sends `ask`, and reads at most `bytes` of the answers at a time, with a pause before each. Gives how many came
+    /// until the connection ended.
+    pub async fn trickle(self, ask: String, bytes: usize, pause: Duration) -> usize {
+        let (mut reading, mut writing) = self.stream.into_split();
+        let asking = tokio::spawn(async move {
+            let _ = writing.write_all(ask.as_bytes()).await;
+            writing
+        });
+        let (mut buffer, mut all) = (vec![0; bytes], 0);
+        loop {
+            tokio::time::sleep(pause).await;
+            match reading.read(&mut buffer).await {
+                Ok(count @ 1..) => all += count,
+                _ => break,
+            }
+        }
+        asking.abort();
+        all
+    }
+
     /// Closes its own side of the connection.
     pub async fn close_sending(&mut self) {
         self.stream.shutdown().await.unwrap();
@@ -57,7 +77,7 @@ impl RawConnection {
     pub async fn hold_with(address: SocketAddr, method: &str, target: &str, lines: &str) -> Self {
         let mut connection = Self::open(address).await;
         let head = format!(
-            "{method} {target} HTTP/1.1\r\nHost: test\r\n{lines}\r\n\
+            "{method} {target} HTTP/1.1\r\nHost: localhost\r\n{lines}\r\n\
              Expect: 100-continue\r\nConnection: close\r\n\r\n"
         );
         connection.send(head).await;

@@ -28,6 +28,8 @@ pub struct Metrics {
     pub received_bytes: Counter,
     /// Bytes of response bodies.
     pub sent_bytes: Counter,
+    /// Idle connections that were closed for others.
+    pub shed_connections: Counter,
     /// What decoding and tracking measure.
     pub tracking: TrackingMetrics,
     /// What is set when somebody asks.
@@ -81,6 +83,11 @@ impl Metrics {
                 &[],
             ),
             sent_bytes: make.counter("bagtrack_sent_bytes_total", "Bytes of answers.", &[]),
+            shed_connections: make.counter(
+                "bagtrack_connections_shed_total",
+                "Idle connections that were closed to make room for others.",
+                &[],
+            ),
             tracking: TrackingMetrics::new(&make),
             gauges: Gauges::new(&make),
             recorder,
