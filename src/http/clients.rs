@@ -7,16 +7,22 @@ use super::client::Client;
 use super::config::Config;
 use super::problems::problem::Problem;
 use crate::sessions::{ByteBudget, Held, Lane};
-use axum::http::{HeaderMap, HeaderValue};
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
 use governor::{Quota, RateLimiter};
 use std::collections::HashMap;
 use std::num::NonZeroU32;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+/// The header with what is left of a client's quotas.
+pub const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
+/// The header with a client's quotas.
+pub const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// Accounts above which those with nothing in use are forgotten.
 const MAX_IDLE_ACCOUNTS: usize = 1024;
@@ -28,6 +34,7 @@ type FrameRate = RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInforma
 struct Quotas {
     sessions: usize,
     requests: usize,
+    streams: usize,
     bytes: usize,
     /// Frames a second, and frames at once.
     frames: Option<(NonZeroU32, NonZeroU32)>,
@@ -48,9 +55,12 @@ pub struct Account {
     quotas: Quotas,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
+    streams: Arc<Semaphore>,
+    videos: Arc<Semaphore>,
     bytes: ByteBudget,
     frames: Option<FrameRate>,
-    frames_left: AtomicU32,
+    /// Frames that were left at some moment.
+    frames_left: Mutex<(u32, Instant)>,
 }
 
 /// A request in flight.
@@ -75,6 +85,7 @@ impl Clients {
             quotas: Quotas {
                 sessions: quarter(limits.client_sessions, config.max_sessions),
                 requests: quarter(limits.client_requests, config.queue),
+                streams: quarter(limits.client_connections, config.max_connections),
                 bytes: bytes.max(config.max_body_bytes),
                 frames,
             },
@@ -113,11 +124,11 @@ impl Clients {
         );
         if let Some((rate, burst)) = quotas.frames {
             let window = burst.get().div_ceil(rate.get());
-            let frames_left = account.frames_left.load(Ordering::Relaxed);
+            let frames_left = account.frames_left(rate, burst);
             policy += &format!(", \"frames\";q={burst};w={window};qu=\"frames\"");
             left += &format!(", \"frames\";r={frames_left};t={window}");
         }
-        for (name, value) in [("ratelimit-policy", policy), ("ratelimit", left)] {
+        for (name, value) in [(RATE_LIMIT_POLICY, policy), (RATE_LIMIT, left)] {
             if let Ok(value) = HeaderValue::from_str(&value) {
                 headers.insert(name, value);
             }
@@ -142,9 +153,14 @@ impl Account {
             quotas,
             sessions: permits(quotas.sessions),
             requests: permits(quotas.requests),
+            streams: permits(quotas.streams),
+            videos: permits(1),
             bytes: ByteBudget::new(quotas.bytes),
             frames,
-            frames_left: AtomicU32::new(quotas.frames.map_or(0, |(_, burst)| burst.get())),
+            frames_left: Mutex::new((
+                quotas.frames.map_or(0, |(_, burst)| burst.get()),
+                Instant::now(),
+            )),
         }
     }
 
@@ -164,6 +180,20 @@ impl Account {
             account: self.clone(),
             _permit: permit.map_err(refused)?,
         })
+    }
+
+    /// Takes a place for a stream.
+    ///
+    /// # Errors
+    /// The client has as many as it may.
+    pub fn stream(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        let permit = self.streams.clone().try_acquire_owned();
+        permit.map_err(|_| Problem::quota_exceeded("streams", self.quotas.streams))
+    }
+
+    /// The place for a video that is decoded.
+    pub fn videos(&self) -> Arc<Semaphore> {
+        self.videos.clone()
     }
 
     /// The bytes that the client may have inside.
@@ -199,11 +229,6 @@ impl Account {
 }
 
 impl RequestPermit {
-    /// The client's account.
-    pub fn account(&self) -> &Arc<Account> {
-        &self.account
-    }
-
     /// In whose turn the request's work is done.
     pub fn lane(&self) -> Lane {
         self.account.lane
@@ -224,6 +249,27 @@ impl RequestPermit {
 }
 
 impl Account {
+    fn note_frames_left(&self, left: u32) {
+        // Nothing panics while it is held.
+        let mut noted = self
+            .frames_left
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        *noted = (left, Instant::now());
+    }
+
+    /// Frames that are left now: those that were, and those that have come back since.
+    fn frames_left(&self, rate: NonZeroU32, burst: NonZeroU32) -> u32 {
+        let noted = self
+            .frames_left
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let (left, at) = *noted;
+        let back = at.elapsed().as_secs_f64() * f64::from(rate.get());
+        // The cast stops at the greatest value.
+        left.saturating_add(back as u32).min(burst.get())
+    }
+
     /// Counts frames of the client.
     ///
     /// # Errors
@@ -236,14 +282,14 @@ impl Account {
         match limiter.check_n(frames) {
             Ok(Ok(state)) => {
                 let left = state.remaining_burst_capacity();
-                self.frames_left.store(left, Ordering::Relaxed);
+                self.note_frames_left(left);
                 Ok(())
             }
             Ok(Err(not_yet)) => {
                 let wait = not_yet.wait_time_from(DefaultClock::default().now());
                 let rate = self.quotas.frames.map_or(0, |(rate, _)| rate.get());
                 let rate = usize::try_from(rate).unwrap_or(usize::MAX);
-                self.frames_left.store(0, Ordering::Relaxed);
+                self.note_frames_left(0);
                 Err(Problem::quota_exceeded("frames a second", rate).retry_after(wait))
             }
             // A request has no more frames than fit at once.

@@ -4,7 +4,7 @@ use super::config::Config;
 use crate::sessions::MAX_LIST_BYTES;
 use crate::tracker::MAX_WORKING_SIDE;
 
-/// Most bytes that a connection keeps of what it read, and of what it is to write.
+/// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
 pub const MAX_BUFFER_BYTES: usize = 64 << 10;
 /// The program, its tables, the log's queue, and what the allocator keeps for itself.
 const PROGRAM: u64 = 96 << 20;

@@ -81,6 +81,14 @@ impl ByteCharge {
         self.bytes = total;
         Ok(())
     }
+
+    /// Gives bytes back, down to so many.
+    pub fn shrink(&mut self, bytes: usize) {
+        let permits = |bytes: usize| bytes.div_ceil(BYTES_PER_PERMIT);
+        let less = permits(self.bytes).saturating_sub(permits(bytes));
+        drop((self.all.split(less), self.client.split(less)));
+        self.bytes = self.bytes.min(bytes);
+    }
 }
 
 #[cfg(test)]
@@ -100,6 +108,8 @@ mod tests {
         assert_eq!(second.grow(2049), Err(BytesFull::All));
         assert_eq!(other.left(), 9216, "nothing was charged");
         second.grow(2048).unwrap();
+        second.shrink(1000);
+        assert_eq!((all.left(), other.left()), (1024, 8192));
         drop((charge, second));
         assert_eq!((all.left(), client.left()), (4096, 3072));
     }

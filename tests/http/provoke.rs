@@ -4,6 +4,7 @@ use crate::application::{BOX, TestApplication, expect};
 use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
+use crate::stream_client::StreamClient;
 use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -53,6 +54,7 @@ pub struct Attempt {
     /// Requests that are kept inside.
     _held: Option<RawConnection>,
     _busy: Option<JoinSet<()>>,
+    _stream: Option<StreamClient>,
     method: Method,
     path: String,
     query: Vec<(&'static str, &'static str)>,
@@ -79,7 +81,12 @@ fn settings(slug: &str, config: &mut Config) {
             (config.queue, config.workers) = (1, Some(1));
             config.max_frames = heavy::FRAMES;
         }
-        "quota-exceeded" => config.limits.client_requests = Some(1),
+        "quota-exceeded" => {
+            config.limits.client_requests = Some(1);
+            // Of a proxy the streams count, and not the connections.
+            config.limits.client_connections = Some(1);
+            config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        }
         "request-too-costly" => {
             config.limits.max_request_pixels = u64::from(pictures::WIDTH * pictures::HEIGHT);
         }
@@ -113,6 +120,7 @@ impl Attempt {
             id: is_open.then(|| id.clone()),
             _held: None,
             _busy: None,
+            _stream: None,
             method: operation.method.clone(),
             path: operation.path_of(&id),
             query: Vec::new(),
@@ -204,6 +212,10 @@ impl Attempt {
             "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
             "request-too-costly" if template == CVAT => self.query = vec![("box", BOX); 100],
             "request-too-costly" => self.frames = 2,
+            "quota-exceeded" if template.ends_with("/stream") => {
+                let id = self.id.as_ref().unwrap();
+                self._stream = Some(StreamClient::open(&self.app, id, "").await);
+            }
             "session-busy" | "quota-exceeded" | "not-in-order" => {
                 let id = self.id.as_ref().unwrap();
                 let target = format!("/sessions/{id}/frames");

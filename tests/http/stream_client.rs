@@ -76,6 +76,13 @@ impl StreamClient {
             .expect("the stream is open");
     }
 
+    /// Sends bytes past the client's own framing.
+    pub async fn send_raw(&mut self, bytes: &[u8]) {
+        use tokio::io::AsyncWriteExt;
+        let stream = self.socket.get_mut();
+        stream.write_all(bytes).await.expect("the stream is open");
+    }
+
     /// What comes next; pings are answered on the way.
     pub async fn receive(&mut self) -> Received {
         loop {

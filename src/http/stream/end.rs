@@ -1,7 +1,8 @@
 //! How a stream ends, and what its client is told.
 
 use crate::http::problems::problem::Problem;
-use axum::extract::ws::{CloseFrame, close_code};
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 /// Close codes from here on are an HTTP status and this.
 const OF_STATUS: u16 = 4000;
@@ -39,12 +40,12 @@ impl End {
     pub fn close_frame(&self) -> Option<CloseFrame> {
         let code = match self {
             Self::Gone | Self::Silent => return None,
-            Self::Shutdown => close_code::AWAY,
+            Self::Shutdown => CloseCode::Away.into(),
             Self::Replaced => REPLACED,
             Self::Problem(problem) => OF_STATUS + problem.kind().status().as_u16(),
         };
         Some(CloseFrame {
-            code,
+            code: code.into(),
             reason: self.reason().into(),
         })
     }

@@ -3,11 +3,13 @@
 use super::frame_work::FrameWork;
 use super::open_streams::StreamPlace;
 use super::session_stream::{SessionStream, Stand};
+use super::upgrade::Upgrade;
 use super::waiting::Waiting;
 use crate::http::auth::caller::Caller;
 use crate::http::client::Client;
 use crate::http::connection_hold::ConnectionHold;
 use crate::http::durability::Durability;
+use crate::http::least_rate::LeastRate;
 use crate::http::newest;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
@@ -16,8 +18,7 @@ use crate::http::request_id;
 use crate::http::session_path::SessionPath;
 use crate::http::state::AppState;
 use crate::http::upload::switch::Switch;
-use crate::sessions::{ByteCharge, ReplayError, Session};
-use axum::extract::ws::WebSocketUpgrade;
+use crate::sessions::{ReplayError, Session};
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
 use axum::response::Response;
@@ -27,12 +28,6 @@ use std::sync::{Arc, Mutex};
 use tokio::time::timeout;
 use tracing::Instrument;
 
-/// The protocol that a client may offer. A page has to offer one beside its token.
-const PROTOCOL: &str = "bagtrack";
-/// Most bytes that a connection reads at once.
-const READ_BYTES: usize = 32 << 10;
-/// Most bytes of answers that wait to be written. They are written as soon as there are any.
-const WRITE_BYTES: usize = 64 << 10;
 /// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
 const BYTES_PER_PIXEL: usize = 4;
 /// And for what stands beside the pixels.
@@ -60,6 +55,8 @@ operation_problems!(
         Kind::MalformedRequest,
         Kind::FrameOutOfOrder,
         Kind::SessionBusy,
+        Kind::QuotaExceeded,
+        Kind::WorkTimeout,
     ]
 );
 
@@ -94,11 +91,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let settings = settings(&parts.uri)?;
     let path = SessionPath::from_request_parts(&mut parts, &state).await?;
     let session = path.find(&state).await?;
-    let upgrade = WebSocketUpgrade::from_request_parts(&mut parts, &state).await;
-    let upgrade = upgrade.map_err(|error| {
-        let detail = format!("{error}. This call opens a WebSocket.");
-        Problem::malformed(detail)
-    })?;
+    let upgrade = Upgrade::of(&mut parts).await?;
     let connection = parts.extensions.get::<ConnectionHold>().cloned();
     let connection = connection.ok_or_else(|| {
         let error = io::Error::other("the service does not know the connection of a request");
@@ -107,14 +100,15 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let caller = Caller::from_request_parts(&mut parts, &state).await?;
     let client = Client::of(&parts);
     let account = state.clients.account(&client);
-    let max_bytes = max_message_bytes(&state, &session);
-    let mut buffers = ByteCharge::new(&state.uploads, account.bytes());
-    // A message in pieces is there twice: the pieces that have come, and the one that comes.
-    buffers.grow(2 * max_bytes + READ_BYTES + WRITE_BYTES)?;
+    let permit = account.stream()?;
     // The stream before this one tracks no further frame.
     let place = Arc::new(state.streams.take(session.id()));
     let stand = stand(&state, &session, &client, &place, settings.from).await?;
     let newest_wins = settings.drop.0;
+    let max_bytes = max_message_bytes(&state, &session);
+    let budgets = [state.uploads.clone(), account.bytes().clone()];
+    let config = &state.config;
+    let rate = LeastRate::new(config.body_timeout, config.limits.min_body_rate);
     let stream = SessionStream {
         work: Arc::new(FrameWork {
             state,
@@ -127,20 +121,14 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
             newest_wins,
         }),
         connection,
-        buffers,
+        permit,
         stand,
         request_id,
         path: parts.uri.path().to_owned(),
     };
     let span = tracing::Span::current();
-    Ok(upgrade
-        .protocols([PROTOCOL])
-        .read_buffer_size(READ_BYTES)
-        .write_buffer_size(0)
-        .max_write_buffer_size(WRITE_BYTES)
-        .max_message_size(max_bytes)
-        .max_frame_size(max_bytes)
-        .on_upgrade(move |socket| stream.run(socket).instrument(span)))
+    let serve = move |socket| stream.run(socket).instrument(span);
+    Ok(upgrade.answer(max_bytes, budgets, rate, serve))
 }
 
 fn settings(uri: &Uri) -> Result<StreamSettings, Problem> {

@@ -1,22 +1,28 @@
 //! A stream from its first message to its end: reads frames, sends answers, pings.
 
 use super::end::End;
+use super::fragments::MessageTooSlow;
 use super::frame_work::{Done, FrameWork, Given};
 use super::message::{FrameHeader, Hello, StreamAnswer};
+use super::upgrade::Socket;
 use super::waiting::ArrivedFrame;
 use crate::http::connection_hold::ConnectionHold;
 use crate::http::durability::Durability;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{ByteCharge, Estimates};
+use crate::sessions::{ByteCharge, BytesFull, Estimates};
 use axum::body::Bytes;
-use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use futures_util::stream::FusedStream;
+use futures_util::{SinkExt, StreamExt};
 use serde::Serialize;
+use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, interval_at, timeout};
+use tokio_tungstenite::tungstenite::{Error, Message};
 
 /// Time for a client to answer the close.
 const CLOSING: Duration = Duration::from_secs(2);
@@ -38,8 +44,8 @@ pub struct SessionStream {
     pub work: Arc<FrameWork>,
     /// The connection that it took over.
     pub connection: ConnectionHold,
-    /// The memory of the buffers that messages are received in.
-    pub buffers: ByteCharge,
+    /// The place among the client's streams.
+    pub permit: OwnedSemaphorePermit,
     /// Where the session stands.
     pub stand: Stand,
     /// The id of the request that opened it, for problems.
@@ -60,7 +66,7 @@ struct Counts {
 
 impl SessionStream {
     /// Serves the stream until it ends.
-    pub async fn run(mut self, mut socket: WebSocket) {
+    pub async fn run(mut self, mut socket: Socket) {
         self.connection.activity().stream();
         let started = Instant::now();
         let mut counts = Counts::default();
@@ -80,7 +86,7 @@ impl SessionStream {
         let _ = timeout(CLOSING, self.close(socket, end)).await;
     }
 
-    async fn serve(&mut self, socket: &mut WebSocket, counts: &mut Counts) -> End {
+    async fn serve(&mut self, socket: &mut Socket, counts: &mut Counts) -> End {
         match self.exchange(socket, counts).await {
             Ok(end) => end,
             // Whoever cannot be written to has gone.
@@ -88,16 +94,13 @@ impl SessionStream {
         }
     }
 
-    async fn exchange(
-        &mut self,
-        socket: &mut WebSocket,
-        counts: &mut Counts,
-    ) -> Result<End, axum::Error> {
+    async fn exchange(&mut self, socket: &mut Socket, counts: &mut Counts) -> Result<End, Error> {
         let next = self.stand.next;
-        send(socket, &Hello { next }).await?;
+        self.send(socket, &Hello { next }).await?;
         for estimates in std::mem::take(&mut self.stand.stored) {
             let answer = self.answer(&estimates, 0, true);
-            send(socket, &answer.with_durability(self.stand.durability)).await?;
+            let answer = answer.with_durability(self.stand.durability);
+            self.send(socket, &answer).await?;
         }
         let work = self.work.clone();
         let mut header = Ok(FrameHeader::default());
@@ -113,22 +116,26 @@ impl SessionStream {
                 return Ok(End::Shutdown);
             }
             let may_come = !is_ending && !work.waiting().is_full();
+            if !may_come {
+                socket.get_mut().pause();
+            }
             tokio::select! {
-                message = socket.recv(), if may_come => {
+                message = socket.next(), if may_come => {
                     is_heard = true;
                     match message {
                         None | Some(Ok(Message::Close(_))) => return Ok(End::Gone),
-                        Some(Ok(Message::Text(text))) => header = FrameHeader::parse(&text),
+                        Some(Ok(Message::Text(text))) => {
+                            drop(socket.get_mut().take_charge());
+                            header = FrameHeader::parse(&text);
+                        }
                         Some(Ok(Message::Binary(file))) => {
                             let header = std::mem::replace(&mut header, Ok(FrameHeader::default()));
-                            let arrived = header.and_then(|header| self.charged(header, file));
+                            let charge = socket.get_mut().take_charge();
+                            let arrived = header.and_then(|header| self.arrived(header, file, charge));
                             work.waiting().push(arrived);
                         }
-                        Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
-                        Some(Err(error)) => {
-                            let detail = format!("The message cannot be read: {error}.");
-                            return Ok(End::Problem(Problem::malformed(detail)));
-                        }
+                        Some(Ok(_)) => {}
+                        Some(Err(error)) => return Ok(End::Problem(unreadable(&error))),
                     }
                 }
                 done = wait_for(&mut answering) => {
@@ -143,7 +150,7 @@ impl SessionStream {
                             counts.answered += 1;
                             let answer = self.answer(&estimates, skipped, replayed);
                             let answer = answer.with_seen(seen).with_durability(durability);
-                            send(socket, &answer).await?;
+                            self.send(socket, &answer).await?;
                         }
                         Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
                         Err(problem) => {
@@ -159,6 +166,7 @@ impl SessionStream {
                         _ => {}
                     }
                     // While frames wait nothing is read, so nothing can be heard.
+                    is_heard |= socket.get_mut().take_heard();
                     if !is_heard && may_come {
                         return Ok(End::Silent);
                     }
@@ -172,15 +180,15 @@ impl SessionStream {
     }
 
     /// A frame with the memory that it takes.
-    fn charged(&self, header: FrameHeader, file: Bytes) -> Result<ArrivedFrame, Problem> {
-        let budgets = (&self.work.state.uploads, self.work.account.bytes());
-        let mut charge = ByteCharge::new(budgets.0, budgets.1);
-        charge.grow(file.len())?;
-        self.work
-            .state
-            .metrics
-            .received_bytes
-            .increment(file.len() as u64);
+    fn arrived(
+        &self,
+        header: FrameHeader,
+        file: Bytes,
+        mut charge: ByteCharge,
+    ) -> Result<ArrivedFrame, Problem> {
+        charge.shrink(file.len());
+        let received = &self.work.state.metrics.received_bytes;
+        received.increment(file.len() as u64);
         Ok(ArrivedFrame {
             header,
             file,
@@ -192,32 +200,54 @@ impl SessionStream {
         StreamAnswer::new(estimates, skipped, replayed, self.work.state.is_draining())
     }
 
-    async fn send_problem(
-        &self,
-        socket: &mut WebSocket,
-        problem: &Problem,
-    ) -> Result<(), axum::Error> {
+    async fn send(&self, socket: &mut Socket, message: &impl Serialize) -> Result<(), Error> {
+        let text = serde_json::to_string(message).map_err(io::Error::other)?;
+        let sent = &self.work.state.metrics.sent_bytes;
+        sent.increment(text.len() as u64);
+        socket.send(Message::text(text)).await
+    }
+
+    async fn send_problem(&self, socket: &mut Socket, problem: &Problem) -> Result<(), Error> {
         self.work.state.metrics.problem(problem.kind());
         if let Some(cause) = problem.cause() {
             tracing::error!(problem = problem.kind().slug(), %cause, "a frame failed");
         }
         let (path, id) = (self.path.clone(), self.request_id.clone());
-        send(socket, &ProblemDocument::new(problem, path, id)).await
+        let document = ProblemDocument::new(problem, path, id);
+        self.send(socket, &document).await
     }
 
     /// Tells the client why, and waits until it has closed too: else its system might throw away what it has not read.
-    async fn close(self, mut socket: WebSocket, end: End) {
+    async fn close(self, mut socket: Socket, end: End) {
         if let End::Problem(problem) = &end {
             let _ = self.send_problem(&mut socket, problem).await;
         }
         let Some(frame) = end.close_frame() else {
             return;
         };
+        let is_readable = !socket.is_terminated();
         if socket.send(Message::Close(Some(frame))).await.is_ok() {
-            while let Some(Ok(_)) = socket.recv().await {}
+            match is_readable {
+                true => while let Some(Ok(_)) = socket.next().await {},
+                false => socket.get_mut().discard().await,
+            }
         }
-        drop(self.buffers);
+        drop(self.permit);
     }
+}
+
+/// The problem that a message is which could not be read.
+fn unreadable(error: &Error) -> Problem {
+    if let Error::Io(error) = error {
+        let cause = error.get_ref();
+        if let Some(full) = cause.and_then(|cause| cause.downcast_ref::<BytesFull>()) {
+            return (*full).into();
+        }
+        if cause.is_some_and(|cause| cause.is::<MessageTooSlow>()) {
+            return Problem::body_timeout();
+        }
+    }
+    Problem::malformed(format!("The message cannot be read: {error}."))
 }
 
 /// Whether nothing can be tracked after this problem.
@@ -234,9 +264,4 @@ async fn wait_for(answering: &mut Option<Answering>) -> Option<Done> {
         Some(answering) => answering.await,
         None => std::future::pending().await,
     }
-}
-
-async fn send(socket: &mut WebSocket, message: &impl Serialize) -> Result<(), axum::Error> {
-    let text = serde_json::to_string(message).map_err(axum::Error::new)?;
-    socket.send(Message::Text(Utf8Bytes::from(text))).await
 }

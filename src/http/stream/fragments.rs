@@ -1,0 +1,283 @@
+//! The bytes of a WebSocket connection, with the client's messages in small fragments, and their memory charged.
+//!
+//! The library makes room for a whole frame when its head has come, and keeps that room for the next one: a few bytes, or
+//! one large message, would hold memory for the life of a stream. So it gets each frame in fragments (RFC 6455, section
+//! 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A fragment is handed over when
+//! its memory is charged. Where there is none the client waits: nothing more is read from it.
+
+use crate::http::least_rate::LeastRate;
+use crate::sessions::{ByteBudget, ByteCharge, BytesFull};
+use arrayvec::ArrayVec;
+use bytes::{Buf, BytesMut};
+use std::future::poll_fn;
+use std::io;
+use std::pin::Pin;
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::time::{Instant, Sleep, sleep_until};
+
+/// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
+const FRAGMENT: usize = 16 << 10;
+/// Most bytes that are read at once.
+pub const READ_BYTES: usize = 32 << 10;
+/// A message that grows may be there twice: in the room that it had, and in the one that it gets.
+const COPIES: usize = 2;
+/// How long to wait before memory is asked for again.
+const RETRY: Duration = Duration::from_millis(20);
+
+/// The first byte of a frame: the last of its message.
+const FINAL: u8 = 0x80;
+const OPCODE: u8 = 0x0F;
+/// Frames of this code and above control the connection.
+const CONTROL: u8 = 8;
+/// The second byte of a frame.
+const MASKED: u8 = 0x80;
+const LENGTH: u8 = 0x7F;
+
+/// The message came more slowly than it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the message is too slow")]
+pub struct MessageTooSlow;
+
+/// A frame of the client, as far as it was not handed over.
+#[derive(Debug)]
+struct Frame {
+    /// Its first byte.
+    first: u8,
+    mask: Option<[u8; 4]>,
+    left: u64,
+}
+
+/// A connection whose incoming frames are fragments.
+#[derive(Debug)]
+pub struct Fragments<S> {
+    stream: S,
+    /// What was read and not handed over.
+    input: BytesMut,
+    frame: Option<Frame>,
+    /// The head of the next fragment, and the bytes of it that follow.
+    head: ArrayVec<u8, 8>,
+    fragment_left: usize,
+    budgets: [ByteBudget; 2],
+    /// The memory of the message that arrives.
+    charge: ByteCharge,
+    retry: Pin<Box<Sleep>>,
+    rate: LeastRate,
+    /// Whether a message has begun.
+    is_within: bool,
+    is_heard: bool,
+}
+
+impl<S> Fragments<S> {
+    /// For a connection from which `read` was read already. Messages are charged to the budgets of all clients and of
+    /// this one, and come at `rate`.
+    pub fn new(stream: S, read: &[u8], budgets: [ByteBudget; 2], rate: LeastRate) -> Self {
+        let charge = ByteCharge::new(&budgets[0], &budgets[1]);
+        Self {
+            stream,
+            input: BytesMut::from(read),
+            frame: None,
+            head: ArrayVec::new(),
+            fragment_left: 0,
+            budgets,
+            charge,
+            retry: Box::pin(sleep_until(Instant::now())),
+            rate,
+            is_within: false,
+            is_heard: false,
+        }
+    }
+
+    /// The charge of the message that has just been read.
+    pub fn take_charge(&mut self) -> ByteCharge {
+        let next = ByteCharge::new(&self.budgets[0], &self.budgets[1]);
+        std::mem::replace(&mut self.charge, next)
+    }
+
+    /// Whether anything has come since this was asked last.
+    pub fn take_heard(&mut self) -> bool {
+        std::mem::take(&mut self.is_heard)
+    }
+
+    /// Nothing is read for a while, which is not the client's fault.
+    pub fn pause(&mut self) {
+        self.rate.pause();
+    }
+
+    /// Whether the client owes the rest of a message.
+    fn is_message_begun(&self) -> bool {
+        self.is_within || self.fragment_left > 0 || !self.input.is_empty()
+    }
+
+    /// Makes the next fragment from what was read, where that has begun.
+    ///
+    /// # Errors
+    /// There is no memory for it.
+    fn begin_fragment(&mut self) -> Result<bool, BytesFull> {
+        if self.frame.is_none() {
+            self.frame = take_head(&mut self.input);
+        }
+        let Some(frame) = &mut self.frame else {
+            return Ok(false);
+        };
+        let length = frame.left.min(FRAGMENT as u64) as usize;
+        let is_data = frame.first & OPCODE < CONTROL;
+        if is_data {
+            self.charge.grow(COPIES * length)?;
+        }
+        frame.left -= length as u64;
+        let is_last = frame.left == 0;
+        // Only the last fragment of the last frame ends a message.
+        let first = if is_last {
+            frame.first
+        } else {
+            frame.first & !FINAL
+        };
+        let mask = frame.mask.map_or(0, |_| MASKED);
+        self.head.push(first);
+        match u8::try_from(length) {
+            Ok(short) if short < 126 => self.head.push(mask | short),
+            _ => {
+                self.head.push(mask | 126);
+                let length = u16::try_from(length).expect("a fragment is short");
+                self.head.extend(length.to_be_bytes());
+            }
+        }
+        self.head.extend(frame.mask.into_iter().flatten());
+        self.fragment_left = length;
+        if is_data {
+            self.is_within = !is_last || frame.first & FINAL == 0;
+        }
+        // What follows goes on with the message.
+        frame.first &= !OPCODE;
+        if is_last {
+            self.frame = None;
+        }
+        Ok(true)
+    }
+}
+
+/// The head of the next frame, where all of it was read.
+fn take_head(input: &mut BytesMut) -> Option<Frame> {
+    let [first, second] = *input.first_chunk()?;
+    let extended = match second & LENGTH {
+        126 => 2,
+        127 => 8,
+        _ => 0,
+    };
+    let masked = if second & MASKED == 0 { 0 } else { 4 };
+    if input.len() < 2 + extended + masked {
+        return None;
+    }
+    input.advance(2);
+    let left = match extended {
+        2 => input.get_u16().into(),
+        8 => input.get_u64(),
+        _ => u64::from(second & LENGTH),
+    };
+    let mask = (masked > 0).then(|| input.get_u32().to_be_bytes());
+    Some(Frame { first, mask, left })
+}
+
+impl<S: AsyncRead + Unpin> Fragments<S> {
+    /// Reads more. Gives whether anything came before the end.
+    fn poll_input(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<bool>> {
+        let mut bytes = [0; READ_BYTES];
+        let mut buffer = ReadBuf::new(&mut bytes);
+        match Pin::new(&mut self.stream).poll_read(cx, &mut buffer) {
+            Poll::Ready(read) => {
+                read?;
+                self.rate.moved(buffer.filled().len());
+                self.input.extend_from_slice(buffer.filled());
+                self.is_heard |= !buffer.filled().is_empty();
+                Poll::Ready(Ok(!buffer.filled().is_empty()))
+            }
+            Poll::Pending if self.is_message_begun() => {
+                ready!(self.rate.poll_late(cx));
+                Poll::Ready(Err(io::Error::other(MessageTooSlow)))
+            }
+            Poll::Pending => Poll::Pending,
+        }
+    }
+
+    /// Reads until the client has closed its side, and throws that away.
+    pub async fn discard(&mut self) {
+        poll_fn(|cx| {
+            loop {
+                let mut bytes = [0; 4096];
+                let mut buffer = ReadBuf::new(&mut bytes);
+                let read = ready!(Pin::new(&mut self.stream).poll_read(cx, &mut buffer));
+                if read.is_err() || buffer.filled().is_empty() {
+                    return Poll::Ready(());
+                }
+            }
+        })
+        .await;
+    }
+
+    /// Waits before memory is asked for again. It has the time of the message.
+    fn poll_memory(&mut self, cx: &mut Context<'_>, full: BytesFull) -> Poll<io::Error> {
+        if self.rate.poll_late(cx).is_ready() {
+            return Poll::Ready(io::Error::other(full));
+        }
+        self.retry.as_mut().reset(Instant::now() + RETRY);
+        let _ = self.retry.as_mut().poll(cx);
+        Poll::Pending
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Fragments<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        loop {
+            if !self.head.is_empty() {
+                let count = self.head.len().min(buffer.remaining());
+                buffer.put_slice(&self.head[..count]);
+                self.head.drain(..count);
+                return Poll::Ready(Ok(()));
+            }
+            let count = self.fragment_left.min(self.input.len());
+            if count > 0 {
+                let count = count.min(buffer.remaining());
+                buffer.put_slice(&self.input[..count]);
+                self.input.advance(count);
+                self.fragment_left -= count;
+                return Poll::Ready(Ok(()));
+            }
+            if self.fragment_left == 0 {
+                match self.begin_fragment() {
+                    Ok(true) => continue,
+                    Ok(false) => {}
+                    Err(full) => {
+                        return self.poll_memory(cx, full).map(Err);
+                    }
+                }
+            }
+            if !ready!(self.poll_input(cx))? {
+                return Poll::Ready(Ok(()));
+            }
+        }
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Fragments<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(cx, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

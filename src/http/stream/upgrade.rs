@@ -1,0 +1,109 @@
+//! From HTTP to a WebSocket: the answer to the handshake, and the connection after it.
+
+use super::fragments::Fragments;
+use crate::http::connection_io::ConnectionIo;
+use crate::http::least_rate::LeastRate;
+use crate::http::problems::problem::Problem;
+use crate::sessions::ByteBudget;
+use axum::extract::FromRequestParts;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::http::header::{
+    CONNECTION, SEC_WEBSOCKET_ACCEPT, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_PROTOCOL, UPGRADE,
+};
+use axum::http::request::Parts;
+use axum::http::{HeaderValue, StatusCode};
+use axum::response::{IntoResponse, Response};
+use hyper::upgrade::OnUpgrade;
+use hyper_util::rt::TokioIo;
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
+use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+
+/// The protocol that a client may offer. A page has to offer one beside its token.
+const PROTOCOL: &str = "bagtrack";
+/// Most bytes that the library reads at once. It keeps room for so much, and for a fragment.
+const READ_BYTES: usize = 16 << 10;
+/// Most bytes of answers that wait to be written. They are written as soon as there are any.
+const WRITE_BYTES: usize = 64 << 10;
+
+/// A WebSocket whose messages are charged as they arrive. Its buffers take the place of those that its connection had.
+pub type Socket = WebSocketStream<Fragments<ConnectionIo>>;
+
+/// A handshake that can be answered.
+#[derive(Debug)]
+pub struct Upgrade {
+    connection: OnUpgrade,
+    accept: String,
+    protocol: Option<HeaderValue>,
+}
+
+impl Upgrade {
+    /// Of a request.
+    ///
+    /// # Errors
+    /// It is no handshake of a WebSocket.
+    pub async fn of(parts: &mut Parts) -> Result<Self, Problem> {
+        let connection = parts.extensions.get::<OnUpgrade>().cloned();
+        let key = parts.headers.get(SEC_WEBSOCKET_KEY).cloned();
+        let checked = WebSocketUpgrade::from_request_parts(parts, &()).await;
+        let checked = checked.map_err(|error| {
+            Problem::malformed(format!("{error}. This call opens a WebSocket."))
+        })?;
+        let checked = checked.protocols([PROTOCOL]);
+        let (Some(connection), Some(key)) = (connection, key) else {
+            return Err(Problem::malformed("This call opens a WebSocket."));
+        };
+        Ok(Self {
+            connection,
+            accept: derive_accept_key(key.as_bytes()),
+            protocol: checked.selected_protocol().cloned(),
+        })
+    }
+
+    /// The answer. After it `serve` gets the socket, with messages of at most `max_bytes`.
+    pub fn answer<F, S>(
+        self,
+        max_bytes: usize,
+        budgets: [ByteBudget; 2],
+        rate: LeastRate,
+        serve: F,
+    ) -> Response
+    where
+        F: FnOnce(Socket) -> S + Send + 'static,
+        S: Future<Output = ()> + Send + 'static,
+    {
+        let connection = self.connection;
+        tokio::spawn(async move {
+            let Ok(upgraded) = connection.await else {
+                return tracing::debug!("the connection ended before it became a stream");
+            };
+            let Ok(parts) = upgraded.downcast::<TokioIo<ConnectionIo>>() else {
+                return tracing::error!("a stream over a connection of another kind");
+            };
+            let stream = parts.io.into_inner();
+            let fragments = Fragments::new(stream, &parts.read_buf, budgets, rate);
+            let config = WebSocketConfig::default()
+                .read_buffer_size(READ_BYTES)
+                .write_buffer_size(0)
+                .max_write_buffer_size(WRITE_BYTES)
+                .max_message_size(Some(max_bytes))
+                .max_frame_size(Some(READ_BYTES));
+            let role = Role::Server;
+            let socket = WebSocketStream::from_raw_socket(fragments, role, Some(config));
+            serve(socket.await).await;
+        });
+        let accept = HeaderValue::try_from(self.accept).expect("base64 is a header's value");
+        let headers = [
+            (CONNECTION, HeaderValue::from_static("upgrade")),
+            (UPGRADE, HeaderValue::from_static("websocket")),
+            (SEC_WEBSOCKET_ACCEPT, accept),
+        ];
+        let mut response = (StatusCode::SWITCHING_PROTOCOLS, headers).into_response();
+        if let Some(protocol) = self.protocol {
+            response
+                .headers_mut()
+                .insert(SEC_WEBSOCKET_PROTOCOL, protocol);
+        }
+        response
+    }
+}

@@ -1,0 +1,134 @@
+//! What streams hold while nothing, or a part of a message, comes over them.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use crate::stream_client::{Received, StreamClient};
+use reqwest::{Method, Response, StatusCode};
+use std::time::Duration;
+
+/// The head of a binary message of 100,000 bytes, masked with zeros.
+const HEAD: [u8; 14] = [0x82, 0xFF, 0, 0, 0, 0, 0, 1, 0x86, 0xA0, 0, 0, 0, 0];
+
+async fn small_memory() -> TestApplication {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 150_000;
+        config.max_upload_bytes = 300_000;
+        config.limits.client_upload_bytes = Some(300_000);
+    });
+    app.await
+}
+
+#[tokio::test]
+async fn idle_streams_take_no_memory_of_uploads() {
+    let app = small_memory().await;
+    let mut streams = Vec::new();
+    for _ in 0..20 {
+        let id = app.open().await;
+        streams.push((StreamClient::open(&app, &id, "").await, id));
+    }
+    // Nor do those over which a message has come.
+    for (stream, id) in &mut streams {
+        stream.send(vec![0; 99_999]).await;
+        let answer = stream.message().await;
+        assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+        assert_eq!(app.frames_of(id).await, 1);
+    }
+    let id = app.open().await;
+    let mut padded = pictures::png(1);
+    padded.resize(140_000, 0);
+    expect(app.post_frame(&id, padded).await, StatusCode::OK).await;
+}
+
+#[tokio::test]
+async fn a_part_of_a_message_is_charged_until_its_stream_ends() {
+    let app = small_memory().await;
+    let (id, other) = (app.open().await, app.open().await);
+    let mut stream = StreamClient::open(&app, &id, "").await;
+    stream.send_raw(&HEAD).await;
+    let post = || {
+        let mut padded = pictures::png(1);
+        padded.resize(140_000, 0);
+        app.post_frame(&other, padded)
+    };
+    expect(post().await, StatusCode::OK).await;
+    stream.send_raw(&[0; 99_000]).await;
+    let full = async { while post().await.status() == StatusCode::OK {} };
+    tokio::time::timeout(Duration::from_secs(60), full)
+        .await
+        .expect("what has arrived is counted");
+    expect_problem(post().await, "quota-exceeded").await;
+    // The rest of the message comes, and is answered.
+    stream.send_raw(&[0; 1000]).await;
+    let answer = stream.message().await;
+    assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+    expect(post().await, StatusCode::OK).await;
+}
+
+#[tokio::test]
+async fn a_message_waits_until_there_is_memory_for_it() {
+    let app = small_memory().await;
+    let (id, other) = (app.open().await, app.open().await);
+    let mut first = StreamClient::open(&app, &id, "").await;
+    let mut second = StreamClient::open(&app, &other, "").await;
+    first.send_raw(&HEAD).await;
+    first.send_raw(&[0; 99_000]).await;
+    let taken = async { while app.post_frame(&id, vec![1; 140_000]).await.status() != 429 {} };
+    tokio::time::timeout(Duration::from_secs(60), taken)
+        .await
+        .expect("what has arrived is counted");
+    second.send(vec![0; 90_000]).await;
+    drop(first);
+    let answer = second.message().await;
+    assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+}
+
+#[tokio::test]
+async fn a_message_that_does_not_end_ends_its_stream() {
+    let app = TestApplication::start_with(|config| {
+        config.body_timeout = Duration::from_millis(200);
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let mut stream = StreamClient::open(&app, &id, "").await;
+    // Between messages there is no hurry.
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    stream.send(pictures::png(1)).await;
+    assert_eq!(stream.message().await["frame"], 1);
+    stream.send_raw(&HEAD).await;
+    stream.send_raw(&[0; 10]).await;
+    let problem = stream.message().await;
+    assert_eq!(problem["type"], "urn:bagtrack:problem:body-timeout");
+    assert!(matches!(stream.receive().await, Received::Closed(4408)));
+}
+
+async fn create_as(app: &TestApplication, client: &str) -> Response {
+    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let request = request.header("x-forwarded-for", client);
+    request.body(pictures::png(0)).send().await.unwrap()
+}
+
+#[tokio::test]
+async fn one_client_has_a_share_of_the_streams() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        config.limits.client_connections = Some(2);
+    });
+    let app = app.await;
+    let mut held = Vec::new();
+    for (client, status) in [
+        ("198.51.100.1", 101),
+        ("198.51.100.1", 101),
+        ("198.51.100.1", 429),
+        ("198.51.100.2", 101),
+    ] {
+        let created = expect(create_as(&app, client).await, StatusCode::CREATED).await;
+        let (id, from) = (created["id"].as_str().unwrap(), ("x-forwarded-for", client));
+        match StreamClient::try_open(app.address, id, "", &[from]).await {
+            Ok(stream) => {
+                assert_eq!(status, 101, "{client}");
+                held.push(stream);
+            }
+            Err(refused) => assert_eq!(refused.status().as_u16(), status, "{client}"),
+        }
+    }
+}
