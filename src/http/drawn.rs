@@ -36,6 +36,10 @@ pub async fn answer_drawn(
         let detail = "A drawn answer is one picture; send one frame in a request.";
         return Err(Problem::malformed(detail));
     };
+    next.check_sizes(
+        &state.config.request_limits(),
+        permit.session().source_size(),
+    )?;
     // Before the frame is tracked: what cannot be drawn must not count.
     let (file, limits) = (file.clone(), state.config.frame_limits());
     let decode = move |_: &mut WorkMeter| Ok(Picture::decode(&file, &limits, MAX_SIDE)?);

@@ -143,3 +143,21 @@ async fn a_large_frame_is_drawn_smaller_with_its_box_in_place() {
         "a gray picture: {answer}"
     );
 }
+
+#[tokio::test]
+async fn a_frame_of_another_size_is_refused_before_it_is_decoded() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let path = format!("/sessions/{id}/frames");
+    // Whoever decodes this one finds the damage first.
+    let mut damaged = pictures::png_of(64, 48);
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 0xFF;
+    for frame in [crate::heavy::bomb(), damaged] {
+        let request = app
+            .request(Method::POST, &path, &[("draw", "")])
+            .body(frame);
+        expect_problem(request.send().await.unwrap(), "frame-size-mismatch").await;
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
