@@ -152,11 +152,10 @@ impl NextFrames {
         let format = state.frame_format();
         let decoded = decode(&self.files, &limits.frame, &|_| format, meter, metrics)?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
-        let (before, started) = (state.latest(), meter.cpu_time());
+        let before = state.latest();
         let mut seen = Vec::new();
         let sees = (self.sees && correction.is_none()).then_some(&mut seen);
         let estimates = state.advance(&frames, correction, meter, self.kept, sees);
-        let took = meter.cpu_time().saturating_sub(started);
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
@@ -167,7 +166,7 @@ impl NextFrames {
             StepError::Stopped(stopped) => stopped.into(),
         };
         let estimates = estimates.map_err(refused)?;
-        metrics.tracked(&before, &estimates, took);
+        metrics.tracked(&before, &estimates, &meter.take_steps());
         Ok(Answered {
             estimates,
             replayed: false,
@@ -201,10 +200,7 @@ impl NextFrames {
             }
             pixels += u64::from(width) * u64::from(height);
         }
-        if self.files.len() > 1 && pixels > limits.max_pixels {
-            return Err(Problem::too_many_pixels(pixels, limits.max_pixels));
-        }
-        Ok(())
+        limits.check_pixels(pixels, self.files.len())
     }
 }
 
@@ -215,6 +211,15 @@ pub struct RequestLimits {
     pub frame: Limits,
     /// Most pixels of several frames together. A single frame has its own limit.
     pub max_pixels: u64,
+}
+
+impl RequestLimits {
+    fn check_pixels(&self, pixels: u64, files: usize) -> Result<(), Problem> {
+        match files > 1 && pixels > self.max_pixels {
+            true => Err(Problem::too_many_pixels(pixels, self.max_pixels)),
+            false => Ok(()),
+        }
+    }
 }
 
 /// Refuses a request whose frames have too many pixels together, by their headers alone.
@@ -229,10 +234,19 @@ pub fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), Probl
             size.map_err(|error| Problem::from(error).of_frame(index, files.len()))?;
         pixels += u64::from(width) * u64::from(height);
     }
-    match files.len() > 1 && pixels > limits.max_pixels {
-        true => Err(Problem::too_many_pixels(pixels, limits.max_pixels)),
-        false => Ok(()),
-    }
+    limits.check_pixels(pixels, files.len())
+}
+
+/// The same where each frame is answered for itself: one that is no image is refused in its turn.
+///
+/// # Errors
+/// Those that are images have too many pixels.
+pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), Problem> {
+    let sizes = files
+        .iter()
+        .filter_map(|file| ingest::size(file, &limits.frame).ok());
+    let pixels = sizes.map(|(width, height)| u64::from(width) * u64::from(height));
+    limits.check_pixels(pixels.sum(), files.len())
 }
 
 /// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says

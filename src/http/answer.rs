@@ -6,6 +6,9 @@ use crate::tracker::{Estimate, Status};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
+/// Bytes of a target in an answer: the value, and its JSON with six numbers.
+const TARGET_BYTES: usize = 256;
+
 /// How sure the tracker is of its box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -113,6 +116,12 @@ impl From<&[Estimates]> for FrameAnswers {
             answers: (estimates.len() > 1).then(all),
         }
     }
+}
+
+/// Bytes that the answers to so many frames take at most, as values and as JSON, in a session with so many targets.
+pub fn answer_bytes(frames: usize, targets: usize) -> usize {
+    // The first target stands beside the list, and the last answer beside the list of answers.
+    (frames + 1) * (targets + 1) * TARGET_BYTES
 }
 
 /// Width and height of the session's frames, in pixels.

@@ -3,24 +3,29 @@
 use super::accept::AnswerForm;
 use super::advance::NextFrames;
 use super::advance_session::advance_session;
-use super::answer::{FrameAnswers, replayed_header};
+use super::answer::{FrameAnswers, answer_bytes, replayed_header};
 use super::drawn::answer_drawn;
 use super::frame_order::wait_for_turn;
-use super::json::Json;
+use super::json;
 use super::lines::{FrameSource, LineWork};
 use super::openapi::example_frames;
 use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
+use super::snapshot::charged;
 use super::state::AppState;
 use super::upload::session_request::SessionRequest;
 use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use super::upload::switch::Switch;
 use super::video_frames::VideoFrames;
+use super::video_place::VideoPlace;
+use crate::sessions::ByteCharge;
 use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// The settings of a request with the next frames.
 #[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
@@ -129,7 +134,7 @@ pub async fn post(
         true => AnswerForm::Picture,
         false => form,
     };
-    wait_for_turn(&state, &permit, &client, number).await?;
+    let mut queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
     let (mut files, targets) = (upload.files, permit.session().target_count());
     let frames = match (upload.video, form) {
         (Some(_), AnswerForm::Picture) => {
@@ -138,9 +143,11 @@ pub async fn post(
         }
         (Some(format), _) => {
             let video = files.swap_remove(0);
-            FrameSource::Video(VideoFrames::decode(&state, video, format).await?)
+            let place;
+            (place, queue) = VideoPlace::take(&state, &client, queue).await?;
+            FrameSource::Video(VideoFrames::decode(&state, video, format, place)?)
         }
-        (None, AnswerForm::Lines) => FrameSource::Files(files.into_iter()),
+        (None, AnswerForm::Lines) => FrameSource::of_files(&state, queue.clone(), files).await?,
         (None, AnswerForm::Picture) => {
             let next = NextFrames::posted(number, files, None);
             let queue = queue.for_frames(targets);
@@ -148,9 +155,17 @@ pub async fn post(
         }
         (None, AnswerForm::Json) => {
             let queue = queue.for_frames(files.len() * targets);
+            let account = state.clients.account(&client);
+            // Before the frames are tracked: what cannot be answered must not count.
+            let mut charge = ByteCharge::new(&state.uploads, account.bytes());
+            charge.grow(answer_bytes(files.len(), targets))?;
             let next = NextFrames::posted(number, files, None);
             let answered = advance_session(&state, permit, queue, &client, next).await?;
-            let answers = Json(FrameAnswers::from(&answered.estimates[..])).into_response();
+            let answers = json::line(&FrameAnswers::from(&answered.estimates[..]));
+            let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
+            charge.shrink(answers.len());
+            let headers = [(CONTENT_TYPE, "application/json")];
+            let answers = (headers, charged(answers, charge)).into_response();
             let response = replayed_header(answered.replayed, answers);
             let last = answered.estimates.last();
             let last = last.map_or(0, |last| last.first().frame);

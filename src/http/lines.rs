@@ -2,10 +2,12 @@
 //!
 //! Each frame is tracked for itself: those before one that is refused count. The refusal of the first one is the answer
 //! to the request; that of a later one is the last line, a problem document. The next frame is tracked when the line
-//! before it has been taken, so a slow reader holds no lines in memory.
+//! before it has been taken, so a slow reader holds no lines in memory. What one request may take holds for all of them
+//! together: pixels, processor time, and the time until the last is tracked. A video has the processor time of as many
+//! requests as its frames would be posted in, and no end but that of its frames.
 
 use super::accept;
-use super::advance::NextFrames;
+use super::advance::{NextFrames, check_readable_pixels};
 use super::advance_session::advance_session;
 use super::client::Client;
 use super::durability::Durability;
@@ -16,7 +18,8 @@ use super::problems::problem::Problem;
 use super::state::AppState;
 use super::stream::message::StreamAnswer;
 use super::video_frames::VideoFrames;
-use crate::sessions::{Fingerprint, LockedSession, QueuePermit, SessionPermit};
+use super::work;
+use crate::sessions::{Fingerprint, LockedSession, QueuePermit, SessionPermit, WorkMeter};
 use axum::body::{Body, Bytes, HttpBody};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -26,7 +29,7 @@ use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use std::vec::IntoIter;
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, timeout_at};
 use tracing::Instrument;
 
 /// How long a frame of a video waits before it asks for a place in the quota again.
@@ -35,10 +38,31 @@ const RETRY: Duration = Duration::from_millis(20);
 /// Where frames come from.
 #[derive(Debug)]
 pub enum FrameSource {
-    /// Files of the request.
-    Files(IntoIter<Bytes>),
+    /// Files of the request, and when the last has to be tracked.
+    Files(IntoIter<Bytes>, Instant),
     /// A video.
     Video(VideoFrames),
+}
+
+impl FrameSource {
+    /// These files, if their pixels are no more than those of one request may.
+    ///
+    /// # Errors
+    /// They are more.
+    pub async fn of_files(
+        state: &AppState,
+        queue: QueuePermit,
+        files: Vec<Bytes>,
+    ) -> Result<Self, Problem> {
+        let deadline = Instant::now() + state.config.work_timeout;
+        let limits = state.config.request_limits();
+        let check = move |_: &mut WorkMeter| {
+            check_readable_pixels(&files, &limits)?;
+            Ok(files)
+        };
+        let files = work::run(state, queue, check).await?;
+        Ok(Self::Files(files.into_iter(), deadline))
+    }
 }
 
 /// Frames that are tracked one after the other.
@@ -86,7 +110,11 @@ impl LineWork {
     /// The answer to the next frame; none after the last.
     async fn next(&mut self) -> Option<Result<StreamAnswer, Problem>> {
         let file = match &mut self.frames {
-            FrameSource::Files(files) => Ok(files.next()?),
+            FrameSource::Files(files, deadline) => {
+                let (file, deadline) = (files.next()?, *deadline);
+                let tracked = timeout_at(deadline, self.track(file)).await;
+                return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
+            }
             FrameSource::Video(video) => video.next().await?,
         };
         Some(match file {

@@ -45,7 +45,9 @@ pub struct Shared {
     /// Places for the processes that decode videos.
     pub videos: Arc<Semaphore>,
     /// Whether `/readyz` has found the queue full.
-    pub saturation: Saturation,
+    pub queue_saturation: Saturation,
+    /// Whether `/readyz` has found the memory of uploads used up.
+    pub upload_saturation: Saturation,
     clock: Clock,
     /// Set from the moment that the service was asked to end.
     draining: AtomicBool,
@@ -89,8 +91,10 @@ impl AppState {
             metrics: Metrics::new(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             streams: OpenStreams::default(),
-            videos: Arc::new(Semaphore::new(config.worker_count())),
-            saturation: Saturation::default(),
+            // A client has one at a time, and no client all of them.
+            videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
+            queue_saturation: Saturation::default(),
+            upload_saturation: Saturation::default(),
             clock,
             draining: AtomicBool::new(false),
             config,

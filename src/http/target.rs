@@ -113,13 +113,14 @@ pub async fn put(
     let next = NextFrames::posted(number, request.upload.files, Some(GivenBox { target, to }));
     let targets = request.permit.session().target_count();
     let queue = request.queue.for_frames(targets);
-    wait_for_turn(&state, &request.permit, &request.client, number).await?;
+    let (permit, client) = (request.permit, request.client);
+    let queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
     let Answered {
         estimates,
         replayed,
         durability,
         ..
-    } = advance_session(&state, request.permit, queue, &request.client, next).await?;
+    } = advance_session(&state, permit, queue, &client, next).await?;
     let answer = Json(Answer::from(&estimates[0])).into_response();
     let frame = estimates[0].first().frame;
     Ok(durability.write(frame, replayed_header(replayed, answer)))

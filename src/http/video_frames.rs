@@ -3,13 +3,13 @@
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::state::AppState;
+use super::video_place::VideoPlace;
 use crate::ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
-use crate::sessions::QueueFull;
 use axum::body::Bytes;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::timeout;
 
 /// Decoded pictures that wait to be tracked.
@@ -26,18 +26,19 @@ pub struct VideoFrames {
     max_frames: usize,
     count: usize,
     _stop: Stop,
-    _place: OwnedSemaphorePermit,
+    _place: VideoPlace,
 }
 
 impl VideoFrames {
-    /// Begins to decode a video, when there is a place for its process.
+    /// Begins to decode a video, in its place.
     ///
     /// # Errors
-    /// There is no program for it, or no place.
-    pub async fn decode(
+    /// There is no program for it.
+    pub fn decode(
         state: &AppState,
         video: Bytes,
         format: VideoFormat,
+        place: VideoPlace,
     ) -> Result<Self, Problem> {
         let (config, limits) = (&state.config, state.config.frame_limits());
         let max_frames = config.limits.max_video_frames;
@@ -50,8 +51,6 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let place = timeout(patience, state.videos.clone().acquire_owned()).await;
-        let place = place.ok().and_then(Result::ok).ok_or(QueueFull)?;
         let mut decoder = VideoDecoder::of_bytes(&config.limits.ffmpeg, video, format, limits)?;
         let stop = decoder.stop();
         let (send, pictures) = mpsc::channel(MAX_WAITING);

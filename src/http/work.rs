@@ -15,7 +15,7 @@ where
     T: Send + 'static,
     F: FnOnce(&mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
-    let limit = limit(state);
+    let limit = limit(state, &queue);
     let _client = limit.abandon_on_drop();
     let (asked, waited) = (Instant::now(), state.metrics.queue_wait.clone());
     let work = state.admission.run(queue, move |turn| {
@@ -38,7 +38,7 @@ where
     T: Send + 'static,
     F: FnOnce(&mut LockedSession, &mut WorkMeter) -> Result<T, Problem> + Send + 'static,
 {
-    let limit = limit(state);
+    let limit = limit(state, &queue);
     let _client = limit.abandon_on_drop();
     let (asked, waited) = (Instant::now(), state.metrics.queue_wait.clone());
     let waiting = async {
@@ -56,7 +56,9 @@ where
         .map_err(|_| Problem::work_timeout())?
 }
 
-fn limit(state: &AppState) -> WorkLimit {
+fn limit(state: &AppState, queue: &QueuePermit) -> WorkLimit {
     let deadline = Instant::now() + state.config.work_timeout;
-    WorkLimit::new(deadline, state.config.limits.max_request_cpu)
+    let max_cpu = state.config.limits.max_request_cpu;
+    let max_cpu = max_cpu.saturating_mul(queue.cpu_share());
+    WorkLimit::new(deadline, max_cpu, queue.spent().clone())
 }

@@ -7,6 +7,7 @@
 
 use super::fair_queue::{FairQueue, Turn};
 use super::lanes::{Lane, Length, Pace};
+use super::work_limit::CpuSpent;
 use super::workers::Workers;
 use std::any::Any;
 use std::io;
@@ -40,10 +41,51 @@ pub type Held = Box<dyn Any + Send + Sync>;
 pub struct QueuePermit {
     lane: Lane,
     length: Length,
-    _held: Arc<(OwnedSemaphorePermit, Held)>,
+    cpu_share: u32,
+    spent: CpuSpent,
+    // The place is free before what is held.
+    _place: Arc<OwnedSemaphorePermit>,
+    held: Arc<Held>,
+}
+
+/// A request that has given its place in the queue back, to wait for something else than a worker.
+#[derive(Debug)]
+pub struct OutsideQueue {
+    lane: Lane,
+    length: Length,
+    cpu_share: u32,
+    spent: CpuSpent,
+    held: Arc<Held>,
 }
 
 impl QueuePermit {
+    /// Gives the place back, as far as no work of the request has it, and keeps what the request holds.
+    pub fn leave(self) -> OutsideQueue {
+        OutsideQueue {
+            lane: self.lane,
+            length: self.length,
+            cpu_share: self.cpu_share,
+            spent: self.spent,
+            held: self.held,
+        }
+    }
+
+    /// The request may take the processor time of so many requests.
+    pub fn with_cpu_of(mut self, requests: u32) -> Self {
+        self.cpu_share = requests;
+        self
+    }
+
+    /// Of how many requests it may take the processor time.
+    pub fn cpu_share(&self) -> u32 {
+        self.cpu_share
+    }
+
+    /// Processor time that the request has taken.
+    pub fn spent(&self) -> &CpuSpent {
+        &self.spent
+    }
+
     /// For work on so many frames, which gives way to shorter work between two of them.
     pub fn for_frames(mut self, count: usize) -> Self {
         self.length = match count {
@@ -111,12 +153,28 @@ impl Admission {
     /// # Errors
     /// All places are taken.
     pub fn enter(&self, lane: Lane, held: Held) -> Result<QueuePermit, QueueFull> {
-        let place = self.queue.clone().try_acquire_owned();
-        let place = place.map_err(|_| QueueFull)?;
-        Ok(QueuePermit {
+        self.enter_again(OutsideQueue {
             lane,
             length: Length::Short,
-            _held: Arc::new((place, held)),
+            cpu_share: 1,
+            spent: CpuSpent::default(),
+            held: Arc::new(held),
+        })
+    }
+
+    /// Takes a place in the queue for a request that has left it.
+    ///
+    /// # Errors
+    /// All places are taken.
+    pub fn enter_again(&self, request: OutsideQueue) -> Result<QueuePermit, QueueFull> {
+        let place = self.queue.clone().try_acquire_owned();
+        Ok(QueuePermit {
+            lane: request.lane,
+            length: request.length,
+            cpu_share: request.cpu_share,
+            spent: request.spent,
+            _place: Arc::new(place.map_err(|_| QueueFull)?),
+            held: request.held,
         })
     }
 

@@ -45,7 +45,7 @@ mod targets;
 mod work_limit;
 mod workers;
 
-pub use admission::{Admission, Held, QueueFull, QueuePermit, WorkPanicked};
+pub use admission::{Admission, Held, OutsideQueue, QueueFull, QueuePermit, WorkPanicked};
 pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
 pub use clock::Clock;
 pub use fair_queue::Turn;
@@ -70,4 +70,4 @@ pub use store::{
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
 };
-pub use work_limit::{Stopped, WorkLimit, WorkMeter};
+pub use work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};

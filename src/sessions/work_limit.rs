@@ -6,7 +6,7 @@
 use super::cpu_time::thread_cpu_time;
 use super::fair_queue::Turn;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Why work was stopped. What it had done was undone.
@@ -23,20 +23,37 @@ pub enum Stopped {
     Cost(Duration),
 }
 
+/// Processor time that the work of one request has taken. Clones are the same request's.
+#[derive(Debug, Clone, Default)]
+pub struct CpuSpent(Arc<AtomicU64>);
+
+impl CpuSpent {
+    fn total(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Ordering::Relaxed))
+    }
+
+    fn add(&self, time: Duration) {
+        let nanos = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.0.fetch_add(nanos, Ordering::Relaxed);
+    }
+}
+
 /// What a request's work may take. Clones share whether it was abandoned.
 #[derive(Debug, Clone)]
 pub struct WorkLimit {
     deadline: Instant,
     max_cpu: Duration,
+    spent: CpuSpent,
     abandoned: Arc<AtomicBool>,
 }
 
 impl WorkLimit {
-    /// Until `deadline`, with at most `max_cpu` of processor time.
-    pub fn new(deadline: Instant, max_cpu: Duration) -> Self {
+    /// Until `deadline`, with at most `max_cpu` of processor time, of which the request has `spent` some before.
+    pub fn new(deadline: Instant, max_cpu: Duration, spent: CpuSpent) -> Self {
         Self {
             deadline,
             max_cpu,
+            spent,
             abandoned: Arc::default(),
         }
     }
@@ -52,6 +69,7 @@ impl WorkLimit {
             limit: self,
             turn,
             started: thread_cpu_time(),
+            steps: Vec::new(),
         }
     }
 }
@@ -72,9 +90,23 @@ pub struct WorkMeter<'a> {
     limit: &'a WorkLimit,
     turn: &'a mut Turn,
     started: Duration,
+    steps: Vec<Duration>,
 }
 
 impl WorkMeter<'_> {
+    /// Does a step of the work, and notes its processor time.
+    pub fn step<T>(&mut self, step: impl FnOnce() -> T) -> T {
+        let before = thread_cpu_time();
+        let result = step();
+        self.steps.push(thread_cpu_time().saturating_sub(before));
+        result
+    }
+
+    /// The processor time of each step since this was asked last.
+    pub fn take_steps(&mut self) -> Vec<Duration> {
+        std::mem::take(&mut self.steps)
+    }
+
     /// Processor time that the work has taken.
     pub fn cpu_time(&self) -> Duration {
         thread_cpu_time().saturating_sub(self.started)
@@ -93,10 +125,16 @@ impl WorkMeter<'_> {
         if Instant::now() >= limit.deadline {
             return Err(Stopped::Deadline);
         }
-        if self.cpu_time() > limit.max_cpu {
+        if limit.spent.total() + self.cpu_time() > limit.max_cpu {
             return Err(Stopped::Cost(limit.max_cpu));
         }
         Ok(())
+    }
+}
+
+impl Drop for WorkMeter<'_> {
+    fn drop(&mut self) {
+        self.limit.spent.add(self.cpu_time());
     }
 }
 
@@ -112,19 +150,23 @@ mod tests {
     async fn each_limit_stops_the_work() {
         let mut turn = FairQueue::new(1).ask(Lane(0), Length::Short).await.unwrap();
         let soon = || Instant::now() + LONG;
-        let limit = WorkLimit::new(soon(), LONG);
+        let limit = WorkLimit::new(soon(), LONG, CpuSpent::default());
         let client = limit.abandon_on_drop();
         assert_eq!(limit.start(&mut turn).check(), Ok(()));
         drop(client);
         assert_eq!(limit.start(&mut turn).check(), Err(Stopped::Abandoned));
-        let late = WorkLimit::new(Instant::now(), LONG);
+        let late = WorkLimit::new(Instant::now(), LONG, CpuSpent::default());
         assert_eq!(late.start(&mut turn).check(), Err(Stopped::Deadline));
-        let limit = WorkLimit::new(soon(), Duration::from_micros(10));
+        let limit = WorkLimit::new(soon(), Duration::from_micros(10), CpuSpent::default());
         let mut meter = limit.start(&mut turn);
         let mut checked = meter.check();
         while checked.is_ok() {
             checked = meter.check();
         }
         assert_eq!(checked, Err(Stopped::Cost(Duration::from_micros(10))));
+        // What the request's next work would take is used up, too.
+        drop(meter);
+        let next = limit.start(&mut turn).check();
+        assert_eq!(next, Err(Stopped::Cost(Duration::from_micros(10))));
     }
 }

@@ -148,3 +148,40 @@ async fn a_request_that_waits_for_a_deleted_session_is_told_so() {
         "{answer}"
     );
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn frames_that_wait_for_those_before_them_hold_no_places_in_the_queue() {
+    let app = TestApplication::start_with(|config| {
+        config.queue = 4;
+        config.limits.client_requests = Some(100);
+    });
+    let app = std::sync::Arc::new(app.await);
+    let mut early = tokio::task::JoinSet::new();
+    let mut sessions = Vec::new();
+    for _ in 0..4 {
+        let id = app.open().await;
+        sessions.push(id.clone());
+        for number in 2..=4 {
+            let (app, id) = (app.clone(), id.clone());
+            early.spawn(async move {
+                let frame = pictures::png(number as u32);
+                app.post_numbered(&id, number, frame).await.status()
+            });
+        }
+    }
+    // They are at their sessions, with more frames than there are places.
+    let id = app.open().await;
+    let started = std::time::Instant::now();
+    let mut answered = 0;
+    while started.elapsed() < Duration::from_millis(1500) {
+        expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+        answered += 1;
+    }
+    assert!(answered > 2, "{answered}");
+    // Their turn comes.
+    for id in &sessions {
+        let first = app.post_numbered(id, 1, pictures::png(1)).await;
+        expect(first, StatusCode::OK).await;
+    }
+    drop(early.join_all().await);
+}

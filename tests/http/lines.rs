@@ -1,10 +1,12 @@
 //! Answers as lines of JSON.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::heavy;
 use crate::pictures;
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
+use std::time::Duration;
 
 pub const LINES: &str = "application/x-ndjson";
 
@@ -105,4 +107,49 @@ async fn a_refused_first_frame_is_the_answer_to_the_request() {
     let differs = post(&app, &id, &[("frame", "2")], frames(5..=6)).await;
     expect_problem(differs, "frame-differs").await;
     assert_eq!(app.frames_of(&id).await, 3);
+}
+
+#[tokio::test]
+async fn the_pixels_of_all_frames_together_are_bounded() {
+    let pixels = u64::from(pictures::WIDTH * pictures::HEIGHT);
+    let app = TestApplication::start_with(|config| {
+        config.limits.max_request_pixels = 3 * pixels;
+    });
+    let app = app.await;
+    let id = app.open().await;
+    lines(post(&app, &id, &[], frames(1..=3)).await).await;
+    let refused = post(&app, &id, &[], frames(4..=7)).await;
+    expect_problem(refused, "request-too-costly").await;
+    assert_eq!(app.frames_of(&id).await, 4);
+}
+
+#[tokio::test]
+async fn the_processor_time_of_all_frames_together_is_bounded() {
+    // More than a frame of these takes, and less than all of them.
+    let app = TestApplication::start_with(|config| {
+        config.limits.max_request_cpu = Duration::from_millis(300);
+        config.max_frames = 400;
+    });
+    let app = app.await;
+    let session = heavy::open(&app).await;
+    let request = heavy::post(&app, &session, 400).header("accept", LINES);
+    let mut got = lines(request.send().await.unwrap()).await;
+    let last = got.pop().unwrap();
+    assert_eq!(last["type"], "urn:bagtrack:problem:request-too-costly");
+    assert!((1..400).contains(&got.len()), "{} lines", got.len());
+}
+
+#[tokio::test]
+async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.max_request_cpu = Duration::from_secs(600);
+        config.work_timeout = Duration::from_millis(300);
+        config.max_frames = 400;
+    });
+    let app = app.await;
+    let session = heavy::open(&app).await;
+    let request = heavy::post(&app, &session, 400).header("accept", LINES);
+    let mut got = lines(request.send().await.unwrap()).await;
+    let last = got.pop().unwrap();
+    assert_eq!(last["type"], "urn:bagtrack:problem:work-timeout", "{last}");
 }

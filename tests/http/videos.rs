@@ -1,12 +1,14 @@
 //! Videos as bodies. Most need ffmpeg, and say so where there is none.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::heavy;
 use crate::lines::lines;
 use crate::pictures;
 use image::ImageFormat;
 use reqwest::{Method, Response};
 use std::io::Write;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 const FRAMES: u32 = 12;
 
@@ -167,4 +169,47 @@ async fn what_is_wrong_with_a_video_is_told() {
         "frame-size-mismatch",
     )
     .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start_with(|config| {
+        config.workers = Some(1);
+        config.work_timeout = Duration::from_secs(2);
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+    });
+    let app = app.await;
+    let send = async |session: String, client: &str, video: Vec<u8>| {
+        let request = app.request(Method::POST, &format!("{session}/frames"), &[]);
+        let request = request
+            .header("content-type", "video/x-motion-jpeg")
+            .body(video);
+        request
+            .header("x-forwarded-for", client)
+            .send()
+            .await
+            .unwrap()
+    };
+    let (long, short) = (motion_jpeg().repeat(200), motion_jpeg());
+    let session = heavy::open(&app).await;
+    let mut held = send(session, "198.51.100.1", long).await;
+    held.chunk().await.unwrap().expect("a line");
+    let again = send(
+        format!("/sessions/{}", app.open().await),
+        "198.51.100.1",
+        short.clone(),
+    );
+    expect_problem(again.await, "quota-exceeded").await;
+    let other = send(
+        format!("/sessions/{}", app.open().await),
+        "198.51.100.2",
+        short,
+    );
+    assert_eq!(lines(other.await).await.len(), FRAMES as usize);
+    // It was at work all the time.
+    held.chunk().await.unwrap().expect("another line");
+    drop(held);
 }
