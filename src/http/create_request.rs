@@ -93,19 +93,19 @@ impl FromRequest<AppState> for CreateRequest {
                 return Err(Problem::malformed(detail));
             }
             (Some(id), None) => Some(OpeningName::Id(id)),
-            (None, Some(key)) => Some(OpeningName::Key(caller.owner().clone(), key)),
+            (None, Some(key)) => {
+                let key = scoped(key, state, &Client::of(&parts));
+                Some(OpeningName::Key(caller.owner().clone(), key))
+            }
             (None, None) => None,
         };
+        let client = Client::of(&parts);
+        let account = state.clients.account(&client);
         // A request that comes again may have its answer already.
         if name.is_none() {
-            check_room(state)?;
+            check_room(state, &account)?;
         }
-        let client = Client::of(&parts);
         let admitted = admit(state, &parts)?;
-        let account = admitted.account().clone();
-        if name.is_none() {
-            account.check_session()?;
-        }
         let request = Request::from_parts(parts, body);
         let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
         Ok(Self {
@@ -142,12 +142,22 @@ impl CreateRequest {
 /// Refuses new sessions where there is no room for them, or when the service is about to end.
 ///
 /// # Errors
-/// `too-many-sessions` and `not-ready`.
-pub fn check_room(state: &AppState) -> Result<(), Problem> {
+/// `too-many-sessions`, `quota-exceeded` and `not-ready`.
+pub fn check_room(state: &AppState, account: &Account) -> Result<(), Problem> {
     if state.is_draining() {
         return Err(Problem::not_ready());
     }
-    Ok(state.registry.check_room()?)
+    state.registry.check_room()?;
+    account.check_session()
+}
+
+/// An idempotency key as it is kept. Each client has keys of its own: where there are no API keys, which tell clients
+/// apart otherwise, each address.
+fn scoped(key: String, state: &AppState, client: &Client) -> String {
+    match client {
+        Client::Address(address) if !state.access.keys.are_needed() => format!("{address} {key}"),
+        _ => key,
+    }
 }
 
 /// The id that the client made, where the path has one.

@@ -36,7 +36,7 @@ pub async fn open_once(state: &AppState, request: CreateRequest) -> Result<Respo
         is_same(&session, request.caller.owner(), request.digest(), &name)?;
         return Ok(created(state, &session, true, is_verbose));
     }
-    check_room(state)?;
+    check_room(state, &request.account)?;
     let (caller, digest) = (request.caller.clone(), request.digest());
     match open(state, request, id).await {
         // Another replica was first.

@@ -117,3 +117,29 @@ async fn clients_have_keys_of_their_own() {
     let ben = id_of(opening(&app, "key", 0).send().await.unwrap()).await;
     assert_ne!(ann, ben);
 }
+
+#[tokio::test]
+async fn without_api_keys_each_address_has_keys_of_its_own() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+        config.limits.client_sessions = Some(1);
+    });
+    let app = app.await;
+    let open = async |client: &str, key: &str, t: u32| {
+        let request = opening(&app, key, t).header("x-forwarded-for", client);
+        request.send().await.unwrap()
+    };
+    let one = id_of(open("198.51.100.1", "key", 0).await).await;
+    // The same request, and another one under the same key: both are the other client's own.
+    let other = id_of(open("198.51.100.2", "key", 0).await).await;
+    assert_ne!(one, other);
+    id_of(open("198.51.100.3", "key", 1).await).await;
+    assert_eq!(id_of(open("198.51.100.1", "key", 0).await).await, one);
+    // A client that has its share of sessions is refused before its frame is looked at.
+    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let request = request
+        .header("idempotency-key", "new")
+        .header("x-forwarded-for", "198.51.100.1");
+    let refused = request.body("no image").send().await.unwrap();
+    expect_problem(refused, "quota-exceeded").await;
+}
