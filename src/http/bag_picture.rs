@@ -7,8 +7,9 @@ use super::openapi::request_bodies::BinaryBody;
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
 use super::session_path::SessionPath;
+use super::snapshot::charged;
 use super::state::AppState;
-use crate::sessions::LockedSession;
+use crate::sessions::{ByteCharge, LockedSession};
 use crate::tracker::{BagEntry, VectorView};
 use axum::Extension;
 use axum::extract::{Query, State};
@@ -74,24 +75,33 @@ pub async fn get(
     let (target, count) = (settings.target.unwrap_or(0), session.target_count());
     state.admission.check_place()?;
     let request = state.clients.account(&client).request()?;
+    let mut charge = ByteCharge::new(&state.uploads, request.bytes());
     let queue = state.admission.enter(request.lane(), Box::new(request))?;
     let permit = session.visit()?;
     let draw = move |locked: &mut LockedSession| {
         let bag = locked.state().bag(target);
-        draw(&bag.ok_or_else(|| Problem::which_target(count))?)
+        let bytes = draw(
+            &bag.ok_or_else(|| Problem::which_target(count))?,
+            &mut charge,
+        )?;
+        charge.shrink(bytes.len());
+        Ok((bytes, charge))
     };
-    let bytes = newest::look(&state, permit, queue, &client, draw).await?;
-    Ok(([(CONTENT_TYPE, "image/png")], bytes).into_response())
+    let (bytes, charge) = newest::look(&state, permit, queue, &client, draw).await?;
+    // The bytes stay in memory until the client has taken them.
+    Ok(([(CONTENT_TYPE, "image/png")], charged(bytes, charge)).into_response())
 }
 
-/// The sheet as a PNG file.
-fn draw(bag: &[BagEntry]) -> Result<Vec<u8>, Problem> {
+/// The sheet as a PNG file, with the memory that it takes.
+fn draw(bag: &[BagEntry], charge: &mut ByteCharge) -> Result<Vec<u8>, Problem> {
     let rows: Vec<Vec<RgbImage>> = bag.iter().map(tiles).collect();
     let across = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
     let tile = rows.iter().flatten().next();
     let (width, height) = tile.map_or((1, 1), RgbImage::dimensions);
     let (step_x, step_y) = (width + GAP, height + GAP);
     let size = (GAP + across * step_x, GAP + rows.len() as u32 * step_y);
+    // The pixels, and a file that is no larger but for a little.
+    charge.grow(2 * 3 * size.0 as usize * size.1 as usize)?;
     let mut sheet = RgbImage::from_pixel(size.0, size.1, GROUND);
     for (y, row) in rows.iter().enumerate() {
         for (x, tile) in row.iter().enumerate() {

@@ -40,7 +40,8 @@ impl FirstFrame {
         let (limits, metrics) = (state.config.frame_limits(), &state.metrics.tracking);
         let files = std::slice::from_ref(file);
         let frame = &advance::decode(files, &limits, &format, meter, metrics)?[0];
-        let started = SessionState::start(frame, Fingerprint::of(file), boxes, &params);
+        let print = Fingerprint::of(file);
+        let started = SessionState::start(frame, print, boxes, &params, || meter.check());
         started.map_err(|error| match (&error, boxes) {
             (StartError::Refused { target, .. }, PerTarget::List(list)) => {
                 let target = *target;

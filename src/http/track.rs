@@ -1,7 +1,7 @@
 //! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
 
 use super::advance::{self, GivenBox, NextFrames};
-use super::answer::FrameAnswers;
+use super::answer::{FrameAnswers, answer_bytes};
 use super::auth::caller::Caller;
 use super::first_frame::FirstFrame;
 use super::json;
@@ -139,17 +139,20 @@ pub async fn post(State(state): State<AppState>, request: Request) -> Result<Res
     let (upload, queue) = Upload::read(&state, admitted, texts, request).await?;
     let queue = queue.for_frames(upload.files.len());
     let worker = state.clone();
-    let track = move |meter: &mut WorkMeter| track(&worker, upload, meter);
-    let body = work::run(&state, queue, track).await?;
-    charge.grow(body.len())?;
+    let track = move |meter: &mut WorkMeter| {
+        let body = track(&worker, upload, meter, &mut charge)?;
+        Ok((body, charge))
+    };
+    let (body, charge) = work::run(&state, queue, track).await?;
     Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
 }
 
-/// The body of the answer.
+/// The body of the answer, whose memory is charged before it is taken.
 fn track(
     state: &AppState,
     upload: Upload<TrackSettings>,
     meter: &mut WorkMeter,
+    charge: &mut ByteCharge,
 ) -> Result<Vec<u8>, Problem> {
     let keys = &state.access.snapshots;
     let (mut estimates, mut files) = (Vec::new(), upload.files);
@@ -187,11 +190,17 @@ fn track(
         let answered = next.advance_state(&mut track, &limits, meter, &state.metrics.tracking)?;
         estimates.extend(answered.estimates);
     }
+    let snapshot = track.snapshot(keys);
+    // It is there as base64, and once more in the body.
+    let text = snapshot.len().div_ceil(3) * 4;
+    charge.grow(2 * text + answer_bytes(estimates.len(), track.target_count()))?;
     let tracked = Tracked {
         answers: FrameAnswers::from(&estimates[..]),
-        snapshot: STANDARD.encode(track.snapshot(keys)),
+        snapshot: STANDARD.encode(snapshot),
     };
-    json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))
+    let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;
+    charge.shrink(body.len());
+    Ok(body)
 }
 
 /// What a new track begins with.

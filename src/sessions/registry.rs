@@ -220,7 +220,8 @@ mod tests {
             height: 16.0,
         };
         let (print, params) = (Fingerprint::of(b"first"), Preset::Paper.params());
-        let state = SessionState::start(&frame, print, &PerTarget::One(target), &params).unwrap();
+        let state = SessionState::start(&frame, print, &PerTarget::One(target), &params, || Ok(()))
+            .unwrap();
         let new = NewSession {
             id: Uuid::new_v4(),
             opening: registry.opening([0; 32], &state),

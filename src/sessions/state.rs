@@ -32,7 +32,8 @@ pub enum StepError {
 }
 
 impl SessionState {
-    /// A session that starts with `boxes` in `frame`, whose file has this digest.
+    /// A session that starts with `boxes` in `frame`, whose file has this digest. Before each target `check` says whether
+    /// to go on.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -41,8 +42,9 @@ impl SessionState {
         fingerprint: Fingerprint,
         boxes: &Boxes,
         params: &Params,
+        check: impl FnMut() -> Result<(), Stopped>,
     ) -> Result<Self, StartError> {
-        let targets = Targets::start(frame, boxes, params)?;
+        let targets = Targets::start(frame, boxes, params, check)?;
         let estimates = targets.estimates();
         let first = boxes.try_map(|target, given| {
             let estimate = estimates.as_slice()[target];

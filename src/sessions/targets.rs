@@ -52,6 +52,9 @@ pub enum StartError {
         /// How many targets there were to be.
         count: usize,
     },
+    /// The work was stopped before all of them began.
+    #[error(transparent)]
+    Stopped(Stopped),
 }
 
 /// The trackers.
@@ -80,16 +83,22 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
 }
 
 impl Targets {
-    /// A tracker for each box in `frame`.
+    /// A tracker for each box in `frame`. Before each of them `check` says whether to go on.
     ///
     /// # Errors
     /// See [`StartError`].
-    pub(super) fn start(frame: &Frame, boxes: &Boxes, params: &Params) -> Result<Self, StartError> {
+    pub(super) fn start(
+        frame: &Frame,
+        boxes: &Boxes,
+        params: &Params,
+        mut check: impl FnMut() -> Result<(), Stopped>,
+    ) -> Result<Self, StartError> {
         let count = boxes.as_slice().len();
         if matches!(boxes, PerTarget::List(_)) && count * params.session_bytes() > MAX_LIST_BYTES {
             return Err(StartError::TooLarge { count });
         }
         let start = |target: usize, given: &Rect| {
+            check().map_err(StartError::Stopped)?;
             let mut params = params.clone();
             let step = SEED_STEP.wrapping_mul(target as u64);
             params.seed = params.seed.wrapping_add(step);
@@ -154,11 +163,12 @@ impl Targets {
             }
             meter.check().map_err(TargetsError::Stopped)?;
             if seen.is_some() {
-                let stepped = tracker.step_seeing(frame);
+                let stepped = meter.step(|| tracker.step_seeing(frame));
                 let (_, saw) = stepped.map_err(TargetsError::Refused)?;
                 all_saw.push(saw);
             } else {
-                tracker.step(frame).map_err(TargetsError::Refused)?;
+                let stepped = meter.step(|| tracker.step(frame).map(drop));
+                stepped.map_err(TargetsError::Refused)?;
             }
         }
         if let Some(seen) = seen {

@@ -1,6 +1,6 @@
 //! The bag as a picture.
 
-use crate::application::{BOX, TestApplication, expect};
+use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use image::RgbImage;
 use reqwest::StatusCode;
@@ -62,4 +62,18 @@ async fn gradient_features_have_two_pictures_a_vector() {
     let sheet = sheet(&app, &id).await;
     let step = sheet.height() - 4;
     assert!(sheet.width() > 2 * step, "{:?}", sheet.dimensions());
+}
+
+#[tokio::test]
+async fn the_sheet_is_charged_to_the_memory_of_bodies() {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 30_000;
+        config.max_upload_bytes = 40_000;
+        config.limits.client_upload_bytes = Some(40_000);
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let refused = app.get(&format!("/sessions/{id}/bag.png")).await;
+    expect_problem(refused, "quota-exceeded").await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
 }

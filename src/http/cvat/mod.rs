@@ -111,8 +111,10 @@ pub async fn post(State(state): State<AppState>, request: Request) -> Result<Res
     text.permit.count_frames(request.targets.len())?;
     let queue = text.queue.for_frames(request.targets.len());
     let worker = state.clone();
-    let track = move |meter: &mut WorkMeter| track(&worker, &request, &params, meter);
-    let body = work::run(&state, queue, track).await?;
-    charge.grow(body.len())?;
+    let track = move |meter: &mut WorkMeter| {
+        let body = track(&worker, &request, &params, meter, &mut charge)?;
+        Ok((body, charge))
+    };
+    let (body, charge) = work::run(&state, queue, track).await?;
     Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
 }

@@ -7,14 +7,18 @@ use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use crate::ingest;
 use crate::sessions::{
-    Fingerprint, PerTarget, SessionState, SnapshotError, StepError, WorkMeter, frame_format,
-    largest_format,
+    ByteCharge, Fingerprint, PerTarget, SessionState, SnapshotError, StepError, WorkMeter,
+    frame_format, largest_format,
 };
 use crate::tracker::{Frame, Params, Status};
 use std::slice;
 use std::sync::Arc;
 
-/// The body of the answer. A state is held only while its own target is at work: together they may be large.
+/// Most bytes of a shape in an answer.
+const SHAPE_BYTES: usize = 128;
+
+/// The body of the answer. A state is held only while its own target is at work: together they may be large. `charge`
+/// grows with the answer, before that does.
 ///
 /// # Errors
 /// The problem of the first target that cannot be tracked, or of the frame.
@@ -23,6 +27,7 @@ pub fn track(
     request: &Targets,
     params: &Params,
     meter: &mut WorkMeter,
+    charge: &mut ByteCharge,
 ) -> Result<Vec<u8>, Problem> {
     let worker = Worker { state, params };
     let (file, count) = (slice::from_ref(&request.file), request.targets.len());
@@ -56,11 +61,20 @@ pub fn track(
         let track = track.map_err(|problem| problem.of_target(index, count))?;
         let estimate = *track.latest().first();
         let found = (estimate.status != Status::Lost).then_some(estimate.target);
-        answer.push(found, &track.snapshot(&state.access.snapshots));
+        let snapshot = track.snapshot(&state.access.snapshots);
+        charge.grow(answered_bytes(&snapshot))?;
+        answer.push(found, &snapshot);
     }
     let [(_, frame)] = frames;
     ingest::recycle(frame);
-    json::line(&answer).map_err(|error| Problem::internal(Arc::new(error)))
+    let body = json::line(&answer).map_err(|error| Problem::internal(Arc::new(error)))?;
+    charge.shrink(body.len());
+    Ok(body)
+}
+
+/// Bytes that a target takes in an answer: its state as base64, and the same in the body.
+fn answered_bytes(snapshot: &[u8]) -> usize {
+    2 * (SHAPE_BYTES + snapshot.len().div_ceil(3) * 4)
 }
 
 /// What all targets of a request have in common.
@@ -87,24 +101,28 @@ impl Worker<'_> {
         let snapshot = match target {
             Target::New(rect) => {
                 let [(fingerprint, frame)] = frames;
-                let begun =
-                    SessionState::start(frame, *fingerprint, &PerTarget::One(*rect), self.params);
+                let begun = SessionState::start(
+                    frame,
+                    *fingerprint,
+                    &PerTarget::One(*rect),
+                    self.params,
+                    || Ok(()),
+                );
                 return Ok(begun?);
             }
             Target::Known(snapshot) => snapshot,
         };
         let mut track = self.restore(snapshot)?;
-        let (before, started) = (track.latest(), meter.cpu_time());
+        let before = track.latest();
         let answered = track.advance(frames, None, meter, 0, None);
         let estimates = answered.map_err(|error| match error {
             StepError::Refused { error, .. } => Problem::from(error),
             StepError::Stopped(stopped) => stopped.into(),
         })?;
-        let took = meter.cpu_time().saturating_sub(started);
         self.state
             .metrics
             .tracking
-            .tracked(&before, &estimates, took);
+            .tracked(&before, &estimates, &meter.take_steps());
         Ok(track)
     }
 }

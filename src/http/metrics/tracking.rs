@@ -53,14 +53,12 @@ impl TrackingMetrics {
         result
     }
 
-    /// Frames were tracked, with this processor time together. `before` is the answer to the frame before them.
-    pub fn tracked(&self, before: &Estimates, answers: &[Estimates], time: Duration) {
-        if answers.is_empty() {
-            return;
+    /// Frames were tracked, with this processor time for each step of a tracker. `before` is the answer to the frame
+    /// before them.
+    pub fn tracked(&self, before: &Estimates, answers: &[Estimates], steps: &[Duration]) {
+        for step in steps {
+            self.step.record(step.as_secs_f64());
         }
-        let steps = answers.len() * before.as_slice().len();
-        self.step
-            .record_many(time.as_secs_f64() / steps as f64, steps);
         let mut last = before;
         for answer in answers {
             for (estimate, before) in answer.as_slice().iter().zip(last.as_slice()) {

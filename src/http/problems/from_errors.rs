@@ -69,6 +69,7 @@ impl From<StartError> for Problem {
                 let detail = format!("{error}. Send fewer boxes, or parameters that keep less.");
                 Self::invalid_parameter(detail)
             }
+            StartError::Stopped(stopped) => stopped.into(),
         }
     }
 }
