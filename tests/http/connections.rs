@@ -25,7 +25,7 @@ async fn an_idle_connection_is_closed() {
     assert_eq!(connection.read_to_end().await, "");
     let mut connection = RawConnection::open(app.address).await;
     connection
-        .send("GET /healthz HTTP/1.1\r\nHost: test\r\n\r\n")
+        .send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
         .await;
     let answer = connection.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
@@ -40,7 +40,7 @@ pub async fn expect_body_timeouts(app: &TestApplication, id: &str) {
     ] {
         let mut connection = RawConnection::open(app.address).await;
         let head = format!(
-            "POST /sessions/{id}/frames HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\n\
+            "POST /sessions/{id}/frames HTTP/1.1\r\nHost: localhost\r\nContent-Type: {media_type}\r\n\
              Content-Length: 9000000\r\nConnection: close\r\n\r\n--b\r\n"
         );
         connection.send(head).await;

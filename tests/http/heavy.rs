@@ -76,7 +76,7 @@ pub async fn send_raw(app: &TestApplication, path: &str, request: RequestBuilder
     let media_type = request.headers()["content-type"].to_str().unwrap();
     let length = body.len();
     let head = format!(
-        "POST {path} HTTP/1.1\r\nHost: test\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\n\r\n"
+        "POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\n\r\n"
     );
     let mut client = RawConnection::open(app.address).await;
     client.send(head).await;

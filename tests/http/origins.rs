@@ -68,6 +68,8 @@ async fn a_page_of_an_allowed_origin_may_call_and_read_the_headers() {
         "draining",
         "replayed",
         "retry-after",
+        "ratelimit",
+        "ratelimit-policy",
     ] {
         assert!(exposed.contains(name), "{exposed}");
     }
@@ -95,6 +97,38 @@ async fn only_allowed_hosts_are_served_but_for_probes() {
         for path in ["/healthz", "/readyz", "/metrics"] {
             assert_eq!(get(path, host).await.status(), StatusCode::OK, "{path}");
         }
+    }
+}
+
+#[tokio::test]
+async fn a_service_for_this_machine_alone_is_not_served_under_a_rebound_name() {
+    let app = TestApplication::start().await;
+    let port = app.address.port();
+    let open = async |host: &str| {
+        let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+        let request = request.header("host", host).body(pictures::png(0));
+        request.send().await.unwrap()
+    };
+    for host in ["localhost", "127.0.0.1", "[::1]"] {
+        let host = format!("{host}:{port}");
+        assert_eq!(open(&host).await.status(), StatusCode::CREATED, "{host}");
+    }
+    let rebound = format!("rebound.example:{port}");
+    let problem = expect_problem(open(&rebound).await, "host-not-allowed").await;
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains("--allowed-hosts"), "{detail}");
+    // With keys, a page that rebinds its name cannot call; a proxy may name any host.
+    let keys = TestApplication::start_with(|config| {
+        config.access.api_keys = vec![bagtrack::http::Secret::from("me:0123456789abcdef")];
+    });
+    let proxied = TestApplication::start_with(|config| {
+        config.limits.trusted_proxies = vec!["127.0.0.1/32".parse().unwrap()];
+    });
+    for app in [keys.await, proxied.await] {
+        let page = app
+            .request(Method::GET, "/", &[])
+            .header("host", "track.example");
+        assert_eq!(page.send().await.unwrap().status(), StatusCode::OK);
     }
 }
 

@@ -60,7 +60,8 @@ pub struct AccessConfig {
         value_parser = clap::builder::BoolishValueParser::new()
     ))]
     pub no_auth: bool,
-    /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all].
+    /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all; the
+    /// names and addresses of this machine for a service on a loopback address without API keys and trusted proxies].
     /// `/healthz`, `/readyz` and `/metrics` answer under any.
     #[cfg_attr(
         feature = "cli",

@@ -3,6 +3,7 @@
 //! Only digests are kept. A key that is presented is hashed and compared with all of them in constant time.
 
 use super::config::Secret;
+use super::token::PREFIX;
 use crate::sessions::Owner;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ pub enum KeysError {
     /// An entry cannot be read. It is not shown, since it may hold a key.
     #[error(
         "{place}, entry {number}: write name:key, with a name of up to 64 letters, digits, `-`, `_` or `.`, and a key \
-         of 16 to 256 visible characters"
+         of 16 to 256 visible characters that does not begin like a session token, with `{PREFIX}`"
     )]
     Entry {
         /// Where the entry stands.
@@ -146,7 +147,8 @@ fn parse_one(entry: &str) -> Option<ApiKey> {
     let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
     let named = (1..=MAX_NAME_BYTES).contains(&name.len()) && name.bytes().all(is_name);
     let usable = KEY_BYTES.contains(&key.len()) && key.bytes().all(|byte| byte.is_ascii_graphic());
-    (named && usable).then(|| ApiKey {
+    let is_token = key.starts_with(PREFIX);
+    (named && usable && !is_token).then(|| ApiKey {
         owner: Owner::named(name),
         digest: blake3::hash(key.as_bytes()),
     })
@@ -168,6 +170,8 @@ mod tests {
             "0123456789abcdef",
             ":0123456789abcdef",
             "a b:0123456789abcdef",
+            // It would be taken for a token.
+            "me:bagtrack-session.0123456789abcdef",
         ] {
             let message = load(wrong).unwrap_err().to_string();
             assert!(

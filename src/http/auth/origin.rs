@@ -1,9 +1,9 @@
 //! Refuses requests that a browser sends for a page of another origin, or under the name of another host.
 //!
 //! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
-//! origin is checked, too. A page can also make its own host name resolve to this machine, and is of the same origin
-//! then; the list of hosts is against that.
+//! origin is checked, too. So is the [host](super::hosts).
 
+use super::hosts::AllowedHosts;
 use crate::http::config::Config;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
@@ -15,21 +15,21 @@ use axum::response::{IntoResponse, Response};
 
 /// The middleware.
 pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {
-    match check(&state.config, &request) {
+    let hosts = AllowedHosts::of(&state.config, state.access.keys.are_needed());
+    match check(&state.config, hosts, &request) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     }
 }
 
-fn check(config: &Config, request: &Request) -> Result<(), Problem> {
+fn check(config: &Config, hosts: AllowedHosts, request: &Request) -> Result<(), Problem> {
     let headers = request.headers();
     let named = request
         .uri()
         .authority()
         .map(|authority| authority.as_str());
     let host = named.or_else(|| text(headers, HOST.as_str())).unwrap_or("");
-    let hosts = &config.access.allowed_hosts;
-    if !hosts.is_empty() && !hosts.iter().any(|allowed| is_host(allowed, host)) {
+    if !hosts.have(host) {
         return Err(Problem::host_not_allowed());
     }
     let Some(origin) = headers.get(ORIGIN) else {
@@ -50,42 +50,8 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// Whether `host` is the allowed one, which may leave the port open.
-fn is_host(allowed: &str, host: &str) -> bool {
-    allowed.eq_ignore_ascii_case(host) || allowed.eq_ignore_ascii_case(without_port(host))
-}
-
 /// The scheme is not compared: a proxy may have ended TLS.
 fn is_same_origin(origin: &str, host: &str) -> bool {
     let authority = origin.split_once("://").map(|(_, authority)| authority);
     authority.is_some_and(|authority| !host.is_empty() && authority.eq_ignore_ascii_case(host))
-}
-
-fn without_port(host: &str) -> &str {
-    match host.rsplit_once(':') {
-        // The colons of an IPv6 address are in brackets.
-        Some((name, port)) if !port.contains(']') => name,
-        _ => host,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hosts_are_compared_with_or_without_their_port() {
-        for (allowed, host, expected) in [
-            ("example.org", "example.org", true),
-            ("example.org", "EXAMPLE.org:8080", true),
-            ("example.org:8080", "example.org:8080", true),
-            ("example.org:8080", "example.org", false),
-            ("example.org", "example.org.evil.net", false),
-            ("[::1]", "[::1]:8080", true),
-            ("[::1]", "[::1]", true),
-            ("example.org", "", false),
-        ] {
-            assert_eq!(is_host(allowed, host), expected, "{allowed} {host}");
-        }
-    }
 }
