@@ -36,8 +36,9 @@ pub async fn live() -> Json<Health> {
 
 /// Whether the service wants requests
 ///
-/// A load balancer should send none while this answers 503: the service was asked to end, its queue is full, or the store
-/// of its sessions gives no answer or takes no writes. A queue that was full counts as full until half of it is free.
+/// A load balancer should send none while this answers 503: the service was asked to end, its queue or its memory for
+/// bodies is full, or the store of its sessions gives no answer or takes no writes. What was full counts as full until
+/// half of it is free.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health), ReadyProblems)
@@ -46,15 +47,20 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     if state.is_draining() {
         return Err(Problem::not_ready());
     }
-    let (free, all) = (state.admission.queue_places(), state.config.queue);
     if let Some(store) = &state.store
         && !store.best_effort
         && !store.calls.is_ready()
     {
         return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));
     }
-    match state.saturation.update(free, all) {
-        true => Err(Problem::saturated()),
-        false => Ok(OK),
+    let (places, bytes) = (state.admission.queue_places(), state.uploads.left());
+    let queue = state.queue_saturation.update(places, state.config.queue);
+    let uploads = state
+        .upload_saturation
+        .update(bytes, state.config.max_upload_bytes);
+    match (queue, uploads) {
+        (true, _) => Err(Problem::saturated("The queue is full.")),
+        (_, true) => Err(Problem::saturated("The memory for bodies is used up.")),
+        (false, false) => Ok(OK),
     }
 }

@@ -1,13 +1,13 @@
-//! Whether the queue is so full that a load balancer should look elsewhere.
+//! Whether something is so full that a load balancer should look elsewhere: the queue, or the memory of uploads.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether the queue was found full. It counts as full until half of it is free, so that the answer does not flicker.
+/// Whether something was found full. It counts as full until half of it is free, so that the answer does not flicker.
 #[derive(Debug, Default)]
 pub struct Saturation(AtomicBool);
 
 impl Saturation {
-    /// Whether the queue counts as full, now that `free` of its `all` places are free.
+    /// Whether it counts as full, now that `free` of its `all` places are free.
     pub fn update(&self, free: usize, all: usize) -> bool {
         // A tenth of the places, and half of them.
         let (fills, empties) = (free <= all / 10, free * 2 >= all);

@@ -170,12 +170,10 @@ impl Problem {
         Self::new(Kind::NotReady, detail)
     }
 
-    /// The queue is full.
-    pub fn saturated() -> Self {
-        Self::new(
-            Kind::NotReady,
-            "The queue is full. Send requests to another instance.",
-        )
+    /// Something of the service is full.
+    pub fn saturated(what: &str) -> Self {
+        let detail = format!("{what} Send requests to another instance.");
+        Self::new(Kind::NotReady, detail)
     }
 
     /// The service failed.
