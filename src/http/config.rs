@@ -67,7 +67,7 @@ pub struct Config {
         default_value_t = Config::default().max_body_bytes
     ))]
     pub max_body_bytes: usize,
-    /// Most bytes of all request bodies together; one of unknown length counts as the largest.
+    /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
     #[cfg_attr(feature = "cli", arg(
         long, env = "BAGTRACK_MAX_UPLOAD_BYTES",
         default_value_t = Config::default().max_upload_bytes

@@ -1,5 +1,6 @@
 //! Which pages of other origins may call.
 
+use super::clients::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use super::draining::DRAINING;
 use super::drawn::ANSWER;
 use super::idempotency::IDEMPOTENCY_KEY;
@@ -39,6 +40,8 @@ pub fn cors(origins: &[String]) -> CorsLayer {
             REQUEST_ID,
             TRACEPARENT,
             DRAINING,
+            RATE_LIMIT,
+            RATE_LIMIT_POLICY,
             name("replayed"),
             name("checkpoint"),
             name("durable"),

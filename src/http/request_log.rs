@@ -1,15 +1,19 @@
 //! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
 //!
-//! The span has the ids of the request and of its trace, the method, and the path: never bytes or boxes, no more of the
+//! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
+//! the method, and the path: never bytes or boxes, no more of the
 //! path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
 //! only where `debug` is asked for.
 
+use super::identify::note_address;
 use super::request_id;
+use super::state::AppState;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::sessions::short_id;
-use axum::extract::Request;
+use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
+use std::net::IpAddr;
 use std::time::Instant;
 use tracing::field::Empty;
 use tracing::{Instrument, Level, Span};
@@ -20,11 +24,16 @@ const MAX_LOGGED_PATH: usize = 200;
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 /// The middleware.
-pub async fn log_request(request: Request, next: Next) -> Response {
+pub async fn log_request(
+    State(state): State<AppState>,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let started = Instant::now();
     let is_probe = PROBES.contains(&request.uri().path());
+    let address = note_address(&state, &mut request);
     let (span, context) = (
-        span(&request, is_probe),
+        span(&request, is_probe, address),
         TraceContext::of(request.headers()),
     );
     #[cfg(feature = "otel")]
@@ -45,12 +54,16 @@ pub async fn log_request(request: Request, next: Next) -> Response {
     response
 }
 
-fn span(request: &Request, is_probe: bool) -> Span {
+fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
     let id = request_id::of(request);
     let (method, path) = (request.method(), logged(request.uri().path()));
     match is_probe {
-        true => tracing::span!(Level::DEBUG, "request", id, trace = Empty, %method, path),
-        false => tracing::span!(Level::INFO, "request", id, trace = Empty, %method, path),
+        true => {
+            tracing::span!(Level::DEBUG, "request", id, trace = Empty, %client, key = Empty, %method, path)
+        }
+        false => {
+            tracing::span!(Level::INFO, "request", id, trace = Empty, %client, key = Empty, %method, path)
+        }
     }
 }
 

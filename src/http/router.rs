@@ -30,7 +30,8 @@ use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetReques
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::RequestBodyDeadlineLayer;
 
-/// The whole service. `extra` routes are served beside its own and pass through the same layers.
+/// The whole service. `extra` routes are served beside its own. They pass through the layers of all requests, and not
+/// through those of [`routes`], which say who may use the service.
 pub fn router(state: AppState, extra: Router) -> Router {
     let config = &state.config;
     let routes = routes(&state)
@@ -55,7 +56,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         ))
         .layer(middleware::from_fn(secure))
         .layer(middleware::from_fn_with_state(state.clone(), mark_draining))
-        .layer(middleware::from_fn(log_request))
+        .layer(middleware::from_fn_with_state(state.clone(), log_request))
         .layer(middleware::from_fn_with_state(state.clone(), count_request))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))

@@ -50,3 +50,49 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
         }
     }
 }
+
+#[tokio::test]
+async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
+    const KEY: &str = "0123456789abcdef";
+    let flags = [
+        "--log-format",
+        "json",
+        "--shutdown-delay",
+        "0s",
+        "--api-keys",
+        "ann:0123456789abcdef",
+        "--trusted-proxies",
+        "127.0.0.0/8",
+    ];
+    let service = Service::start(&flags).await;
+    let get = async |id: &str, key: &str| {
+        let request = service.client.get(service.url("/sessions/none"));
+        let request = request.header("x-forwarded-for", "203.0.113.9");
+        request
+            .header("x-request-id", id)
+            .bearer_auth(key)
+            .send()
+            .await
+            .unwrap();
+    };
+    get("with-key", KEY).await;
+    get("without", "another-key-of-somebody").await;
+    service.signal(Signal::TERM);
+    let (_, log) = service.ends().await;
+    let of = |id: &str| {
+        let mut lines = log.iter().filter(move |line| line.contains(id));
+        let line = lines.find(|line| line.contains("answered"));
+        line.unwrap_or_else(|| panic!("{log:?}"))
+    };
+    for id in ["with-key", "without"] {
+        assert_eq!(of(id).matches("203.0.113.9").count(), 1, "{}", of(id));
+    }
+    assert!(
+        of("with-key").contains(r#""key":"ann""#),
+        "{}",
+        of("with-key")
+    );
+    assert!(!of("without").contains(r#""key""#), "{}", of("without"));
+    let all = log.join("\n");
+    assert!(!all.contains(KEY) && !all.contains("another-key"), "{all}");
+}

@@ -142,3 +142,31 @@ async fn a_client_with_one_session_gets_its_turn_beside_one_with_forty() {
     println!("{modest} µs beside {greedy} µs");
     assert!(modest < greedy / 4, "{modest} µs beside {greedy} µs");
 }
+
+#[tokio::test]
+async fn what_is_left_of_the_frames_comes_back_and_is_told_by_every_call() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.client_frame_rate = 50;
+        config.max_frames = 50;
+    });
+    let app = app.await;
+    let id = app.open().await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    // Asking takes no frame.
+    let full = async {
+        loop {
+            let response = app.get_session(&id).await;
+            let left = response.headers()["ratelimit"].to_str().unwrap().to_owned();
+            if left.contains("\"frames\";r=50;") {
+                break;
+            }
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(60), full)
+        .await
+        .expect("the frames come back");
+    for path in ["/track", "/integrations/cvat"] {
+        let refused = app.request(Method::POST, path, &[]).send().await.unwrap();
+        assert!(refused.headers().contains_key("ratelimit"), "{path}");
+    }
+}

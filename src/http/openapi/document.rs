@@ -24,6 +24,9 @@ pub fn document_at(base_path: &str) -> String {
     let links = links(&document);
     for operation in operations(&mut document) {
         complete_parameters(operation);
+        if operation["tags"] != json!(["service"]) {
+            add_rate_limits(operation);
+        }
         if OPENING.iter().any(|id| operation["operationId"] == *id) {
             operation["responses"]["201"]["links"] = links.clone();
         }
@@ -49,6 +52,19 @@ fn complete_parameters(operation: &mut Value) {
         }
         if parameter["in"] == "query" && parameter["schema"]["type"] == "boolean" {
             parameter["allowEmptyValue"] = true.into();
+        }
+    }
+}
+
+/// Answers tell the client's quotas, and refusals for one of them.
+fn add_rate_limits(operation: &mut Value) {
+    let header = |text: &str| json!({"description": text, "schema": {"type": "string"}});
+    let responses = operation["responses"].as_object_mut();
+    for (status, response) in responses.into_iter().flatten() {
+        if status.starts_with('2') || status == "429" {
+            let text = "The client's quotas (draft-ietf-httpapi-ratelimit-headers).";
+            response["headers"]["RateLimit-Policy"] = header(text);
+            response["headers"]["RateLimit"] = header("What is left of them.");
         }
     }
 }
