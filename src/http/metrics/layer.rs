@@ -27,9 +27,20 @@ pub async fn count_request(
         })),
     });
     let response = next.run(request).await;
-    // Streams of unknown length do not count.
-    let bytes = response.body().size_hint().exact().unwrap_or(0);
-    state.metrics.sent_bytes.increment(bytes);
+    let sent = state.metrics.sent_bytes.clone();
+    let response = match response.body().size_hint().exact() {
+        Some(bytes) => {
+            sent.increment(bytes);
+            response
+        }
+        // Lines count as they are sent.
+        None => response.map(|body| {
+            Body::new(body.inspect_frame(move |frame| {
+                let bytes = frame.data_ref().map_or(0, |data| data.len());
+                sent.increment(bytes as u64);
+            }))
+        }),
+    };
     let route = route.as_ref().map_or("none", MatchedPath::as_str);
     let (status, seconds) = (response.status().as_u16(), started.elapsed().as_secs_f64());
     state.metrics.answered(method, route, status, seconds);

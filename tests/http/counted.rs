@@ -1,0 +1,125 @@
+//! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
+
+use crate::application::{TestApplication, expect, expect_problem};
+use crate::metrics::{metrics, value};
+use crate::pictures;
+use crate::raw::RawConnection;
+use crate::stream_client::StreamClient;
+use reqwest::{Method, StatusCode};
+use std::time::Duration;
+
+#[tokio::test]
+async fn lines_and_messages_count_as_sent() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let sent = async || value(&metrics(&app).await, "bagtrack_sent_bytes_total", &[]);
+    let mut frames = reqwest::multipart::Form::new();
+    for t in 1..=60 {
+        let part = reqwest::multipart::Part::bytes(pictures::png(t % 20));
+        frames = frames.part("frame", part.file_name("frame.png"));
+    }
+    // Its own answer is the only other one between two of these.
+    let own = metrics(&app).await.len();
+    let before = sent().await;
+    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
+    let request = request.header("accept", "application/x-ndjson");
+    let answer = request.multipart(frames).send().await.unwrap();
+    let lines = answer.text().await.unwrap().len();
+    let all = sent().await - before;
+    assert!(
+        all >= (lines + own / 2) as f64 && lines > 2 * own / 3,
+        "{all} {lines} {own}"
+    );
+    let mut stream = StreamClient::open(&app, &id, "").await;
+    let before = sent().await;
+    let mut messages = 0;
+    for t in 2..400 {
+        stream.send(pictures::png(t % 20)).await;
+        messages += stream.message().await.to_string().len();
+    }
+    let all = sent().await - before;
+    assert!(all > messages as f64, "{all} {messages}");
+}
+
+#[tokio::test]
+async fn what_ends_before_a_handler_is_counted_and_told() {
+    let app = TestApplication::start_with(|config| {
+        config.max_connections = 4;
+        config.limits.client_connections = Some(2);
+    });
+    let app = app.await;
+    let mut garbage = RawConnection::open(app.address).await;
+    garbage.send("NONSENSE\r\n\r\n").await;
+    let answer = garbage.read_to_end().await;
+    for header in [
+        "x-content-type-options: nosniff",
+        "content-security-policy: ",
+        "x-frame-options: DENY",
+    ] {
+        assert!(answer.contains(header), "{header}: {answer}");
+    }
+    let mut busy = Vec::new();
+    for _ in 0..2 {
+        busy.push(RawConnection::hold(app.address, "POST", "/sessions", 1000).await);
+    }
+    let refused = RawConnection::open(app.address).await.read_to_end().await;
+    assert!(refused.starts_with("HTTP/1.1 429"), "{refused}");
+    drop(busy.pop());
+    // Two idle ones, the first of which makes room, and this client's own.
+    let counted = async {
+        loop {
+            let _idle = RawConnection::open(app.address).await;
+            let Ok(response) = app.request(Method::GET, "/metrics", &[]).send().await else {
+                continue;
+            };
+            if response.status() != StatusCode::OK {
+                continue;
+            }
+            let text = response.text().await.unwrap();
+            let problems = |kind: &str| value(&text, "bagtrack_problems_total", &[kind]);
+            if value(&text, "bagtrack_connections_shed_total", &[]) >= 1.0 {
+                break (
+                    problems("kind=\"malformed-request\""),
+                    problems("kind=\"quota-exceeded\""),
+                );
+            }
+        }
+    };
+    let (malformed, refused) = tokio::time::timeout(Duration::from_secs(60), counted)
+        .await
+        .unwrap();
+    assert!(malformed >= 1.0 && refused >= 1.0, "{malformed} {refused}");
+}
+
+#[tokio::test]
+async fn readiness_ends_when_the_memory_of_bodies_is_used_up() {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 100_000;
+        config.max_upload_bytes = 100_000;
+        config.limits.client_upload_bytes = Some(100_000);
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let target = format!("/sessions/{id}/frames");
+    let mut held = RawConnection::hold(app.address, "POST", &target, 99_000).await;
+    expect(app.get("/readyz").await, StatusCode::OK).await;
+    held.send([7; 98_000]).await;
+    let full = async {
+        loop {
+            let response = app.get("/readyz").await;
+            if response.status() != StatusCode::OK {
+                break response;
+            }
+        }
+    };
+    let full = tokio::time::timeout(Duration::from_secs(60), full)
+        .await
+        .unwrap();
+    let problem = expect_problem(full, "not-ready").await;
+    assert!(problem["detail"].as_str().unwrap().contains("bodies"));
+    drop(held);
+    let ready = async { while app.get("/readyz").await.status() != StatusCode::OK {} };
+    tokio::time::timeout(Duration::from_secs(60), ready)
+        .await
+        .unwrap();
+}
