@@ -1,0 +1,83 @@
+//! The limits of the containers in `docker/`, against what the program says that it takes with their settings.
+#![cfg(unix)]
+
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// The text that stands between these two in a line that has the first.
+fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
+    let rest = text
+        .split_once(before)
+        .unwrap_or_else(|| panic!("{before} is missing"));
+    rest.1.split(after).next().unwrap().trim().trim_matches('"')
+}
+
+/// The settings of the program in a file of compose or Kubernetes that are plain values.
+fn settings(text: &str) -> Vec<(String, String)> {
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.starts_with('#'));
+    let pairs = lines.filter_map(|line| {
+        let (name, value) = match line.strip_prefix("- {name: ") {
+            Some(rest) => rest.trim_end_matches('}').split_once(", value: ")?,
+            None => line.split_once(": ")?,
+        };
+        let is_number = value.trim_matches('"').parse::<u64>().is_ok();
+        let is_setting = name.starts_with("BAGTRACK_") && is_number;
+        is_setting.then(|| (name.to_owned(), value.trim_matches('"').to_owned()))
+    });
+    pairs.collect()
+}
+
+/// The resident memory in MiB that the program promises with these settings.
+fn promised(settings: &[(String, String)], workers: &str) -> u64 {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    command.args(["serve", "--log-format", "json"]);
+    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
+    command.env("BAGTRACK_WORKERS", workers);
+    command.envs(settings.iter().cloned());
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
+    let promised = log.find_map(|line| {
+        let line: Value = serde_json::from_str(&line.unwrap()).unwrap();
+        let message = line["fields"]["message"].as_str()?;
+        let rest = message.strip_prefix("resident memory stays below ")?;
+        rest.trim_end_matches(" MiB").parse().ok()
+    });
+    child.kill().unwrap();
+    child.wait().unwrap();
+    promised.expect("the start says it")
+}
+
+#[test]
+fn what_the_program_promises_fits_into_its_container() {
+    let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");
+    for (file, cpus, memory, unit) in [
+        ("compose.yaml", "\n    cpus: ", "\n    mem_limit: ", "g"),
+        (
+            "compose.replicas.yaml",
+            "\n  cpus: ",
+            "\n  mem_limit: ",
+            "g",
+        ),
+        (
+            "kubernetes/deployment.yaml",
+            "requests: {cpu: ",
+            "limits: {memory: ",
+            "Gi",
+        ),
+    ] {
+        let text = std::fs::read_to_string(docker.join(file)).unwrap();
+        let settings = settings(&text);
+        assert!(settings.len() >= 4, "{file}: {settings:?}");
+        // A worker for each processor that the container has.
+        let workers = between(&text, cpus, if unit == "g" { "\n" } else { "," });
+        let limit = between(&text, memory, unit);
+        let limit = limit.parse::<u64>().unwrap() << 10;
+        let promised = promised(&settings, workers);
+        assert!(promised < limit, "{file}: {promised} MiB of {limit}");
+    }
+}
