@@ -1,10 +1,14 @@
 //! What decoding one frame allocates, counted by the allocator: never more than `max_memory`.
 
+mod pictures;
+
 use bagtrack::ingest::{Limits, decode_to};
 use bagtrack::tracker::FrameFormat;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb, Rgba};
+use jpeg_encoder::ColorType;
+use pictures::{BASELINE, JpegForm, jpeg, jpeg_of};
 use std::io::{Cursor, Write};
 
 /// Room for the working image, which is no part of the promise.
@@ -32,6 +36,47 @@ fn with_profile(mut png: Vec<u8>, mib: usize) -> Vec<u8> {
     let chunk = [&length, data.as_slice(), &checksum].concat();
     png.splice(AFTER_HEADER..AFTER_HEADER, chunk);
     png
+}
+
+/// A PNG with a palette, whose pixels are all the first colour; interlaced in seven passes where that is asked for.
+fn with_palette(side: usize, interlaced: bool) -> Vec<u8> {
+    let chunk = |name: &[u8; 4], data: &[u8]| {
+        let named = [name.as_slice(), data].concat();
+        let length = (data.len() as u32).to_be_bytes();
+        let checksum = crc32fast::hash(&named).to_be_bytes();
+        [&length, named.as_slice(), &checksum].concat()
+    };
+    // The first pixel of each pass, and the steps to the next ones.
+    let passes: &[[usize; 4]] = match interlaced {
+        false => &[[0, 0, 1, 1]],
+        true => &[
+            [0, 0, 8, 8],
+            [4, 0, 8, 8],
+            [0, 4, 4, 8],
+            [2, 0, 4, 4],
+            [0, 2, 2, 4],
+            [1, 0, 2, 2],
+            [0, 1, 1, 2],
+        ],
+    };
+    let mut pixels = ZlibEncoder::new(Vec::new(), Compression::fast());
+    for [x, y, across, down] in passes {
+        let row = vec![0; 1 + (side - x).div_ceil(*across)];
+        for _ in 0..(side - y).div_ceil(*down) {
+            pixels.write_all(&row).expect("memory takes it");
+        }
+    }
+    let pixels = pixels.finish().expect("memory takes it");
+    let size = (side as u32).to_be_bytes();
+    let form = [8, 3, 0, 0, u8::from(interlaced)];
+    let header = [size.as_slice(), &size, &form].concat();
+    let chunks = [
+        chunk(b"IHDR", &header),
+        chunk(b"PLTE", &[9, 99, 199]),
+        chunk(b"IDAT", &pixels),
+        chunk(b"IEND", &[]),
+    ];
+    [b"\x89PNG\r\n\x1A\n".as_slice(), &chunks.concat()].concat()
 }
 
 /// Writes numbers with so many bits, the lowest bit first.
@@ -127,6 +172,14 @@ fn no_format_allocates_more_than_is_promised() {
         |side| DynamicImage::ImageRgb8(ImageBuffer::from_pixel(side, side, Rgb([9, 99, 199])));
     let rgba =
         |side| DynamicImage::ImageRgba8(ImageBuffer::from_pixel(side, side, Rgba([9, 99, 199, 7])));
+    let progressive = JpegForm {
+        scans: Some(6),
+        ..BASELINE
+    };
+    let cmyk = |side: u32, form| {
+        let samples = vec![99; 4 * (side * side) as usize];
+        jpeg_of(&samples, (side, side), ColorType::Cmyk, form, None)
+    };
     let format = FrameFormat {
         size: (320, 320),
         has_color: true,
@@ -162,6 +215,39 @@ fn no_format_allocates_more_than_is_promised() {
             false,
         ),
         ("JPEG", encode(rgb(2500), ImageFormat::Jpeg), true),
+        (
+            "JPEG that is turned",
+            jpeg(&rgb(2500).to_rgb8(), BASELINE, Some(6)),
+            true,
+        ),
+        (
+            "progressive JPEG",
+            jpeg(&rgb(1500).to_rgb8(), progressive, None),
+            true,
+        ),
+        (
+            "progressive JPEG that is turned",
+            jpeg(&rgb(1500).to_rgb8(), progressive, Some(6)),
+            true,
+        ),
+        (
+            "progressive JPEG, too large",
+            jpeg(&rgb(3000).to_rgb8(), progressive, None),
+            false,
+        ),
+        ("JPEG of CMYK", cmyk(2000, BASELINE), true),
+        ("progressive JPEG of CMYK", cmyk(1200, progressive), true),
+        ("PNG with a palette", with_palette(2500, false), true),
+        (
+            "interlaced PNG with a palette",
+            with_palette(2500, true),
+            true,
+        ),
+        (
+            "interlaced PNG with a palette, too large",
+            with_palette(6000, true),
+            false,
+        ),
     ] {
         let mut taken = None;
         let used = allocation_counter::measure(|| {
