@@ -36,7 +36,8 @@ pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
     let request = target.post("198.51.100.1", "/sessions?box=1000,1000,900,900");
     let status = request.body(png.clone()).send().await?.status();
     let (Some(before), Some(peak)) = (before, target.memory("VmHWM:")) else {
-        return Ok(Verdict::new(true, format!("{status}; memory not measured")));
+        let seen = format!("{status}; memory not measured");
+        return Ok(Verdict::new(!target.is_own(), seen));
     };
     let cost = (peak - before) >> 20;
     // What decoding may take, and the upload itself.

@@ -8,7 +8,7 @@ use tokio::io::AsyncReadExt;
 pub const SETTINGS: &[&str] = &[];
 
 pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
-    let head = "POST /sessions HTTP/1.1\r\nHost: x\r\nContent-Length: 629145600\r\n\r\n";
+    let head = "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 629145600\r\n\r\n";
     let sent = Instant::now();
     let mut stream = raw::send(target.address, head).await?;
     let mut status = [0; 12];

@@ -12,19 +12,25 @@
 mod costly_sessions;
 mod decode_bombs;
 mod fat_frame;
+mod forged_snapshots;
 mod garbage;
 mod good;
 mod greedy_client;
 mod half_close;
 mod idle_flood;
+mod idle_streams;
 mod json_copies;
+mod large_frame;
 mod large_length;
 mod mix;
 mod never_readers;
 mod odd_heads;
 mod raw;
+mod repeated_creation;
 mod session_hoard;
 mod silent_bodies;
+mod slow_readers;
+mod stalled_log;
 mod target;
 
 use clap::Parser;
@@ -117,6 +123,8 @@ async fn main() -> ExitCode {
         silent_bodies,
         large_length,
         never_readers,
+        slow_readers,
+        idle_streams,
         idle_flood,
         session_hoard,
         greedy_client,
@@ -125,6 +133,10 @@ async fn main() -> ExitCode {
         garbage,
         fat_frame,
         json_copies,
+        forged_snapshots,
+        large_frame,
+        stalled_log,
+        repeated_creation,
         mix
     );
     match failed {

@@ -21,7 +21,7 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
             let Ok(mut stream) = TcpStream::connect(address).await else {
                 return true;
             };
-            let ask = "GET /openapi.json HTTP/1.1\r\nHost: x\r\n\r\n".repeat(200);
+            let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(200);
             let refused = async { while stream.write_all(ask.as_bytes()).await.is_ok() {} };
             timeout(patience, refused).await.is_ok()
         });

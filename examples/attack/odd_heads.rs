@@ -8,7 +8,7 @@ pub const SETTINGS: &[&str] = &[];
 
 pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
     let long = format!(
-        "GET / HTTP/1.1\r\nHost: x\r\nx: {}\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nx: {}\r\n\r\n",
         "a".repeat(200_000)
     );
     let heads = [
@@ -21,12 +21,12 @@ pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
         ("no HTTP", "NONSENSE\r\n\r\n", "400"),
         (
             "a space in a name",
-            "GET / HTTP/1.1\r\nHost: x\r\nbad name: 1\r\n\r\n",
+            "GET / HTTP/1.1\r\nHost: localhost\r\nbad name: 1\r\n\r\n",
             "400",
         ),
         (
             "two lengths",
-            "POST /sessions HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nab",
+            "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nab",
             "400",
         ),
         ("a huge head", long.as_str(), "431"),

