@@ -6,14 +6,14 @@
 //! has ended, and never more threads work than there are workers.
 
 use super::fair_queue::{FairQueue, Turn};
-use super::lanes::{Lane, Length, Pace};
-use super::work_limit::CpuSpent;
+use super::lanes::{Lane, Pace};
+use super::queue_permit::{Held, OutsideQueue, QueuePermit};
 use super::workers::Workers;
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::sync::{Semaphore, oneshot};
 
 /// The queue is full; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -30,69 +30,6 @@ impl WorkPanicked {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
         Self(text.unwrap_or("a value that is not text").to_owned())
-    }
-}
-
-/// What a request holds until its work has ended: its share of memory, its place in a quota.
-pub type Held = Box<dyn Any + Send + Sync>;
-
-/// A place in the queue, given back when the last clone is dropped.
-#[derive(Debug, Clone)]
-pub struct QueuePermit {
-    lane: Lane,
-    length: Length,
-    cpu_share: u32,
-    spent: CpuSpent,
-    // The place is free before what is held.
-    _place: Arc<OwnedSemaphorePermit>,
-    held: Arc<Held>,
-}
-
-/// A request that has given its place in the queue back, to wait for something else than a worker.
-#[derive(Debug)]
-pub struct OutsideQueue {
-    lane: Lane,
-    length: Length,
-    cpu_share: u32,
-    spent: CpuSpent,
-    held: Arc<Held>,
-}
-
-impl QueuePermit {
-    /// Gives the place back, as far as no work of the request has it, and keeps what the request holds.
-    pub fn leave(self) -> OutsideQueue {
-        OutsideQueue {
-            lane: self.lane,
-            length: self.length,
-            cpu_share: self.cpu_share,
-            spent: self.spent,
-            held: self.held,
-        }
-    }
-
-    /// The request may take the processor time of so many requests.
-    pub fn with_cpu_of(mut self, requests: u32) -> Self {
-        self.cpu_share = requests;
-        self
-    }
-
-    /// Of how many requests it may take the processor time.
-    pub fn cpu_share(&self) -> u32 {
-        self.cpu_share
-    }
-
-    /// Processor time that the request has taken.
-    pub fn spent(&self) -> &CpuSpent {
-        &self.spent
-    }
-
-    /// For work on so many frames, which gives way to shorter work between two of them.
-    pub fn for_frames(mut self, count: usize) -> Self {
-        self.length = match count {
-            0 | 1 => Length::Short,
-            _ => Length::Long,
-        };
-        self
     }
 }
 
@@ -153,13 +90,7 @@ impl Admission {
     /// # Errors
     /// All places are taken.
     pub fn enter(&self, lane: Lane, held: Held) -> Result<QueuePermit, QueueFull> {
-        self.enter_again(OutsideQueue {
-            lane,
-            length: Length::Short,
-            cpu_share: 1,
-            spent: CpuSpent::default(),
-            held: Arc::new(held),
-        })
+        self.enter_again(OutsideQueue::new(lane, held))
     }
 
     /// Takes a place in the queue for a request that has left it.
@@ -168,14 +99,7 @@ impl Admission {
     /// All places are taken.
     pub fn enter_again(&self, request: OutsideQueue) -> Result<QueuePermit, QueueFull> {
         let place = self.queue.clone().try_acquire_owned();
-        Ok(QueuePermit {
-            lane: request.lane,
-            length: request.length,
-            cpu_share: request.cpu_share,
-            spent: request.spent,
-            _place: Arc::new(place.map_err(|_| QueueFull)?),
-            held: request.held,
-        })
+        Ok(QueuePermit::new(request, place.map_err(|_| QueueFull)?))
     }
 
     /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is
@@ -188,7 +112,7 @@ impl Admission {
         T: Send + 'static,
         F: FnOnce(&mut Turn) -> T + Send + 'static,
     {
-        let (lane, length) = (queue.lane, queue.length);
+        let (lane, length) = queue.turn();
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
@@ -230,6 +154,7 @@ impl Admission {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::Length;
     use super::*;
     use std::sync::mpsc;
 

@@ -1,8 +1,8 @@
 //! Adding a session to the map, and making room for it.
 
-use super::admission::Held;
 use super::new_session::NewSession;
 use super::opening::Opening;
+use super::queue_permit::Held;
 use super::registry::{Registry, TooManySessions};
 use super::session::Session;
 use super::state::SessionState;

@@ -1,8 +1,8 @@
 //! What a session is made of.
 
-use super::admission::Held;
 use super::opening::Opening;
 use super::owner::Owner;
+use super::queue_permit::Held;
 use super::state::SessionState;
 use super::store::Version;
 use std::time::Duration;

@@ -1,11 +1,11 @@
 //! One session: its trackers behind a lock, and what can be read of it without the lock.
 
-use super::admission::Held;
 use super::clock::Clock;
 use super::lease::Lease;
 use super::new_session::NewSession;
 use super::opening::Opening;
 use super::owner::Owner;
+use super::queue_permit::Held;
 use super::short_id::short_id;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
