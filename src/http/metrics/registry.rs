@@ -175,3 +175,33 @@ impl Gauges {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sessions::PerTarget;
+    use crate::tracker::{Estimate, Rect, Status};
+    use std::time::Duration;
+
+    #[test]
+    fn each_step_is_measured_for_itself() {
+        let metrics = Metrics::new();
+        let before = PerTarget::One(Estimate {
+            frame: 0,
+            target: Rect::new(0.0, 0.0, 1.0, 1.0),
+            score: 1.0,
+            status: Status::Tracking,
+        });
+        let steps = [1, 1, 100].map(Duration::from_millis);
+        let tracking = &metrics.tracking;
+        tracking.tracked(&before, &[before.clone(), before.clone()], &steps);
+        let text = metrics.render();
+        for line in [
+            "bagtrack_frame_step_seconds_bucket{le=\"0.002\"} 2",
+            "bagtrack_frame_step_seconds_bucket{le=\"0.064\"} 2",
+            "bagtrack_frame_step_seconds_bucket{le=\"0.128\"} 3",
+        ] {
+            assert!(text.contains(line), "{line}:\n{text}");
+        }
+    }
+}
