@@ -7,7 +7,7 @@ use bagtrack::tracker::FrameFormat;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb, Rgba};
-use jpeg_encoder::ColorType;
+use jpeg_encoder::{ColorType, SamplingFactor};
 use pictures::{BASELINE, JpegForm, jpeg, jpeg_of};
 use std::io::{Cursor, Write};
 
@@ -178,6 +178,11 @@ fn no_format_allocates_more_than_is_promised() {
     };
     let cmyk = |side: u32, form| {
         let samples = vec![99; 4 * (side * side) as usize];
+        // Decoders do not take other ones.
+        let form = JpegForm {
+            sampling: SamplingFactor::R_4_4_4,
+            ..form
+        };
         jpeg_of(&samples, (side, side), ColorType::Cmyk, form, None)
     };
     let format = FrameFormat {
