@@ -55,7 +55,7 @@ impl State {
         scratch: &mut Scratch,
     ) {
         if self.params.static_penalty > 0.0 {
-            let displaced = search.to_original(search.displaced());
+            let displaced = search.in_original(search.displaced());
             let test = &mut scratch.change_test;
             test.load(frame, &self.answer, &self.bounds);
             test.compare(
@@ -94,7 +94,7 @@ impl State {
         scratch.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {
             scratch.original.clear();
-            let original = new.iter().map(|&particle| search.to_original(particle));
+            let original = new.iter().map(|&particle| search.in_original(particle));
             scratch.original.extend(original);
             scratch.change_test.penalize(
                 &scratch.original,

@@ -47,7 +47,7 @@ impl State {
             let mean = search.answer(&candidates.particles, &candidates.weights, best);
             self.measure_scale(views.rectified, mean, scratch)
         };
-        let answer = self.bounds.clamp(search.to_original(rectified));
+        let answer = self.bounds.clamp(search.in_original(rectified));
         let found = Localization {
             number,
             answer,
