@@ -179,7 +179,7 @@ fn walks_and_scales_without_bound_are_held() {
         };
         for answer in run(&frames, tracker_scene::target(0), params) {
             assert!(
-                answer.target.intersection(&edge) > 0.0,
+                answer.target.intersection(&edge).area() > 0.0,
                 "{name}: {answer:?}"
             );
             assert!(answer.target.width < 500.0 && answer.target.height > 0.9);

@@ -57,7 +57,7 @@ impl Timeline {
             Scene::Default => default::covered(&self.course, index),
             Scene::Covered | Scene::Leaves => {
                 let card = self.target(index);
-                let covered = |board: Rect| card.intersection(&board) / card.area();
+                let covered = |board: Rect| card.intersection(&board).area() / card.area();
                 self.board(index).map_or(0.0, covered)
             }
         }
@@ -67,7 +67,8 @@ impl Timeline {
     pub(super) fn visible(&self, index: u32) -> f64 {
         let card = self.target(index);
         let (width, height) = self.course.size();
-        let inside = card.intersection(&Rect::new(0.0, 0.0, width, height)) / card.area();
+        let inside = card.intersection(&Rect::new(0.0, 0.0, width, height));
+        let inside = inside.area() / card.area();
         let visible = inside - self.covered(index);
         // Rounding leaves a little where there is nothing, and takes a little where there is all.
         match visible {

@@ -21,7 +21,7 @@ use crate::tracker::motion::particles::Particle;
 use crate::tracker::motion::search;
 use crate::tracker::params::table::Params;
 use crate::tracker::state::State;
-use crate::tracker::weights::likelihood::{self, Likelihoods};
+use crate::tracker::weights::{self, Likelihoods};
 
 /// Subtracts `mean` (nothing, where it is empty) from `vectors` of length `len`, and appends their squared lengths.
 #[pulp::with_simd(center = Arch::new())]
@@ -123,7 +123,7 @@ impl Candidates {
         batch: Range<usize>,
         state: &State,
     ) {
-        let range = self.values_of(&batch);
+        let range = batch.start * self.len..batch.end * self.len;
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors.values_mut()[range];
         extractor.describe(image, particles, &state.bounds, &state.params, vectors);
@@ -133,7 +133,7 @@ impl Candidates {
 
     /// (D) The distances and the discriminant's scores of a batch.
     fn compare(&mut self, batch: Range<usize>, state: &State) {
-        let vectors = &self.vectors.values()[self.values_of(&batch)];
+        let vectors = &self.vectors.values()[batch.start * self.len..batch.end * self.len];
         if state.params.single_vector_candidate {
             let squares = &self.squares[batch.start..];
             let (compared, out) = (&mut self.point_distance, &mut self.distances);
@@ -152,11 +152,6 @@ impl Candidates {
         self.distances.extend_from_slice(distances);
     }
 
-    /// Where the vectors of so many particles are.
-    fn values_of(&self, particles: &Range<usize>) -> Range<usize> {
-        particles.start * self.len..particles.end * self.len
-    }
-
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
     /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
     pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
@@ -172,7 +167,7 @@ impl Candidates {
             params,
             weights,
         );
-        likelihood::arg_max(&self.weights)
+        weights::arg_max(&self.weights)
     }
 
     /// The weights of one particle in several `views` of the frame, with these logarithmic priors and this σ. The
@@ -253,5 +248,5 @@ fn weigh(
         *weight += params.discriminant_weight * f64::from(score - max);
     }
     let pinned = (params.pinned_entries(), params.pinned_weight);
-    likelihood::weigh(likelihoods, distances, sigma, pinned, weights);
+    weights::weigh(likelihoods, distances, sigma, pinned, weights);
 }

@@ -73,7 +73,8 @@ impl State {
             self.bag.rebuild(&self.background, &self.params, bag);
         }
         let Learning { features, bag, .. } = &mut scratch.learning;
-        self.describe_at(image, at, &mut scratch.extractor, features);
+        let (extractor, params) = (&mut scratch.extractor, &self.params);
+        extractor.features(image, &[*at], &self.bounds, params, features);
         if Bag::admits(found.number, &self.params) {
             // V: the answer and the previous frames (equation 2).
             self.history.append_to(features, &self.params);
@@ -161,14 +162,11 @@ impl State {
 
     /// The feature vectors of the pyramid around `center`.
     fn describe_pyramid(&self, image: &Frame, center: &Particle, scratch: &mut Scratch) {
-        let pyramid::Scratch {
-            areas, features, ..
-        } = &mut scratch.learning.pyramid;
-        pyramid::areas(center, areas);
-        let params = pyramid::params(&self.params);
-        scratch
-            .extractor
-            .features(image, areas, &self.bounds, &params, features);
+        let memory = &mut scratch.learning.pyramid;
+        pyramid::areas(center, &mut memory.areas);
+        let (areas, params) = (&memory.areas, pyramid::params(&self.params));
+        let (extractor, features) = (&mut scratch.extractor, &mut memory.features);
+        extractor.features(image, areas, &self.bounds, &params, features);
     }
 
     /// Replaces samples of the background by those of the areas in `scratch`.
@@ -180,16 +178,5 @@ impl State {
             .features(image, areas, &self.bounds, &self.params, features);
         self.background
             .rebuild(features, &self.params, &mut learning.background);
-    }
-
-    /// Makes `features` the feature vector of what is at `at`.
-    pub fn describe_at(
-        &self,
-        image: &Frame,
-        at: &Particle,
-        extractor: &mut Extractor,
-        features: &mut Vec<f32>,
-    ) {
-        extractor.features(image, &[*at], &self.bounds, &self.params, features);
     }
 }

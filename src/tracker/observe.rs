@@ -4,11 +4,10 @@ use crate::tracker::appearance::background::{self, Background};
 use crate::tracker::features::extractor::Extractor;
 use crate::tracker::image::downsample::downsampled;
 use crate::tracker::image::frame::Frame;
-use crate::tracker::image::plane::Plane;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::search::SearchContext;
 use crate::tracker::state::State;
-use crate::tracker::workspace::Scratch;
+use crate::tracker::workspace::{Scratch, ViewBuffers};
 
 /// The views of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -19,31 +18,13 @@ pub(crate) struct Views<'a> {
     pub rectified: &'a Frame,
 }
 
-/// The memory of the views that are not the frame itself.
-#[derive(Debug, Default)]
-pub(crate) struct ViewBuffers {
-    downsampled: Frame,
-    rectified: Frame,
-}
-
-impl ViewBuffers {
-    /// Reserves the memory of a rectified view of `frame`, so that the first rotation does not allocate.
-    pub fn reserve_rectified(&mut self, frame: &Frame) {
-        let memory = std::mem::take(&mut self.rectified);
-        self.rectified = frame.map_planes(memory, |plane, mut pixels| {
-            pixels.resize(plane.pixels.len(), 0);
-            Plane::new(plane.size(), pixels, plane.pixel_side)
-        });
-    }
-}
-
 impl State {
     /// The displacement of the whole image since the last frame, in working pixels.
     pub fn displacement(&mut self, frame: &Frame, scratch: &mut Scratch) -> (f64, f64) {
-        match &mut self.global_motion {
-            Some(profiles) => profiles.displacement(frame, &mut scratch.global_motion),
-            None => (0.0, 0.0),
-        }
+        let profiles = self.global_motion.as_mut();
+        profiles.map_or((0.0, 0.0), |profiles| {
+            profiles.displacement(frame, &mut scratch.global_motion)
+        })
     }
 
     /// The search in frame `number`, whose image is displaced by so much.
@@ -73,34 +54,22 @@ impl State {
         search: &SearchContext<'_>,
         buffers: &'a mut ViewBuffers,
     ) -> Views<'a> {
-        let ViewBuffers {
-            downsampled,
-            rectified,
-        } = buffers;
-        let original = self.original(frame, downsampled);
-        let Some(rotation) = search.rotation else {
-            let rectified = original;
-            return Views {
-                original,
-                rectified,
-            };
-        };
-        let radius = search.window_radius();
-        let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
-        *rectified = rotation.apply(original, &window, std::mem::take(rectified));
+        let original = self.original(frame, &mut buffers.downsampled);
+        let memory = &mut buffers.rectified;
+        let rectified = search.rotation.map_or(original, |rotation| {
+            let radius = search.window_radius();
+            let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
+            *memory = rotation.apply(original, &window, std::mem::take(memory));
+            memory
+        });
         Views {
             original,
             rectified,
         }
     }
 
-    /// The views of `frame` with an upright target.
-    pub fn upright_view<'a>(&self, frame: &'a Frame, buffers: &'a mut ViewBuffers) -> &'a Frame {
-        self.original(frame, &mut buffers.downsampled)
-    }
-
     /// `frame`, or the frame in larger pixels where the target is large.
-    fn original<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
+    pub fn original<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
         match Extractor::downsample_factor(&self.answer, &self.bounds, &self.params) {
             1 => frame,
             factor => {

@@ -3,7 +3,7 @@
 use crate::tracker::candidates::Candidates;
 use crate::tracker::image::rect::Rect;
 use crate::tracker::state::State;
-use crate::tracker::weights::likelihood;
+use crate::tracker::weights;
 
 /// What one step saw.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,7 +21,7 @@ impl Seen {
     pub(crate) fn of(state: &State, candidates: &Candidates) -> Self {
         let boxes = candidates.particles.iter();
         let boxes = boxes.map(|particle| state.target_of(particle));
-        let best = likelihood::arg_max(&candidates.weights);
+        let best = weights::arg_max(&candidates.weights);
         let sigma = state.params.sigma;
         let distances = candidates.distances_of(best);
         let least = distances.iter().copied().fold(f64::INFINITY, f64::min);

@@ -83,8 +83,7 @@ impl State {
     /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
     fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
         let Workspace { views, scratch } = workspace;
-        views.reserve_rectified(frame);
-        let image = self.upright_view(frame, views);
+        let image = self.original(frame, &mut views.downsampled);
         // All particles are there, with equal weights.
         let count = self.params.stored_particles();
         self.particles = vec![self.answer; count];
@@ -95,8 +94,9 @@ impl State {
         self.record_seen(scratch);
         self.init_models(image, given.frame, scratch);
         let Learning { features, bag, .. } = &mut scratch.learning;
-        self.describe_at(image, &self.answer, &mut scratch.extractor, features);
-        self.describe_augmented(image, &mut scratch.extractor, features);
+        let (extractor, params) = (&mut scratch.extractor, &self.params);
+        extractor.features(image, &[self.answer], &self.bounds, params, features);
+        self.describe_augmented(image, extractor, features);
         self.bag.rebuild(&self.background, &self.params, bag);
         self.history.clear();
         self.update_gate = UpdateGate::default();

@@ -3,7 +3,8 @@
 //! An answer is judged against statistics of the frames before it, and nothing is learned before it is judged.
 
 use crate::tracker::confidence::score::Evidence;
-use crate::tracker::estimate::Estimate;
+use crate::tracker::confidence::update_gate;
+use crate::tracker::estimate::{Estimate, Status};
 use crate::tracker::image::frame::Frame;
 use crate::tracker::learn::Localization;
 use crate::tracker::motion::random::{self, Draws};
@@ -60,19 +61,31 @@ impl State {
         let evidence = scratch
             .candidates
             .evidence(best, mean_distance, answer.scale);
-        let judgement = self.judge(number, &evidence, is_lost);
+        let (score, status, may_learn) = self.judge(number, &evidence, is_lost);
 
         // (C) Learn: what is remembered of the frame.
         self.remember(&found, is_lost, scratch);
-        if judgement.may_learn {
+        if may_learn {
             self.learn(&views, &found, scratch);
         }
         self.estimate = Estimate {
             frame: number,
             target: self.target_of(&answer),
-            score: judgement.score,
-            status: judgement.status,
+            score,
+            status,
         };
         (self.estimate, evidence)
+    }
+
+    /// The score and the status of the answer to frame `number`, and whether the frame may be learned from. Updates the
+    /// statistics that later answers are judged against.
+    fn judge(&mut self, number: u64, evidence: &Evidence, is_lost: bool) -> (f32, Status, bool) {
+        let (distance, has_color) = (evidence.first_distance, self.format.has_color);
+        let (gate, params) = (&mut self.update_gate, &self.params);
+        let is_near = !is_lost && gate.admit_distance(distance, has_color, number, params);
+        let (score, status) = self.baseline.judge(evidence, is_lost, is_near);
+        // Without a discriminant the score is no probability.
+        let is_likely = !self.discriminant.is_on() || update_gate::passes(score, number);
+        (score, status, is_near && is_likely)
     }
 }

@@ -54,8 +54,7 @@ impl Tracker {
     /// A frame whose uploaded size is not that of the session's first frame, or that was reduced to less than
     /// [`frame_format`](Self::frame_format).
     pub fn step(&mut self, frame: &Frame) -> Result<Estimate, TrackerError> {
-        let (estimate, ()) = self.advance(frame, |_, _| ())?;
-        Ok(estimate)
+        Ok(self.advance(frame, |_, _| ())?.0)
     }
 
     /// Like [`step`](Self::step), and tells what the tracker saw.

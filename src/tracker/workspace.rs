@@ -10,11 +10,11 @@ use crate::tracker::candidates::{Candidates, RotatedView};
 use crate::tracker::classifier::dense_search::DenseSearch;
 use crate::tracker::classifier::ridge;
 use crate::tracker::features::extractor::Extractor;
+use crate::tracker::image::frame::Frame;
 use crate::tracker::motion::change_test::ChangeTest;
 use crate::tracker::motion::global_motion::GlobalMotion;
 use crate::tracker::motion::orientation;
 use crate::tracker::motion::particles::Particle;
-use crate::tracker::observe::ViewBuffers;
 use crate::tracker::scale::pyramid;
 
 /// The memory of one frame.
@@ -24,6 +24,13 @@ pub(crate) struct Workspace {
     pub views: ViewBuffers,
     /// What is computed from that.
     pub scratch: Scratch,
+}
+
+/// The memory of the views that are not the frame itself.
+#[derive(Debug, Default)]
+pub(crate) struct ViewBuffers {
+    pub downsampled: Frame,
+    pub rectified: Frame,
 }
 
 /// What is computed of a frame, room by room.

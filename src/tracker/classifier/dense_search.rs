@@ -108,24 +108,17 @@ impl DenseSearch {
         discriminant: &Discriminant,
         foreground: &ForegroundMap,
     ) {
-        let params = search.params;
+        let (params, bounds) = (search.params, search.bounds);
         self.maxima.clear();
         let has_gradients = params.features == Features::Gradients;
         if params.dense_maxima == 0 || !discriminant.is_on() || !has_gradients {
             return;
         }
         let center = search.displaced();
-        let cell = Extractor::cell_size(&center, search.bounds, params);
+        let cell = Extractor::cell_size(&center, bounds, params);
         let places = SearchGrid::new(center, search.dense_radius(), cell, params);
         let grid = &mut self.grid;
-        extractor.grid(
-            &center,
-            places.offset,
-            MAX_OFFSET,
-            search.bounds,
-            params,
-            grid,
-        );
+        extractor.grid(&center, places.offset, MAX_OFFSET, bounds, params, grid);
         clear_and_reserve(&mut self.values, (2 * MAX_OFFSET + 1).pow(2));
         let values = &mut self.values;
         values.resize(places.columns() * (2 * places.offset.1 + 1), 0.0);

@@ -161,12 +161,9 @@ impl Extractor {
         params: &Params,
         grid: &mut Grid,
     ) {
-        let size = |margin: (usize, usize)| {
-            let columns = params.patch_width as usize + 2 * margin.0;
-            (columns, params.patch_height as usize + 2 * margin.1)
-        };
-        let (columns, rows) = size(margin);
-        let (max_columns, max_rows) = size((max_margin, max_margin));
+        let own = Layout::of(params);
+        let (columns, rows) = (own.columns + 2 * margin.0, own.rows + 2 * margin.1);
+        let (max_columns, max_rows) = (own.columns + 2 * max_margin, own.rows + 2 * max_margin);
         let (x, y) = bounds.area(center).center();
         let (width, height) = Self::cell_size(center, bounds, params);
         let area = Rect::centered(x, y, width * columns as f64, height * rows as f64);
@@ -180,7 +177,7 @@ impl Extractor {
         let layout = Layout {
             columns,
             rows,
-            ..Layout::of(params)
+            ..own
         };
         descriptor::describe(hog, &self.integral, areas, layout, &mut grid.values);
         grid.grays.extend(hog.cells.iter().map(|cell| cell.0[GRAY]));

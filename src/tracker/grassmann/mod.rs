@@ -10,7 +10,7 @@
 //! | the candidate's subspace | μ as its products, U as the coefficients W S⁻¹ | 1, 2 | `batch` |
 //! | principal angles | θ from the singular values of UᵀFₖ, an n × n matrix | 6, 7 | `principal_angles` |
 //! | distances | α γ ‖μ - μₖ‖² + (1 - α) β ‖Θ‖² | 4, 5, 8 | `distance` |
-//! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights::likelihood` |
+//! | likelihoods, weights | the sum rule over the bag | 9 to 12 | `weights` |
 //!
 //! **In:** N candidates and 1 to P previous patches, each of D values; K entries of up to n basis vectors each.
 //! **Out:** N × K distances in \[0, 1\], for the sum rule. Nothing has a unit: gray values are shares of white.

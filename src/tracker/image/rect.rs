@@ -49,13 +49,8 @@ impl Rect {
         self.width.max(0.0) * self.height.max(0.0)
     }
 
-    /// The area, in square pixels, that both boxes cover.
-    pub fn intersection(&self, other: &Self) -> f64 {
-        self.common(other).area()
-    }
-
     /// The part that both boxes cover; without width or height where there is none.
-    pub(crate) fn common(&self, other: &Self) -> Self {
+    pub fn intersection(&self, other: &Self) -> Self {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
         let width = (self.x + self.width).min(other.x + other.width) - x;
         let height = (self.y + self.height).min(other.y + other.height) - y;
@@ -64,7 +59,7 @@ impl Rect {
 
     /// Intersection over union, in [0, 1]; 0 if either box has no area.
     pub fn overlap(&self, other: &Self) -> f64 {
-        let shared = self.intersection(other);
+        let shared = self.intersection(other).area();
         let union = self.area() + other.area() - shared;
         if shared > 0.0 && union > 0.0 {
             (shared / union).min(1.0)

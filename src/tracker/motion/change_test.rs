@@ -109,7 +109,7 @@ impl ChangeTest {
     /// where nothing is known.
     fn unchanged(&self, area: &Rect, last_box: &Rect) -> f64 {
         let (pixels, sums) = self.integral.over(area);
-        let (covered, covered_sums) = self.integral.over(&area.common(last_box));
+        let (covered, covered_sums) = self.integral.over(&area.intersection(last_box));
         let beside = pixels - covered;
         if beside < MIN_PIXELS {
             return 0.0;

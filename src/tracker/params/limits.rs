@@ -43,34 +43,33 @@ impl Params {
         let len = self.feature_len();
         let (particles, samples) = (self.particles as usize, self.background_samples as usize);
         let kept = self.bag_size as usize * (self.basis_dim as usize + 1) + samples;
-        let (name, value, expected) = if particles * len > MAX_CANDIDATE_VALUES {
+        let products = samples * (particles + self.bag_vectors()) * len;
+        let limits = [
             (
-                "particles",
-                self.particles,
+                particles * len > MAX_CANDIDATE_VALUES,
+                ("particles", self.particles),
                 "fewer for patches of this size: particles times feature length is at most 1100000",
-            )
-        } else if kept * len > MAX_KEPT_VALUES {
+            ),
             (
-                "bag_size",
-                self.bag_size,
+                kept * len > MAX_KEPT_VALUES,
+                ("bag_size", self.bag_size),
                 "smaller for patches of this size: (bag_size times (basis_dim + 1) + background_samples) times feature \
                  length is at most 1000000",
-            )
-        } else if samples * (particles + self.bag_vectors()) * len > MAX_BACKGROUND_PRODUCTS {
+            ),
             (
-                "background_samples",
-                self.background_samples,
+                products > MAX_BACKGROUND_PRODUCTS,
+                ("background_samples", self.background_samples),
                 "fewer for so much to compare: background_samples times (particles + bag_size times (history + 1)) \
                  times feature length is at most 110000000",
-            )
-        } else {
-            return Ok(());
-        };
-        let value = f64::from(value);
-        Err(ParamsError {
-            name,
-            value,
-            expected,
-        })
+            ),
+        ];
+        match limits.into_iter().find(|(is_exceeded, ..)| *is_exceeded) {
+            None => Ok(()),
+            Some((_, (name, value), expected)) => Err(ParamsError {
+                name,
+                value: f64::from(value),
+                expected,
+            }),
+        }
     }
 }

@@ -18,7 +18,7 @@ use crate::tracker::linalg::vector_ops;
 use crate::tracker::params::table::Params;
 use crate::tracker::scale::maximum::Maximum;
 use crate::tracker::scale::pyramid::{self, FOURIER, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch};
-use crate::tracker::weights::likelihood;
+use crate::tracker::weights;
 
 /// λ, against energies of about 1: it only keeps flat pyramids from a division by zero.
 const LAMBDA: f32 = 0.01;
@@ -46,7 +46,7 @@ impl ScaleFilter {
     /// Measures the scale of the target in the pyramid in `scratch`.
     pub fn find(&self, scratch: &mut Scratch) -> Maximum {
         let response = respond(self, scratch);
-        let best = likelihood::arg_max(&response);
+        let best = weights::arg_max(&response);
         let mut at = best as f64 - MIDDLE as f64;
         if (1..LEVELS - 1).contains(&best) {
             // The vertex of the parabola through three levels.

@@ -1,5 +1,6 @@
 //! (D) From distances to the weights of the particles (equations 9 to 12).
 //!
+//! In: N x K distances in \[0, 1\], σ, and for each particle the logarithm of its prior. Out: N weights with the sum 1.
 //! exp(-dist / σ) underflows for every candidate as soon as the nearest is some hundred σ away, and 0 / 0 is no
 //! likelihood. Equation 10 normalises over the candidates, so the least distance to an entry may be taken from all
 //! distances to it first: the result is the same, and the largest term is always 1.
