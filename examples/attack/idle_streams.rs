@@ -26,14 +26,8 @@ pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     let mut streams = Vec::new();
     for number in 0..STREAMS {
         let client = format!("198.51.100.{}", number % ADDRESSES);
-        let request = target.post(&client, "/sessions?box=1000,1000,500,400");
-        let created = request.body(frame.clone()).send().await?;
-        let path = created
-            .headers()
-            .get("location")
-            .ok_or("no session")?
-            .to_str()?
-            .to_owned();
+        let query = "box=1000,1000,500,400";
+        let path = target.open_with(&client, &frame, query).await?;
         let url = format!("ws://{}{path}/stream", target.address);
         let mut request = url.into_client_request()?;
         request

@@ -21,14 +21,7 @@ fn frame(value: u8) -> Outcome<Vec<u8>> {
 pub async fn attack(target: &Target, _: &Options) -> Outcome<Verdict> {
     let (first, next) = (frame(10)?, frame(20)?);
     let (client, query) = ("198.51.100.1", "box=2000,1500,1600,1200");
-    let created = target.post(client, &format!("/sessions?{query}"));
-    let created = created.body(first.clone()).send().await?;
-    let path = created
-        .headers()
-        .get("location")
-        .ok_or("no session")?
-        .to_str()?
-        .to_owned();
+    let path = target.open_with(client, &first, query).await?;
     let url = format!("{}{path}", target.url);
     let replay = target
         .http

@@ -103,7 +103,13 @@ impl Target {
 
     /// Opens a session of this client; gives its path.
     pub async fn open(&self, client: &str, frame: &[u8], query: &str) -> Outcome<String> {
-        let request = self.post(client, &format!("/sessions?box={}{query}", target_box()));
+        let query = format!("box={}{query}", target_box());
+        self.open_with(client, frame, &query).await
+    }
+
+    /// The same with a query that has the box.
+    pub async fn open_with(&self, client: &str, frame: &[u8], query: &str) -> Outcome<String> {
+        let request = self.post(client, &format!("/sessions?{query}"));
         let answer = request.body(frame.to_vec()).send().await?;
         let status = answer.status();
         let path = answer.headers().get("location").cloned();
