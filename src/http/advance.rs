@@ -1,5 +1,6 @@
 //! A session's next frames: decode them, then track through them or take the box that the user gives.
 
+use super::box_check;
 use super::durability::Durability;
 use super::metrics::tracking::TrackingMetrics;
 use super::problems::problem::Problem;
@@ -43,11 +44,12 @@ pub struct GivenBox {
 }
 
 impl GivenBox {
-    /// The correction in a session with so many targets.
+    /// The correction in a session with so many targets and frames of this size.
     ///
     /// # Errors
-    /// There is no such target, or it is not told which of several is meant.
-    fn of(self, count: usize) -> Result<Correction, Problem> {
+    /// There is no such target, it is not told which of several is meant, or the box cannot be meant.
+    fn of(self, count: usize, size: (u32, u32)) -> Result<Correction, Problem> {
+        box_check::check(&self.to.into(), size)?;
         let target = match self.target {
             Some(target) => target,
             None if count == 1 => 0,
@@ -137,7 +139,9 @@ impl NextFrames {
             .iter()
             .map(|file| Fingerprint::of(file))
             .collect();
-        let correction = self.correction.map(|given| given.of(state.target_count()));
+        let correction = self
+            .correction
+            .map(|given| given.of(state.target_count(), state.source_size()));
         let correction = correction.transpose()?;
         let decision = state.replay_decision(self.number, &fingerprints, correction)?;
         if let ReplayDecision::Replay(estimates) = decision {

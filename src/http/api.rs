@@ -6,7 +6,7 @@ use super::state::AppState;
 use super::stream::handshake;
 use super::{
     bag_picture, create, create_named, cvat, frames, health, session, snapshot, target, token,
-    track,
+    track, version,
 };
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
@@ -74,6 +74,11 @@ pub fn metrics() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(metrics_page::get))
 }
 
+/// `/version`.
+pub fn version() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(version::get))
+}
+
 /// The probes, which everybody may use.
 pub fn probes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -85,6 +90,7 @@ pub fn probes() -> OpenApiRouter<AppState> {
 pub fn handlers() -> utoipa::openapi::OpenApi {
     OpenApiRouter::with_openapi(Api::openapi())
         .merge(sessions())
+        .merge(version())
         .merge(metrics())
         .merge(probes())
         .into_openapi()

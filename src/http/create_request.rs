@@ -11,7 +11,7 @@ use super::target_box::{BoxInput, BoxText, TargetBox};
 use super::target_boxes::{BoxesInput, BoxesText, TargetBoxes};
 use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
-use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use super::upload::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
 use super::upload::switch::Switch;
 use super::upload::texts::Texts;
 use super::upload::uploaded::Upload;
@@ -41,9 +41,9 @@ pub struct CreateSettings {
     #[param(nullable = false)]
     pub preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    pub seed: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    pub seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
     #[serde(rename = "parameters")]

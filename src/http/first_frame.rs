@@ -1,10 +1,11 @@
 //! A new session's first frame, with the boxes and parameters that come with it.
 
 use super::advance;
+use super::box_check;
 use super::problems::problem::Problem;
 use super::state::AppState;
 use super::upload::overrides::{self, ParamOverrides, PresetName};
-use super::upload::settings::WholeNumber;
+use super::upload::settings::Seed;
 use crate::sessions::{
     Boxes, Fingerprint, PerTarget, SessionState, StartError, WorkMeter, frame_format,
 };
@@ -18,7 +19,7 @@ pub struct FirstFrame {
     /// The set of parameters.
     pub preset: Option<PresetName>,
     /// The seed of all random draws.
-    pub seed: Option<WholeNumber>,
+    pub seed: Option<Seed>,
     /// Parameters that are set otherwise than in the preset.
     pub params: Option<ParamOverrides>,
 }
@@ -40,6 +41,12 @@ impl FirstFrame {
         let (limits, metrics) = (state.config.frame_limits(), &state.metrics.tracking);
         let files = std::slice::from_ref(file);
         let frame = &advance::decode(files, &limits, &format, meter, metrics)?[0];
+        for (target, given) in boxes.as_slice().iter().enumerate() {
+            box_check::check(given, frame.source_size()).map_err(|problem| match boxes {
+                PerTarget::One(_) => problem,
+                PerTarget::List(list) => problem.of_target(target, list.len()),
+            })?;
+        }
         let print = Fingerprint::of(file);
         let started = SessionState::start(frame, print, boxes, &params, || meter.check());
         started.map_err(|error| match (&error, boxes) {

@@ -18,6 +18,7 @@ use super::problems::problem::Problem;
 use super::state::AppState;
 use super::stream::message::StreamAnswer;
 use super::video_frames::VideoFrames;
+use super::video_place::count_frame;
 use super::work;
 use crate::sessions::{Fingerprint, LockedSession, QueuePermit, SessionPermit, WorkMeter};
 use axum::body::{Body, Bytes, HttpBody};
@@ -27,13 +28,9 @@ use http_body::Frame;
 use std::convert::Infallible;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 use std::vec::IntoIter;
-use tokio::time::{Instant, sleep, timeout_at};
+use tokio::time::{Instant, timeout_at};
 use tracing::Instrument;
-
-/// How long a frame of a video waits before it asks for a place in the quota again.
-const RETRY: Duration = Duration::from_millis(20);
 
 /// Where frames come from.
 #[derive(Debug)]
@@ -141,7 +138,7 @@ impl LineWork {
             return Ok(answer.with_durability(Durability::of(&session, state.store.is_some())));
         }
         if matches!(self.frames, FrameSource::Video(_)) {
-            self.count_frame().await?;
+            count_frame(&self.state, &self.client).await?;
         }
         let mut next = NextFrames::posted(self.number, vec![file], None);
         // So that the request can be sent again when its line breaks.
@@ -152,18 +149,6 @@ impl LineWork {
         self.number = Some(estimates.first().frame + 1);
         let answer = StreamAnswer::new(estimates, 0, answered.replayed, state.is_draining());
         Ok(answer.with_durability(answered.durability))
-    }
-
-    /// Waits for a place in the quota of frames.
-    async fn count_frame(&self) -> Result<(), Problem> {
-        let account = self.state.clients.account(&self.client);
-        let deadline = Instant::now() + self.state.config.work_timeout;
-        loop {
-            match account.count_frames(1) {
-                Err(_) if Instant::now() < deadline => sleep(RETRY).await,
-                counted => return counted,
-            }
-        }
     }
 
     /// The next line, and what follows it.
@@ -187,7 +172,8 @@ impl LineWork {
         let cause = cause.as_deref().unwrap_or("none");
         tracing::info!(kind, cause, "problem of a later frame");
         let (path, id) = (self.path.clone(), self.request_id.clone());
-        line(&ProblemDocument::new(problem, path, id)).unwrap_or_default()
+        let base = self.state.config.base_path.as_str();
+        line(&ProblemDocument::new(problem, base, path, id)).unwrap_or_default()
     }
 }
 

@@ -4,7 +4,7 @@ use super::answer_problems::{answer_problems, panic_response};
 use super::api;
 use super::auth::layer::{authenticate, authenticate_metrics};
 use super::auth::origin::check_origin;
-use super::base_path::mount;
+use super::base_path::{client_path, mount};
 use super::cors::cors;
 use super::drain::drain_refused;
 use super::draining::mark_draining;
@@ -20,9 +20,9 @@ use super::security_headers::secure;
 use super::state::AppState;
 use super::{docs, page};
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
-use axum::http::HeaderValue;
+use axum::extract::{DefaultBodyLimit, Request};
 use axum::http::header::CACHE_CONTROL;
+use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -37,7 +37,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
     let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
-        .fallback(async || Problem::route_not_found())
+        .fallback(async |request: Request| Problem::no_route(&client_path(&request)))
         .method_not_allowed_fallback(async || Problem::method_not_allowed())
         // The last layer is the first to see a request.
         .layer(DefaultBodyLimit::max(config.max_body_bytes))
@@ -74,6 +74,7 @@ fn routes(state: &AppState) -> Router<AppState> {
     let document = docs::document(&state.config.base_path);
     let (sessions, _) = api::sessions().split_for_parts();
     let (metrics, _) = api::metrics().split_for_parts();
+    let (version, _) = api::version().split_for_parts();
     let (probes, _) = api::probes().split_for_parts();
     let pages = Router::new()
         .route("/", get(page::index))
@@ -83,7 +84,12 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));
     pages
-        .route("/openapi.json", get(move || docs::served(document.clone())))
+        .route(
+            "/openapi.json",
+            get(move |headers: HeaderMap| docs::served(document.clone(), headers)),
+        )
+        .route("/docs/problems", get(docs::problems))
+        .merge(version)
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))

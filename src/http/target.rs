@@ -3,6 +3,7 @@
 use super::advance::{Answered, GivenBox, NextFrames};
 use super::advance_session::advance_session;
 use super::answer::{Answer, replayed_header};
+use super::box_check;
 use super::frame_order::wait_for_turn;
 use super::json::Json;
 use super::openapi::example_frames;
@@ -13,7 +14,9 @@ use super::problems::problem::Problem;
 use super::state::AppState;
 use super::target_box::{BoxInput, BoxText, TargetBox};
 use super::upload::session_request::SessionRequest;
-use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use super::upload::settings::{
+    ExactInput, ExactText, FrameCount, FrameNumber, Settings, TargetInput, TargetNumber, TargetText,
+};
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -29,13 +32,13 @@ pub struct TargetSettings {
     #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    frame: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    frame: Option<FrameNumber>,
     /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    target: Option<WholeNumber>,
+    #[param(value_type = TargetText, inline, required = false)]
+    #[schema(value_type = TargetInput, inline, required = false)]
+    target: Option<TargetNumber>,
 }
 
 impl Settings for TargetSettings {
@@ -75,9 +78,8 @@ operation_problems!(
         TargetSettings,
     ),
     request_body(
-        description = "The frame in one of three forms.",
+        description = "The frame as a raw body (JPEG, PNG or WebP), as a form, or as JSON with base64.",
         content(
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
             (TargetForm = "multipart/form-data"),
             (
@@ -112,6 +114,7 @@ pub async fn put(
     let number = settings.frame.map(|number| number.0);
     let next = NextFrames::posted(number, request.upload.files, Some(GivenBox { target, to }));
     let targets = request.permit.session().target_count();
+    let size = request.permit.session().source_size();
     let queue = request.queue.for_frames(targets);
     let (permit, client) = (request.permit, request.client);
     let queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
@@ -121,7 +124,8 @@ pub async fn put(
         durability,
         ..
     } = advance_session(&state, permit, queue, &client, next).await?;
-    let answer = Json(Answer::from(&estimates[0])).into_response();
+    let warnings = box_check::warnings(&[to.into()], size);
+    let answer = Json(Answer::from(&estimates[0]).with_warnings(warnings)).into_response();
     let frame = estimates[0].first().frame;
     Ok(durability.write(frame, replayed_header(replayed, answer)))
 }

@@ -3,6 +3,9 @@
 use super::advance::{self, GivenBox, NextFrames};
 use super::answer::{FrameAnswers, answer_bytes};
 use super::auth::caller::Caller;
+use super::base_path::client_path;
+use super::box_check;
+use super::client::Client;
 use super::first_frame::FirstFrame;
 use super::json;
 use super::openapi::example_frames;
@@ -11,17 +14,22 @@ use super::openapi::problem_responses::{self, operation_problems};
 use super::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use super::problems::kind::Kind;
 use super::problems::problem::Problem;
+use super::request_id;
 use super::snapshot::charged;
 use super::state::AppState;
 use super::target_box::{BoxInput, BoxText, TargetBox};
 use super::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use super::track_video::{self, VideoRequest};
 use super::upload::admit::admit;
 use super::upload::overrides::{ParamOverrides, PresetName};
-use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use super::upload::settings::{
+    ExactInput, ExactText, FrameCount, Seed, Settings, TargetInput, TargetNumber, TargetText,
+};
 use super::upload::texts::Texts;
 use super::upload::uploaded::Upload;
 use super::work;
 use crate::sessions::{ByteCharge, SessionState, WorkMeter};
+use crate::tracker::Rect;
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -45,17 +53,17 @@ pub struct TrackSettings {
     #[schema(value_type = BoxesInput, inline, required = false)]
     boxes: Option<TargetBoxes>,
     /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    target: Option<WholeNumber>,
+    #[param(value_type = TargetText, inline, required = false)]
+    #[schema(value_type = TargetInput, inline, required = false)]
+    target: Option<TargetNumber>,
     /// `robust` (the default) or `paper`. Only without a snapshot.
     #[param(nullable = false)]
     preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
     /// snapshot.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    seed: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
     #[serde(rename = "parameters")]
     #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
@@ -65,6 +73,7 @@ pub struct TrackSettings {
 impl Settings for TrackSettings {
     const FRAMES: FrameCount = FrameCount::Several;
     const TAKES_SNAPSHOT: bool = true;
+    const TAKES_VIDEO: bool = true;
     const SCHEMA_PREFIX: &'static str = "Track";
 }
 
@@ -103,12 +112,19 @@ operation_problems!(
 /// or to another one with the same secret (`BAGTRACK_SNAPSHOT_KEYS`). Nothing is kept here, so the same request gets
 /// the same answer again, but for the random seed of a new track.
 ///
+/// A video and a box are tracked to the video's end, where the service has an `ffmpeg`: a line of JSON for each frame
+/// (`application/x-ndjson`), as soon as it is tracked, the first one being the box. Where the rest cannot be tracked,
+/// the last line is a problem document.
+///
+/// `curl -N --data-binary @clip.mp4 'http://localhost:8080/track?box=10,20,30,40'`
+///
 /// `curl -F frame=@next.jpg -F snapshot=@last.snapshot http://localhost:8080/track`
 #[utoipa::path(
     post, path = "/track", tag = "sessions", operation_id = "track",
     params(TrackSettings),
     request_body(
-        description = "The frames and the snapshot. A raw frame begins a track.",
+        description = "The frames and the snapshot. A raw frame begins a track; so does a video (MP4, WebM, GIF, Motion \
+            JPEG as `video/x-motion-jpeg`).",
         content(
             (TrackForm = "multipart/form-data"),
             (
@@ -119,24 +135,44 @@ operation_problems!(
                     "seed": 7
                 })
             ),
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
         )
     ),
     responses(
-        (status = 200, description = "Where the target is, and the new snapshot", body = Tracked),
+        (
+            status = 200, description = "Where the target is, and the new snapshot; for a video, a line for each frame",
+            content((Tracked = "application/json"), (String = "application/x-ndjson"))
+        ),
         Problems
     )
 )]
 pub async fn post(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
     let texts = Texts::of_query::<TrackSettings>(request.uri())?;
+    let (path, request_id) = (client_path(&request), request_id::of(&request));
     let (mut parts, body) = request.into_parts();
     let caller = Caller::from_request_parts(&mut parts, &state).await?;
     caller.require_key()?;
+    let client = Client::of(&parts);
     let admitted = admit(&state, &parts)?;
     let mut charge = ByteCharge::new(&state.uploads, admitted.bytes());
     let request = Request::from_parts(parts, body);
-    let (upload, queue) = Upload::read(&state, admitted, texts, request).await?;
+    let (mut upload, queue) = Upload::read(&state, admitted, texts, request).await?;
+    if let Some(format) = upload.video {
+        if upload.snapshot.is_some() {
+            let detail = "A video begins a track; leave out the snapshot.";
+            return Err(Problem::malformed(detail));
+        }
+        let request = VideoRequest {
+            video: upload.files.swap_remove(0),
+            format,
+            first: begin(upload.settings)?,
+            queue,
+            client,
+            path,
+            request_id,
+        };
+        return track_video::answer(state, request).await;
+    }
     let queue = queue.for_frames(upload.files.len());
     let worker = state.clone();
     let track = move |meter: &mut WorkMeter| {
@@ -155,7 +191,7 @@ fn track(
     charge: &mut ByteCharge,
 ) -> Result<Vec<u8>, Problem> {
     let keys = &state.access.snapshots;
-    let (mut estimates, mut files) = (Vec::new(), upload.files);
+    let (mut estimates, mut files, mut given) = (Vec::new(), upload.files, Vec::new());
     let (mut track, correction) = match &upload.snapshot {
         Some(snapshot) => {
             let allowed = TrackSettings {
@@ -173,13 +209,15 @@ fn track(
             }
             let track = SessionState::restore(snapshot, keys, state.config.max_frames)?;
             let target = allowed.target.map(|number| number.as_index());
+            given.extend(allowed.r#box.map(Rect::from));
             let correction = allowed.r#box.map(|to| GivenBox { target, to });
             (track, correction)
         }
         None => {
             advance::check_pixels(&files, &state.config.request_limits())?;
-            let first = files.remove(0);
-            let track = begin(upload.settings)?.begin(state, &first, meter)?;
+            let (file, first) = (files.remove(0), begin(upload.settings)?);
+            given = first.boxes.as_slice().to_vec();
+            let track = first.begin(state, &file, meter)?;
             estimates.push(track.latest());
             (track, None)
         }
@@ -195,7 +233,8 @@ fn track(
     let text = snapshot.len().div_ceil(3) * 4;
     charge.grow(2 * text + answer_bytes(estimates.len(), track.target_count()))?;
     let tracked = Tracked {
-        answers: FrameAnswers::from(&estimates[..]),
+        answers: FrameAnswers::from(&estimates[..])
+            .with_warnings(box_check::warnings(&given, track.source_size())),
         snapshot: STANDARD.encode(snapshot),
     };
     let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;

@@ -23,7 +23,7 @@ use super::state::AppState;
 use super::upload::admit::admit;
 use super::upload::json_body::JsonText;
 use super::upload::overrides::{self, ParamOverrides, PresetName};
-use super::upload::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use super::upload::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
 use super::upload::texts::Texts;
 use super::work;
 use crate::sessions::{ByteCharge, WorkMeter};
@@ -41,9 +41,9 @@ pub struct CvatSettings {
     #[param(nullable = false)]
     preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    seed: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset.
     #[serde(rename = "parameters")]
     #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]

@@ -35,6 +35,7 @@ impl From<IngestError> for Problem {
                 let detail = "The type is taken from the bytes; send a JPEG, PNG or WebP image.";
                 Self::new(Kind::UnsupportedImage, detail)
             }
+            IngestError::UnreadFormat(name) => Self::new(Kind::UnsupportedImage, unread(name)),
             IngestError::TooLarge(limit) => Self::new(
                 Kind::FrameTooLarge,
                 format!("{limit}. Send a smaller frame."),
@@ -45,6 +46,15 @@ impl From<IngestError> for Problem {
             }
         }
     }
+}
+
+/// What is said to an image of a type that is not read.
+fn unread(name: &str) -> String {
+    let cure = match name {
+        "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
+        _ => "Convert it, or let the camera or the browser make JPEGs.",
+    };
+    format!("The file is a {name} image, which is not read. Send JPEG, PNG or WebP. {cure}")
 }
 
 impl From<TrackerError> for Problem {

@@ -5,6 +5,7 @@ use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::advance::{Answered, NextFrames};
 use crate::http::advance_session::advance_session;
 use crate::http::auth::caller::Caller;
+use crate::http::box_check;
 use crate::http::client::Client;
 use crate::http::clients::Account;
 use crate::http::durability::Durability;
@@ -13,7 +14,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use crate::http::{newest, stored};
 use crate::sessions::{Estimates, QueuePermit, Session, SessionPermit};
-use crate::tracker::Seen;
+use crate::tracker::{Rect, Seen};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -56,6 +57,8 @@ pub struct Given {
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
     pub seen: Option<Seen>,
+    /// What may be wrong with the box that came with it.
+    pub warnings: Option<Vec<String>>,
     /// What the store has.
     pub durability: Durability,
 }
@@ -179,7 +182,11 @@ impl FrameWork {
             };
             let at = session.session().clone();
             match advance_session(&self.state, session, queue, &self.client, next).await {
-                Ok(answered) => return Ok(Given::of(answered, shown)),
+                Ok(answered) => {
+                    let given = header.r#box.map(Rect::from);
+                    let warnings = box_check::warnings(given.as_slice(), at.source_size());
+                    return Ok(Given::of(answered, shown, warnings));
+                }
                 Err(problem) if is_store_away(&problem) && Instant::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
                     number = number.or(Some(at.latest_frame() + 1));
@@ -194,12 +201,13 @@ impl FrameWork {
 
 impl Given {
     /// The answer to one frame, with what the tracker of this target saw.
-    fn of(mut answered: Answered, target: usize) -> Self {
+    fn of(mut answered: Answered, target: usize, warnings: Option<Vec<String>>) -> Self {
         let seen = (target < answered.seen.len()).then(|| answered.seen.swap_remove(target));
         Self {
             estimates: answered.estimates.swap_remove(0),
             replayed: answered.replayed,
             seen,
+            warnings,
             durability: answered.durability,
         }
     }
