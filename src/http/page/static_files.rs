@@ -1,0 +1,95 @@
+//! `/`: the page for people, with its style sheet and its scripts. All of it is in the program.
+//!
+//! Browsers ask again each time, and get 304 as long as the program is the same.
+
+use super::static_file::StaticFile;
+use crate::http::middleware::base_path::client_path;
+use crate::http::middleware::security_headers::PAGE_POLICY;
+use crate::http::problems::problem::Problem;
+use axum::body::Bytes;
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, Request};
+use axum::http::HeaderMap;
+use axum::response::{IntoResponse, Redirect, Response};
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// A file of the page: its name, media type and text.
+type File = (&'static str, &'static str, &'static str);
+
+macro_rules! file {
+    ($name:literal, $media_type:ident) => {
+        (
+            $name,
+            $media_type,
+            include_str!(concat!("../../../web/", $name)),
+        )
+    };
+}
+
+/// A file of the JavaScript client, which the page uses.
+macro_rules! client_file {
+    ($name:literal) => {
+        (
+            $name,
+            SCRIPT,
+            include_str!(concat!("../../../clients/", $name)),
+        )
+    };
+}
+
+const INDEX: File = file!("index.html", HTML);
+
+const FILES: [File; 16] = [
+    file!("page.css", CSS),
+    file!("main.js", SCRIPT),
+    file!("box.js", SCRIPT),
+    file!("chart.js", SCRIPT),
+    file!("clip.js", SCRIPT),
+    file!("problems.js", SCRIPT),
+    file!("run.js", SCRIPT),
+    file!("save.js", SCRIPT),
+    file!("stage.js", SCRIPT),
+    file!("video.js", SCRIPT),
+    client_file!("js/bagtrack.js"),
+    client_file!("js/client.js"),
+    client_file!("js/problem.js"),
+    client_file!("js/session.js"),
+    client_file!("js/stream.js"),
+    client_file!("js/transport.js"),
+];
+
+/// All of them, by their names.
+static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
+    let files = FILES.iter().chain([&INDEX]);
+    let served = files.map(|(name, media_type, text)| {
+        let bytes = Bytes::from_static(text.as_bytes());
+        let file = StaticFile::new(*media_type, PAGE_POLICY, "no-cache", bytes);
+        (*name, file)
+    });
+    served.collect()
+});
+
+/// `/`. Its links are relative, so a base path needs its slash.
+pub async fn index(request: Request) -> Response {
+    let path = client_path(&request);
+    match path.ends_with('/') {
+        true => SERVED[INDEX.0].respond(request.headers()).await,
+        false => Redirect::permanent("/").into_response(),
+    }
+}
+
+/// `/page/{*file}`.
+pub async fn asset(
+    path: Result<Path<String>, PathRejection>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let Path(path) = path.map_err(|_| Problem::route_not_found())?;
+    let file = SERVED.get(&*path).filter(|_| path != INDEX.0);
+    let file = file.ok_or_else(Problem::route_not_found)?;
+    Ok(file.respond(&headers).await)
+}
