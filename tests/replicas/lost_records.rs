@@ -8,7 +8,7 @@ use reqwest::{Response, StatusCode};
 async fn must_come_again(answer: Response) {
     assert!(answer.headers().contains_key("retry-after"));
     let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:store-unavailable");
+    assert_eq!(problem["type"], "/docs/problems#store-unavailable");
 }
 
 #[tokio::test]

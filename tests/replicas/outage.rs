@@ -16,7 +16,7 @@ fn says_not_durable(answer: &Response) -> bool {
 async fn must_come_again(answer: Response) {
     assert!(answer.headers().contains_key("retry-after"));
     let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:store-unavailable");
+    assert_eq!(problem["type"], "/docs/problems#store-unavailable");
 }
 
 /// Opens a session without an id of its own; its path.
