@@ -85,7 +85,10 @@ fn the_readmes_curl_session_works_as_typed() {
         .lines()
         .filter_map(|line| serde_json::from_str(line).ok())
         .collect();
-    assert!(!script.contains("sed ") && !script.contains("tr "), "plain commands alone");
+    assert!(
+        !script.contains("sed ") && !script.contains("tr "),
+        "plain commands alone"
+    );
     // The opening, one frame, two frames, one twice, a correction, the state, the restored session.
     assert_eq!(documents.len(), 8, "{answers}");
     assert_eq!(documents[0]["box"]["x"], 44.1);

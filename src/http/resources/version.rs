@@ -25,6 +25,8 @@ operation_problems!(
 );
 
 /// See which version answers
+///
+/// Needs no key.
 #[utoipa::path(
     get, path = "/version", tag = "service", operation_id = "getVersion", security(()),
     responses((status = 200, description = "The version", body = Version), Problems)

@@ -8,7 +8,7 @@ use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;
 use std::borrow::Cow;
 use std::str::FromStr;
-use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
+use utoipa::openapi::schema::{AnyOfBuilder, ArrayBuilder, ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Ref, RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
@@ -115,11 +115,13 @@ impl ToSchema for BoxesInput {
 impl PartialSchema for BoxesInput {
     fn schema() -> RefOr<Schema> {
         let list = ArrayBuilder::new()
-            .schema_type(SchemaType::from_iter([Type::Array, Type::Null]))
             .items(Ref::from_schema_name(TargetBox::name()))
             .min_items(Some(1))
             .max_items(Some(MAX_TARGETS));
-        list.into()
+        AnyOfBuilder::new()
+            .item(list)
+            .item(ObjectBuilder::new().schema_type(Type::Null))
+            .into()
     }
 }
 
