@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use bagtrack::ingest::{self, IngestError, Limits};
-use bagtrack::tracker::{Frame, Preset, Rect, Tracker};
+use bagtrack_ingest::{self, IngestError, Limits};
+use bagtrack_tracker::{Frame, Preset, Rect, Tracker};
 
 use crate::clock;
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bagtrack::tracker::{self, Rect};
+use bagtrack_tracker::{self, Rect};
 use bagtrack_client::{Client, ClientError, OpenOptions, Preset, Session};
 use bytes::Bytes;
 use hdrhistogram::Histogram;

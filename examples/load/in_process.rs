@@ -1,7 +1,7 @@
 //! The baseline of the service: decoding and tracking in this process, on one thread.
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Preset, Rect, Tracker};
+use bagtrack_ingest::{self, Limits};
+use bagtrack_tracker::{Preset, Rect, Tracker};
 
 use crate::Outcome;
 use crate::process::cpu_seconds;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use bagtrack::tracker::Preset;
+use bagtrack_tracker::Preset;
 use bagtrack_client::Client;
 use tokio::task::JoinSet;
 

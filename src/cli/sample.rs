@@ -1,6 +1,6 @@
 //! `bagtrack sample`.
 
-use super::{output, progress};
+use bagtrack_cli::{output, progress};
 use bagtrack::sample::{Clip, Format, Scene, Settings};
 use std::path::PathBuf;
 

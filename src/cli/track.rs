@@ -1,10 +1,9 @@
 //! `bagtrack track`.
 
-use super::params::ParamFlags;
-use super::progress;
+use bagtrack_cli::{BOXES, ParamFlags, read_boxes};
+use bagtrack_cli::progress;
 use super::track_frames::Frames;
 use super::track_writer::Writer;
-use bagtrack::eval::Sequence;
 use bagtrack::ingest::{self, Limits};
 use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
 use std::io::{self, ErrorKind, Write};
@@ -118,20 +117,20 @@ fn advance(
 }
 
 fn first_annotated(dir: &Path) -> Result<Rect, String> {
-    if !dir.join(Sequence::BOXES).is_file() {
+    if !dir.join(BOXES).is_file() {
         return Err(format!(
             "{}: --box x,y,width,height is needed (there is no {} to take the first box from)",
             dir.display(),
-            Sequence::BOXES
+            BOXES
         ));
     }
-    let boxes = Sequence::read_boxes(dir).map_err(|error| error.to_string())?;
+    let boxes = read_boxes(dir).map_err(|error| error.to_string())?;
     let first = boxes.first().copied().flatten();
     first.ok_or_else(|| {
         format!(
             "{}: --box x,y,width,height is needed (the first frame is not annotated in {})",
             dir.display(),
-            Sequence::BOXES
+            BOXES
         )
     })
 }

@@ -1,6 +1,6 @@
 //! The frames of `bagtrack track`: those of a folder, or of a video.
 
-use bagtrack::eval::frames;
+use bagtrack_cli::frames;
 use bagtrack::ingest::Limits;
 use bagtrack::ingest::video::{VideoDecoder, VideoLimits};
 use std::error::Error;

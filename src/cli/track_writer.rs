@@ -1,7 +1,7 @@
 //! What `bagtrack track --draw` writes: a folder of pictures, or a video.
 
 use super::draw;
-use super::output;
+use bagtrack_cli::output;
 use super::track_frames::{FFMPEG, FrameFile};
 use bagtrack::tracker::Estimate;
 use std::error::Error;

@@ -1,8 +1,8 @@
 //! The sample clip, and what the library says of it.
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::sample::{Clip as Sample, Format, Settings};
-use bagtrack::tracker::{Estimate, Preset, Rect, Status, Tracker};
+use bagtrack_ingest::{self, Limits};
+use bagtrack_sample::{Clip as Sample, Format, Settings};
+use bagtrack_tracker::{Estimate, Preset, Rect, Status, Tracker};
 use bagtrack_client::Answer;
 use serde_json::{Value, json};
 use std::sync::LazyLock;

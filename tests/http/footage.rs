@@ -1,8 +1,8 @@
 //! Real video over HTTP.
 
 use crate::application::{TestApplication, expect};
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Estimate, Preset, Rect, Tracker};
+use bagtrack_ingest::{self, Limits};
+use bagtrack_tracker::{Estimate, Preset, Rect, Tracker};
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
