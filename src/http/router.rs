@@ -1,24 +1,25 @@
 //! All routes, and the layers that every request passes through.
 
-use super::answer_problems::{answer_problems, panic_response};
-use super::api;
-use super::auth::layer::{authenticate, authenticate_metrics};
-use super::auth::origin::check_origin;
-use super::base_path::mount;
-use super::cors::cors;
-use super::drain::drain_refused;
-use super::draining::mark_draining;
-use super::host::one_host;
-use super::identify::identify;
-use super::metrics::layer::count_request;
-use super::problems::problem::Problem;
-use super::request_id::{REQUEST_ID, remove_unusable_id};
-use super::request_log::log_request;
+use crate::http::auth::layer::{authenticate, authenticate_metrics};
+use crate::http::auth::origin::check_origin;
+use crate::http::metrics::layer::count_request;
+use crate::http::middleware::answer_problems::{answer_problems, panic_response};
+use crate::http::middleware::base_path::mount;
+use crate::http::middleware::client_identity::identify;
+use crate::http::middleware::cors::cors;
+use crate::http::middleware::draining::mark_draining;
+use crate::http::middleware::lingering_close::drain_refused;
+use crate::http::middleware::request_id::{REQUEST_ID, remove_unusable_id};
+use crate::http::middleware::request_log::log_request;
+use crate::http::middleware::security_headers::secure;
+use crate::http::middleware::single_host::one_host;
+use crate::http::openapi::routes;
+use crate::http::page::docs;
 #[cfg(feature = "eval")]
-use super::sample_clips;
-use super::security_headers::secure;
-use super::state::AppState;
-use super::{docs, page};
+use crate::http::page::sample_clips;
+use crate::http::page::static_files;
+use crate::http::problems::problem::Problem;
+use crate::http::service::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::HeaderValue;
@@ -72,12 +73,12 @@ fn routes(state: &AppState) -> Router<AppState> {
     let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
     let document = docs::document(&state.config.base_path);
-    let (sessions, _) = api::sessions().split_for_parts();
-    let (metrics, _) = api::metrics().split_for_parts();
-    let (probes, _) = api::probes().split_for_parts();
+    let (sessions, _) = routes::sessions().split_for_parts();
+    let (metrics, _) = routes::metrics().split_for_parts();
+    let (probes, _) = routes::probes().split_for_parts();
     let pages = Router::new()
-        .route("/", get(page::index))
-        .route("/page/{*file}", get(page::asset));
+        .route("/", get(static_files::index))
+        .route("/page/{*file}", get(static_files::asset));
     #[cfg(feature = "eval")]
     let pages = pages
         .route("/sample/{clip}/clip.json", get(sample_clips::view))

@@ -1,8 +1,8 @@
 //! The keys and secrets of a running service, checked at its start.
 
-use super::config::AccessConfig;
 use super::keys::{ApiKeys, KeysError};
 use super::token::TokenKeys;
+use crate::http::config::access::AccessConfig;
 use crate::sessions::{MacKeys, SNAPSHOT_KEY_CONTEXT};
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -2,8 +2,8 @@
 //!
 //! Only digests are kept. A key that is presented is hashed and compared with all of them in constant time.
 
-use super::config::Secret;
 use super::token::PREFIX;
+use crate::http::config::access::Secret;
 use crate::sessions::Owner;
 use std::io;
 use std::path::{Path, PathBuf};

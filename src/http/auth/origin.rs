@@ -4,9 +4,9 @@
 //! origin is checked, too. So is the [host](super::hosts).
 
 use super::hosts::AllowedHosts;
-use crate::http::config::Config;
+use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
-use crate::http::state::AppState;
+use crate::http::service::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};

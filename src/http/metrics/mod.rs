@@ -11,6 +11,5 @@
 
 pub mod layer;
 mod maker;
-pub mod page;
 pub mod registry;
 pub mod tracking;

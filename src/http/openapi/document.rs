@@ -1,7 +1,7 @@
 //! The document as it is sent: what the handlers say, and what follows from all of them together.
 
 use super::key_order::InOrder;
-use crate::http::api;
+use super::routes;
 use serde_json::{Map, Value, json};
 
 /// The id in all examples: that of `putSession` opens the session which the others use.
@@ -18,7 +18,7 @@ pub fn document() -> String {
 
 /// The OpenAPI document of a service at this path.
 pub fn document_at(base_path: &str) -> String {
-    let document = serde_json::to_value(api::handlers());
+    let document = serde_json::to_value(routes::handlers());
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
     let links = links(&document);

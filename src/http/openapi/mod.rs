@@ -7,7 +7,7 @@
 //! which is written [in an order](key_order) that generators of clients depend on.
 //!
 //! What can go wrong: the document says something else than the parsers do. So the bodies are made from the
-//! [`Settings`](super::upload::settings::Settings) type that the parsers read, the problem responses from the problems
+//! [`Settings`](crate::http::extract::settings::Settings) type that the parsers read, the problem responses from the problems
 //! that the handlers answer, and the parameters from the tracker's own table and
 //! errors.
 
@@ -18,3 +18,4 @@ pub mod param_limits;
 pub mod params_schema;
 pub mod problem_responses;
 pub mod request_bodies;
+pub mod routes;

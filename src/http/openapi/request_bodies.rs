@@ -1,6 +1,6 @@
 //! The bodies that have frames and settings in them, as a form and as JSON.
 
-use crate::http::upload::settings::{FrameCount, Settings};
+use crate::http::extract::settings::{FrameCount, Settings};
 use std::borrow::Cow;
 use std::marker::PhantomData;
 use utoipa::openapi::path::ParameterIn;

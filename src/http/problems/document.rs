@@ -1,7 +1,7 @@
 //! The problem document as it is sent.
 
 use super::problem::Problem;
-use crate::http::json::Json;
+use crate::http::respond::json::Json;
 use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_TYPE, RETRY_AFTER};
 use axum::response::{IntoResponse, Response};

@@ -2,7 +2,7 @@
 //!
 //! A handler returns a [`Problem`](problem::Problem): its [`Kind`](kind::Kind) (status, type and title, which never
 //! change), a detail that tells the client what to do, and the cause, which only the log gets. The errors of the other
-//! modules [turn into problems](from_errors) by `?`. The layer [`answer_problems`](super::answer_problems) writes the
+//! modules [turn into problems](from_errors) by `?`. The layer [`answer_problems`](crate::http::middleware::answer_problems) writes the
 //! [document](document), since it knows the path and the id of the request.
 //!
 //! What can go wrong: a cause that reaches the client tells more than it should. So the document has no field for it.

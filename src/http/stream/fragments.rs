@@ -5,7 +5,7 @@
 //! 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A fragment is handed over when
 //! its memory is charged. Where there is none the client waits: nothing more is read from it.
 
-use crate::http::least_rate::LeastRate;
+use crate::http::net::least_rate::LeastRate;
 use crate::sessions::{ByteBudget, ByteCharge, BytesFull};
 use arrayvec::ArrayVec;
 use bytes::{Buf, BytesMut};

@@ -2,16 +2,17 @@
 
 use super::open_streams::StreamPlace;
 use super::waiting::{Arrived, ArrivedFrame, Waiting};
-use crate::http::advance::{Answered, NextFrames};
-use crate::http::advance_session::advance_session;
 use crate::http::auth::caller::Caller;
-use crate::http::client::Client;
-use crate::http::clients::Account;
-use crate::http::durability::Durability;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::state::AppState;
-use crate::http::{newest, stored};
+use crate::http::quotas::client::Client;
+use crate::http::quotas::clients::Account;
+use crate::http::respond::durability::Durability;
+use crate::http::service::advance::{Answered, NextFrames};
+use crate::http::service::advance_session::advance_session;
+use crate::http::service::newest;
+use crate::http::service::state::AppState;
+use crate::http::service::stored;
 use crate::sessions::{Estimates, QueuePermit, Session, SessionPermit};
 use crate::tracker::Seen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

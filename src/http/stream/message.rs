@@ -1,10 +1,10 @@
 //! The text messages of a stream, as JSON.
 
-use crate::http::advance::GivenBox;
-use crate::http::answer::Answer;
-use crate::http::durability::Durability;
 use crate::http::problems::problem::Problem;
-use crate::http::target_box::TargetBox;
+use crate::http::respond::answer::Answer;
+use crate::http::respond::durability::Durability;
+use crate::http::respond::target_box::TargetBox;
+use crate::http::service::advance::GivenBox;
 use crate::sessions::Estimates;
 use crate::tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};

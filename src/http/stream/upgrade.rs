@@ -1,8 +1,8 @@
 //! From HTTP to a WebSocket: the answer to the handshake, and the connection after it.
 
 use super::fragments::Fragments;
-use crate::http::connection_io::ConnectionIo;
-use crate::http::least_rate::LeastRate;
+use crate::http::net::connection_io::ConnectionIo;
+use crate::http::net::least_rate::LeastRate;
 use crate::http::problems::problem::Problem;
 use crate::sessions::ByteBudget;
 use axum::extract::FromRequestParts;

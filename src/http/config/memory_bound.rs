@@ -1,0 +1,82 @@
+//! How much memory the service takes at most, by its settings.
+
+use super::service::Config;
+use crate::sessions::MAX_LIST_BYTES;
+use crate::tracker::MAX_WORKING_SIDE;
+
+/// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
+pub const MAX_BUFFER_BYTES: usize = 64 << 10;
+/// The program, its tables, the log's queue, and what the allocator keeps for itself.
+const PROGRAM: u64 = 96 << 20;
+/// What a worker keeps from frame to frame: buffers of the decoder and the tracker's workspace.
+const WORKER: u64 = 64 << 20;
+/// The largest working image of a frame that waits for its turn in a request: luma, and chroma in half of its columns
+/// and rows.
+const WORKING_IMAGE: u64 = MAX_WORKING_SIDE as u64 * MAX_WORKING_SIDE as u64 * 3 / 2;
+/// A connection's tasks, beside its two buffers.
+const CONNECTION: u64 = 16 << 10;
+
+/// Bytes that the parts of the service take at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryBound {
+    /// Bodies of requests, decoded copies and unread answers included.
+    pub uploads: u64,
+    /// Decoding and tracking.
+    pub work: u64,
+    /// The states of sessions.
+    pub sessions: u64,
+    /// Buffers of connections.
+    pub connections: u64,
+}
+
+impl MemoryBound {
+    /// Of a service with these settings.
+    pub fn of(config: &Config) -> Self {
+        let count = |n: usize| n as u64;
+        let images = count(config.max_frames) * WORKING_IMAGE;
+        // A body is copied once on its way, from the connection's buffer or out of base64.
+        let worker = config
+            .max_frame_memory
+            .max(2 * count(config.max_body_bytes))
+            + WORKER;
+        Self {
+            uploads: count(config.max_upload_bytes),
+            // There are quick and slow workers, and as many threads may wait between two frames. Each has a copy of its
+            // session's targets.
+            work: count(config.worker_count())
+                * (2 * (worker + WORKER) + 3 * (images + count(MAX_LIST_BYTES))),
+            sessions: count(config.session_bytes()),
+            connections: count(config.max_connections) * (2 * count(MAX_BUFFER_BYTES) + CONNECTION),
+        }
+    }
+
+    /// All parts together, with the program itself.
+    pub fn total(&self) -> u64 {
+        PROGRAM + self.uploads + self.work + self.sessions + self.connections
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_grows_with_every_setting_that_it_is_made_of() {
+        let config = || Config {
+            workers: Some(2),
+            ..Config::default()
+        };
+        let total = |config: &Config| MemoryBound::of(config).total();
+        let with = |change: &dyn Fn(&mut Config)| {
+            let mut config = config();
+            change(&mut config);
+            total(&config)
+        };
+        let before = total(&config());
+        assert_eq!(with(&|c| c.max_upload_bytes += 1 << 20), before + (1 << 20));
+        assert_eq!(with(&|c| c.max_frame_memory += 1 << 20), before + (4 << 20));
+        assert!(with(&|c| c.workers = Some(3)) > before);
+        assert!(with(&|c| c.max_sessions += 1) > before);
+        assert!(with(&|c| c.max_connections += 1) > before);
+    }
+}

@@ -1,0 +1,69 @@
+//! A request with frames for a live session.
+
+use super::admit::admit;
+use super::settings::Settings;
+use super::texts::Texts;
+use super::uploaded::Upload;
+use crate::http::middleware::base_path::client_path;
+use crate::http::middleware::request_id;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::resources::session_path::SessionPath;
+use crate::http::respond::response_format::AnswerForm;
+use crate::http::service::newest::renew_if_busy;
+use crate::http::service::state::AppState;
+use crate::sessions::{QueuePermit, SessionPermit};
+use axum::extract::{FromRequest, FromRequestParts, Request};
+
+/// A request with frames for a live session, with its permits.
+#[derive(Debug)]
+pub struct SessionRequest<S> {
+    /// Who sends it.
+    pub client: Client,
+    /// The form of the answer.
+    pub form: AnswerForm,
+    /// The path of the request, as its client knows it.
+    pub path: String,
+    /// The id of the request.
+    pub request_id: String,
+    /// The permit of the session.
+    pub permit: SessionPermit,
+    /// The place in the queue.
+    pub queue: QueuePermit,
+    /// The frames and settings.
+    pub upload: Upload<S>,
+}
+
+impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
+        let texts = Texts::of_query::<S>(request.uri())?;
+        let (uri, request_id) = (client_path(&request), request_id::of(&request));
+        let (mut parts, body) = request.into_parts();
+        let path = SessionPath::from_request_parts(&mut parts, state).await?;
+        let permit = path.find(state).await?.enter()?;
+        let (client, form) = (Client::of(&parts), AnswerForm::of(&parts.headers));
+        let read = async {
+            let admitted = admit(state, &parts)?;
+            let request = Request::from_parts(parts, body);
+            Upload::read(state, admitted, texts, request).await
+        };
+        let (upload, queue) = match read.await {
+            Ok(read) => read,
+            Err(problem) => {
+                renew_if_busy(state, permit.session(), &problem).await;
+                return Err(problem);
+            }
+        };
+        Ok(Self {
+            client,
+            form,
+            path: uri,
+            request_id,
+            permit,
+            queue,
+            upload,
+        })
+    }
+}

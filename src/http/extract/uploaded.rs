@@ -1,0 +1,164 @@
+//! The frames and settings of a request, whichever form they came in.
+
+use super::body;
+use super::fields::Fields;
+use super::json;
+use super::multipart;
+use super::pace::{Pace, PacedBody};
+use super::settings::{FrameCount, Settings};
+use super::texts::Texts;
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::clients::RequestPermit;
+use crate::http::resources::snapshot::MEDIA_TYPE;
+use crate::http::service::state::AppState;
+use crate::http::service::work;
+use crate::ingest::video::{VideoFormat, video_format};
+use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
+use axum::body::{Body, Bytes};
+use axum::extract::Request;
+use axum::http::header::CONTENT_TYPE;
+use std::sync::Arc;
+
+/// What curl calls a body, whatever it is.
+const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
+/// Least bytes of a body that is told to have lost some.
+const MIN_STRIPPED: usize = 256;
+
+const STRIPPED: &str =
+    "The file has lost its line breaks and zeros, as `curl -d` does: use `--data-binary @file`.";
+
+const VIDEO: &str = "A video goes to `POST /sessions/{id}/frames`, one in a request, after a picture has opened the \
+    session. Here send a JPEG, PNG or WebP image.";
+
+/// What a client uploaded.
+#[derive(Debug)]
+pub struct Upload<S> {
+    /// The files as sent, in order; at least one, none of them empty.
+    pub files: Vec<Bytes>,
+    /// The settings, from the query and the body.
+    pub settings: S,
+    /// The snapshot beside the files.
+    pub snapshot: Option<Bytes>,
+    /// How the only file is stored, where it is a video.
+    pub video: Option<VideoFormat>,
+    /// Whether the content type says that the file is a session snapshot.
+    pub is_snapshot: bool,
+}
+
+impl<S: Settings> Upload<S> {
+    /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
+    /// their names. JSON is parsed on a worker. The place holds `permit` and the memory of the files until the request's
+    /// work has ended.
+    ///
+    /// # Errors
+    /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
+    /// has sent too many frames lately.
+    pub async fn read(
+        state: &AppState,
+        permit: RequestPermit,
+        texts: Texts,
+        request: Request,
+    ) -> Result<(Self, QueuePermit), Problem> {
+        let max_bytes = state.config.max_body_bytes;
+        let pace = Pace::of(&state.config.limits);
+        let new_charge = || ByteCharge::new(&state.uploads, permit.bytes());
+        let mut charge = new_charge();
+        let max_files = match S::FRAMES {
+            FrameCount::One => 1,
+            FrameCount::Several => state.config.max_frames,
+        };
+        let media_type = media_type(&request);
+        let mut fields = Fields {
+            files: Vec::new(),
+            snapshot: None,
+            texts: Texts::default(),
+        };
+        let mut json = None;
+        if media_type == "multipart/form-data" {
+            // The parser keeps bytes that it has not given out yet; they are charged beside the files.
+            let arriving = Some(new_charge());
+            let request = request.map(|body| Body::new(PacedBody::new(body, pace, arriving)));
+            let takes = S::TAKES_SNAPSHOT;
+            multipart::read(
+                request,
+                max_bytes,
+                max_files,
+                takes,
+                &mut fields,
+                &mut charge,
+            )
+            .await?;
+        } else {
+            let body = Body::new(PacedBody::new(request.into_body(), pace, None));
+            let bytes = body::read(body, max_bytes, &mut charge).await?;
+            // No image and no snapshot starts like a JSON object, which curl's -d mislabels too.
+            if media_type == "application/json" || bytes.starts_with(b"{") {
+                charge.grow(json::DECODED_PER_BYTE * bytes.len())?;
+                json = Some(bytes);
+            } else if media_type == FORM_URLENCODED && is_stripped(&bytes) {
+                return Err(Problem::new(Kind::FrameDamaged, STRIPPED));
+            } else if !bytes.is_empty() {
+                fields.files.push(bytes);
+            }
+        }
+        let (lane, permit) = (permit.lane(), Arc::new(permit));
+        let held = Box::new((charge, permit.clone()));
+        let queue = state.admission.enter(lane, held)?;
+        if let Some(bytes) = json {
+            let parse = move |_: &mut WorkMeter| {
+                json::read::<S>(&bytes, max_files, &mut fields)?;
+                Ok(fields)
+            };
+            fields = work::run(state, queue.clone(), parse).await?;
+        }
+        let Fields {
+            files,
+            snapshot,
+            texts: own,
+        } = fields;
+        check_files(&files, max_files)?;
+        let formats = files.iter().map(|file| video_format(file, &media_type));
+        let video = formats.flatten().next();
+        if video.is_some() && (!S::TAKES_VIDEO || files.len() > 1) {
+            return Err(Problem::new(Kind::UnsupportedImage, VIDEO));
+        }
+        let upload = Self {
+            settings: own.or(texts).parse()?,
+            is_snapshot: media_type == MEDIA_TYPE,
+            snapshot,
+            video,
+            files,
+        };
+        if upload.video.is_none() {
+            permit.count_frames(upload.files.len())?;
+        }
+        Ok((upload, queue))
+    }
+}
+
+/// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.
+fn is_stripped(bytes: &[u8]) -> bool {
+    let is_lost = |byte: &u8| matches!(byte, 0 | b'\n' | b'\r');
+    bytes.len() >= MIN_STRIPPED && !bytes.iter().any(is_lost)
+}
+
+fn check_files(files: &[Bytes], max_files: usize) -> Result<(), Problem> {
+    if files.len() > max_files {
+        return Err(Problem::too_many_frames(max_files));
+    }
+    if files.is_empty() {
+        return Err(Problem::missing_frame());
+    }
+    match files.iter().position(Bytes::is_empty) {
+        Some(empty) => Err(Problem::missing_frame().of_frame(empty, files.len())),
+        None => Ok(()),
+    }
+}
+
+fn media_type(request: &Request) -> String {
+    let value = request.headers().get(CONTENT_TYPE);
+    let text = value.and_then(|value| value.to_str().ok()).unwrap_or("");
+    let essence = text.split(';').next().unwrap_or("");
+    essence.trim().to_ascii_lowercase()
+}

@@ -1,0 +1,56 @@
+//! Notes which client a request is from, and tells the client what is left of its quotas.
+
+use super::forwarded::address;
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::{Client, Peer};
+use crate::http::service::state::AppState;
+use axum::extract::{Request, State};
+use axum::middleware::Next;
+use axum::response::Response;
+use std::net::{IpAddr, Ipv4Addr};
+use std::time::Duration;
+use tracing::Span;
+
+/// How long an answer that refuses a client for its quota is held back.
+const REFUSAL_DELAY: Duration = Duration::from_millis(250);
+
+/// The client's address, as far as proxies are trusted.
+#[derive(Debug, Clone, Copy)]
+struct ClientAddress(IpAddr);
+
+/// Notes the address of the client that a request is from.
+pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
+    let peer = request.extensions().get::<Peer>();
+    let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
+    let trusted = &state.config.limits.trusted_proxies;
+    let address = address(peer, request.headers(), trusted);
+    request.extensions_mut().insert(ClientAddress(address));
+    address
+}
+
+/// The middleware. A request that has its client already keeps it.
+pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
+    match request.extensions().get::<Client>() {
+        Some(Client::Key(name)) => {
+            Span::current().record("key", &**name);
+        }
+        Some(Client::Address(_)) => {}
+        None => {
+            let noted = request.extensions().get::<ClientAddress>().copied();
+            let address = noted.map_or(Ipv4Addr::UNSPECIFIED.into(), |noted| noted.0);
+            request.extensions_mut().insert(Client::at(address));
+        }
+    }
+    let client = request.extensions().get::<Client>().cloned();
+    let mut response = next.run(request).await;
+    let problem = response.extensions().get::<Problem>();
+    if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
+        // Whoever does not wait before it asks again costs the network threads time.
+        tokio::time::sleep(REFUSAL_DELAY).await;
+    }
+    if let Some(client) = client {
+        state.clients.write_headers(&client, response.headers_mut());
+    }
+    response
+}

@@ -1,0 +1,21 @@
+//! The layers that requests pass through before their handlers. [`router`](super::router) gives their order.
+//!
+//! In: a request. Out: the request, with what the layer found in its extensions, or a response in its place.
+//!
+//! What can go wrong: a client says that it is another (`X-Forwarded-For` counts only from a trusted proxy), or reads no
+//! answer because it is still sending its body ([`lingering_close`]).
+
+pub mod answer_problems;
+pub mod base_path;
+pub mod client_identity;
+pub mod cors;
+pub mod draining;
+#[cfg(feature = "otel")]
+pub mod exported_span;
+pub mod forwarded;
+pub mod lingering_close;
+pub mod request_id;
+pub mod request_log;
+pub mod security_headers;
+pub mod single_host;
+pub mod trace_context;

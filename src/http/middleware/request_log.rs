@@ -1,0 +1,97 @@
+//! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
+//!
+//! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
+//! the method, and the path: never bytes or boxes, no more of the
+//! path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
+//! only where `debug` is asked for.
+
+use super::client_identity::note_address;
+use super::request_id;
+use super::trace_context::{TRACEPARENT, TraceContext};
+use crate::http::service::state::AppState;
+use crate::sessions::short_id;
+use axum::extract::{Request, State};
+use axum::middleware::Next;
+use axum::response::Response;
+use std::net::IpAddr;
+use std::time::Instant;
+use tracing::field::Empty;
+use tracing::{Instrument, Level, Span};
+use uuid::Uuid;
+
+/// Bytes of a path that are logged.
+const MAX_LOGGED_PATH: usize = 200;
+const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
+
+/// The middleware.
+pub async fn log_request(
+    State(state): State<AppState>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let started = Instant::now();
+    let is_probe = PROBES.contains(&request.uri().path());
+    let address = note_address(&state, &mut request);
+    let (span, context) = (
+        span(&request, is_probe, address),
+        TraceContext::of(request.headers()),
+    );
+    #[cfg(feature = "otel")]
+    let context = super::exported_span::join(&span, &request, context);
+    span.record("trace", context.trace_id());
+    let mut response = next.run(request).instrument(span.clone()).await;
+    response.headers_mut().insert(TRACEPARENT, context.header());
+    let (status, ms) = (
+        response.status().as_u16(),
+        started.elapsed().as_secs_f64() * 1e3,
+    );
+    #[cfg(feature = "otel")]
+    super::exported_span::answered(&span, status);
+    span.in_scope(|| match is_probe {
+        true => tracing::debug!(status, ms, "answered"),
+        false => tracing::info!(status, ms, "answered"),
+    });
+    response
+}
+
+fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
+    let id = request_id::of(request);
+    let (method, path) = (request.method(), logged(request.uri().path()));
+    match is_probe {
+        true => {
+            tracing::span!(Level::DEBUG, "request", id, trace = Empty, %client, key = Empty, %method, path)
+        }
+        false => {
+            tracing::span!(Level::INFO, "request", id, trace = Empty, %client, key = Empty, %method, path)
+        }
+    }
+}
+
+/// The path as it is logged.
+fn logged(path: &str) -> String {
+    let path = path.get(..MAX_LOGGED_PATH).unwrap_or(path);
+    let shown = path
+        .split('/')
+        .map(|segment| match segment.parse::<Uuid>() {
+            Ok(id) => short_id(id),
+            Err(_) => segment.to_owned(),
+        });
+    shown.collect::<Vec<String>>().join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_shortened_however_they_are_written() {
+        for id in [
+            "67e55044-10b1-426f-9247-bb680e5fe0c8",
+            "67E5504410B1426F9247BB680E5FE0C8",
+        ] {
+            let path = format!("/sessions/{id}/frames");
+            assert_eq!(logged(&path), "/sessions/67e55044…/frames");
+        }
+        assert_eq!(logged("/healthz"), "/healthz");
+    }
+}

@@ -1,0 +1,186 @@
+//! A connection's bytes, with what hyper's own handling of them lacks.
+//!
+//! - *A client that takes an answer slowly*, or nothing of it, is let go.
+//! - *A client that has closed its side* may still wait for its answer, or have gone: TCP does not tell. It gets some
+//!   time for the answer to a whole request; then it counts as gone, and its request is dropped. Whether the request is
+//!   whole shows when its handler has read the body, for which there is a moment.
+//! - *hyper's own answers* to heads that it cannot read get a problem document.
+
+use super::activity::Activity;
+use super::head_problems;
+use super::least_rate::LeastRate;
+use crate::http::service::state::AppState;
+use std::io::{self, IoSlice};
+use std::net::IpAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::TcpStream;
+use tokio::time::{Instant, Sleep, sleep_until};
+
+/// Time for a handler to read the body that has come.
+const READING: Duration = Duration::from_millis(500);
+
+/// The stream of a connection.
+#[derive(Debug)]
+pub struct ConnectionIo {
+    stream: TcpStream,
+    client: IpAddr,
+    activity: Arc<Activity>,
+    state: AppState,
+    /// At which the client takes answers.
+    rate: LeastRate,
+    half_close_timeout: Duration,
+    /// Set when the client has closed its side: since when, and what wakes the connection.
+    half_closed: Option<(Instant, Pin<Box<Sleep>>)>,
+    /// What is written in place of an answer of hyper's own, and how much of it is written.
+    document: Vec<u8>,
+    written: usize,
+}
+
+impl ConnectionIo {
+    /// For a stream to this client, whose service tells `activity` what it does.
+    pub fn new(
+        stream: TcpStream,
+        client: IpAddr,
+        activity: Arc<Activity>,
+        state: AppState,
+    ) -> Self {
+        let limits = &state.config.limits;
+        Self {
+            stream,
+            client,
+            activity,
+            rate: LeastRate::new(limits.write_timeout, limits.min_answer_rate),
+            half_close_timeout: limits.half_close_timeout,
+            state,
+            half_closed: None,
+            document: Vec::new(),
+            written: 0,
+        }
+    }
+
+    /// Whether `bytes` are an answer of hyper's own. Then its document is to be written.
+    fn takes_over(&mut self, bytes: &[u8]) -> bool {
+        if self.activity.idle_since().is_none() {
+            return false;
+        }
+        match head_problems::problem_of(bytes) {
+            Some(problem) => {
+                let metrics = &self.state.metrics;
+                self.document = head_problems::answer_of(&problem, self.client, metrics);
+                self.written = 0;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// What came of writing: an error where the client is too slow.
+    fn paced(
+        &mut self,
+        cx: &mut Context<'_>,
+        written: Poll<io::Result<usize>>,
+    ) -> Poll<io::Result<usize>> {
+        match &written {
+            Poll::Ready(Ok(bytes)) => self.rate.moved(*bytes),
+            Poll::Ready(Err(_)) => {}
+            Poll::Pending => {
+                ready!(self.rate.poll_late(cx));
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
+        written
+    }
+
+    fn poll_bytes(&mut self, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        self.paced(cx, written)
+    }
+
+    fn poll_document(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        while self.written < self.document.len() {
+            let rest = &self.document[self.written..];
+            let written = Pin::new(&mut self.stream).poll_write(cx, rest);
+            let written = ready!(self.paced(cx, written))?;
+            if written == 0 {
+                return Poll::Ready(Err(io::ErrorKind::WriteZero.into()));
+            }
+            self.written += written;
+        }
+        Poll::Ready(Ok(()))
+    }
+}
+
+impl AsyncRead for ConnectionIo {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        ready!(Pin::new(&mut self.stream).poll_read(cx, buffer))?;
+        let is_closed = buffer.filled().len() == before && buffer.remaining() > 0;
+        let waits = self.activity.idle_since().is_none() && !self.activity.is_stream();
+        if is_closed && waits {
+            let patience = match self.activity.is_answering() {
+                true => self.half_close_timeout,
+                false => self.half_close_timeout.min(READING),
+            };
+            let (since, gone) = self.half_closed.get_or_insert_with(|| {
+                let now = Instant::now();
+                (now, Box::pin(sleep_until(now)))
+            });
+            if gone.deadline() != *since + patience {
+                gone.as_mut().reset(*since + patience);
+            }
+            ready!(gone.as_mut().poll(cx));
+        }
+        Poll::Ready(Ok(()))
+    }
+}
+
+impl AsyncWrite for ConnectionIo {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_document(cx))?;
+        if self.takes_over(bytes) {
+            return Poll::Ready(Ok(bytes.len()));
+        }
+        self.poll_bytes(cx, bytes)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        ready!(self.poll_document(cx))?;
+        if let [bytes] = slices
+            && self.takes_over(bytes)
+        {
+            return Poll::Ready(Ok(bytes.len()));
+        }
+        let written = Pin::new(&mut self.stream).poll_write_vectored(cx, slices);
+        self.paced(cx, written)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_document(cx))?;
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        ready!(self.poll_document(cx))?;
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

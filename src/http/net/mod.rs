@@ -1,0 +1,14 @@
+//! The network: listening, connections, and how slowly a client may read and write.
+//!
+//! In: sockets. Out: requests for the [router](super::router), and their responses.
+//!
+//! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, or keeps idle ones.
+//! [`least_rate`] and the time limit for heads bound the first, [`connections`] the others.
+
+pub mod activity;
+pub mod connection_hold;
+pub mod connection_io;
+pub mod connections;
+pub mod head_problems;
+pub mod least_rate;
+pub mod server;

@@ -1,0 +1,271 @@
+//! Accepting connections, and ending.
+//!
+//! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
+//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a
+//! bounded time to end.
+
+use super::connection_hold::ConnectionHold;
+use super::connection_io::ConnectionIo;
+use super::connections::{Connections, NoRoom};
+use super::head_problems;
+use crate::http::auth::access::{Access, AccessError};
+use crate::http::auth::keys::ApiKeys;
+use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
+use crate::http::config::service::Config;
+use crate::http::config::store::SharedStore;
+use crate::http::config::validation::ConfigError;
+use crate::http::middleware::forwarded::is_trusted;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Peer;
+use crate::http::router::router;
+use crate::http::service::state::AppState;
+use crate::http::service::stored_writes;
+use crate::sessions::Clock;
+use axum::body::Body;
+use axum::{Extension, Router};
+use hyper::Request;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::io::{self, Write};
+use std::net::SocketAddr;
+use std::pin::pin;
+use std::time::Duration;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+use tokio::time::{interval, sleep, timeout};
+
+/// How long to wait before looking for room again.
+const RETRY: Duration = Duration::from_millis(100);
+
+/// Why the service could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum BindError {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The keys cannot be used, or the service would be open to a network.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The system gives no threads.
+    #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
+    Workers(io::Error),
+}
+
+/// How a service ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shutdown {
+    /// After the configured delay, in which sessions are still served.
+    Gradual,
+    /// Without the delay.
+    Prompt,
+}
+
+impl From<()> for Shutdown {
+    fn from((): ()) -> Self {
+        Self::Gradual
+    }
+}
+
+/// The service, bound to its address.
+#[derive(Debug)]
+pub struct Application {
+    listener: TcpListener,
+    state: AppState,
+    extra: Router,
+}
+
+impl Application {
+    /// Listens on the configured address.
+    ///
+    /// # Errors
+    /// See [`BindError`].
+    pub async fn bind(config: Config) -> Result<Self, BindError> {
+        Self::bind_with_clock(config, Clock::default()).await
+    }
+
+    /// Like [`Self::bind`], with the clock that sessions expire by.
+    ///
+    /// # Errors
+    /// See [`BindError`].
+    pub async fn bind_with_clock(config: Config, clock: Clock) -> Result<Self, BindError> {
+        config.validate()?;
+        let address = config.listen;
+        let access = Access::load(&config.access, address)?;
+        let listener = TcpListener::bind(address).await;
+        let store = SharedStore::connect(&config.store).await;
+        Ok(Self {
+            listener: listener.map_err(|source| BindError::Listen { address, source })?,
+            state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
+            extra: Router::new(),
+        })
+    }
+
+    /// The address that the service listens on.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// The API keys, to read them again.
+    pub fn api_keys(&self) -> ApiKeys {
+        self.state.access.keys.clone()
+    }
+
+    /// Serves these routes too: behind the layers that all requests pass, but not behind those that ask for a key, or
+    /// check the origin and the host.
+    pub fn with_routes(mut self, routes: Router) -> Self {
+        self.extra = self.extra.merge(routes);
+        self
+    }
+
+    /// The routes alone, as a client on this machine meets them. Fuzzing sends more requests a second than connections
+    /// can be opened.
+    #[cfg(fuzzing)]
+    pub fn into_router(self) -> Router {
+        let peer = Peer(SocketAddr::from(([127, 0, 0, 1], 1)));
+        router(self.state, self.extra).layer(Extension(peer))
+    }
+
+    /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
+    /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests get
+    /// the configured time to end; then they are cut off. Returns whether all of them ended in time.
+    pub async fn serve<S: Into<Shutdown>>(self, shutdown: impl Future<Output = S>) -> bool {
+        let Self {
+            listener,
+            state,
+            extra,
+        } = self;
+        let config = &state.config;
+        let (ending, _) = watch::channel(false);
+        let (keep_alive, cut_off) = watch::channel(());
+        let sweeper = tokio::spawn(sweep(state.clone()));
+        {
+            let service = router(state.clone(), extra);
+            let accepting = accept(&listener, &state, service, &ending, cut_off);
+            let mut accepting = pin!(accepting);
+            tokio::select! {
+                () = &mut accepting => {}
+                how = shutdown => {
+                    tracing::info!("shutting down");
+                    state.drain();
+                    tokio::spawn({
+                        let state = state.clone();
+                        async move { stored_writes::flush(&state).await }
+                    });
+                    // New connections are still served: a load balancer asks for /readyz on them.
+                    if how.into() == Shutdown::Gradual {
+                        let _ = timeout(config.shutdown_delay, accepting).await;
+                    }
+                }
+            }
+        }
+        drop(listener);
+        sweeper.abort();
+        ending.send_replace(true);
+        // Each connection, and each stream that took one over, holds a receiver.
+        let ended = timeout(config.shutdown_timeout, ending.closed()).await;
+        drop(keep_alive);
+        stored_writes::flush(&state).await;
+        ended.is_ok()
+    }
+}
+
+/// Accepts connections for ever. They end when `cut_off` loses its sender.
+async fn accept(
+    listener: &TcpListener,
+    state: &AppState,
+    service: Router,
+    ending: &watch::Sender<bool>,
+    cut_off: watch::Receiver<()>,
+) {
+    let (config, limits) = (&state.config, &state.config.limits);
+    let of_address = limits.client_connections;
+    let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
+    let connections = Connections::new(
+        config.max_connections,
+        of_address,
+        state.metrics.shed_connections.clone(),
+    );
+    let mut builder = http1::Builder::new();
+    builder
+        .timer(TokioTimer::new())
+        .max_buf_size(MAX_BUFFER_BYTES)
+        .header_read_timeout(config.header_timeout);
+    loop {
+        let (stream, peer) = match listener.accept().await {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                // Mostly too many open files: wait for connections to end.
+                tracing::warn!(%error, "cannot accept");
+                sleep(RETRY).await;
+                continue;
+            }
+        };
+        let is_proxy = is_trusted(peer.ip().to_canonical(), &limits.trusted_proxies);
+        let permit = loop {
+            match connections.enter(peer.ip(), is_proxy) {
+                Err(NoRoom::All) => {
+                    let _ = timeout(RETRY, connections.ended.notified()).await;
+                }
+                other => break other,
+            }
+        };
+        let Ok(permit) = permit else {
+            refuse(stream, peer, state);
+            continue;
+        };
+        if let Err(error) = stream.set_nodelay(true) {
+            tracing::debug!(%error, "cannot set TCP_NODELAY");
+        }
+        let activity = permit.activity.clone();
+        let io = ConnectionIo::new(stream, peer.ip(), activity.clone(), state.clone());
+        let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
+        let service = service.clone().layer(Extension(Peer(peer)));
+        let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
+        let watched = service_fn(move |request: Request<Incoming>| {
+            let activity = activity.clone();
+            let request = request.map(|body| activity.receive(Body::new(body)));
+            let answer = service.call(request);
+            async move { answer.await.map(|answer| activity.answer(answer)) }
+        });
+        let connection = builder.serve_connection(TokioIo::new(io), watched);
+        tokio::spawn(hold.serve(connection.with_upgrades()));
+    }
+}
+
+/// Tells a client that it has too many connections, as far as its system takes that at once.
+fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
+    let problem = Problem::too_many_connections();
+    let answer = head_problems::answer_of(&problem, peer.ip(), &state.metrics);
+    if let Ok(mut stream) = stream.into_std() {
+        // It does not wait: the stream is not in blocking mode.
+        let _ = stream.write(&answer);
+    }
+}
+
+async fn sweep(state: AppState) {
+    let idle = state.config.session_idle;
+    let mut ticks = interval((idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30)));
+    loop {
+        ticks.tick().await;
+        let expired = state.registry.sweep();
+        state.prune();
+        state.metrics.upkeep();
+        if expired > 0 {
+            tracing::info!(expired, live = state.registry.len(), "sessions expired");
+        }
+    }
+}

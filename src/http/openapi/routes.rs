@@ -1,0 +1,98 @@
+//! The routes that are in the OpenAPI document, and what the document says of the service as a whole.
+
+use crate::http::problems::document::ProblemDocument;
+use crate::http::resources::bag_picture;
+use crate::http::resources::correction;
+use crate::http::resources::create;
+use crate::http::resources::create_named;
+use crate::http::resources::cvat;
+use crate::http::resources::frames;
+use crate::http::resources::health;
+use crate::http::resources::metrics;
+use crate::http::resources::session;
+use crate::http::resources::snapshot;
+use crate::http::resources::token;
+use crate::http::resources::track;
+use crate::http::service::state::AppState;
+use crate::http::stream::handshake;
+use utoipa::OpenApi;
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+#[derive(utoipa::OpenApi)]
+#[openapi(
+    info(
+        title = "bagtrack",
+        description = "Follows one object through the frames that you upload. The first frame and a box open a \
+            session; every further frame gets a box back.\n\n\
+            A frame is sent as a raw body (the settings are in the query), as `multipart/form-data`, or as JSON \
+            with base64. Its type is taken from its bytes: JPEG, PNG or WebP. Boxes are in the pixels of the \
+            uploaded frame. Every error is a problem document (RFC 9457) and leaves the session as it was, but for \
+            `work-timeout`, which says what to do. Paths that do not exist answer `route-not-found` (404). \
+            Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
+            to hosts that are not allowed `host-not-allowed` (421).\n\n\
+            Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \
+            While the service is about to end, all answers have the header `Draining: true`.",
+        contact(name = "The authors of bagtrack")
+    ),
+    servers((url = "/", description = "The service that this document comes from")),
+    tags(
+        (name = "sessions", description = "Open a session, send frames, end it"),
+        (name = "integrations", description = "The calls of annotation tools"),
+        (name = "service", description = "The service itself")
+    ),
+    components(schemas(ProblemDocument)),
+    modifiers(&Bearer),
+    // A service without keys needs none.
+    security((), ("bearer" = []))
+)]
+struct Api;
+
+struct Bearer;
+
+impl utoipa::Modify for Bearer {
+    fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
+        let text = "An API key, or a session token, which is good for one session. Needed where the service has keys.";
+        let scheme = HttpBuilder::new().scheme(HttpAuthScheme::Bearer);
+        let scheme = SecurityScheme::Http(scheme.description(Some(text)).build());
+        let components = document.components.get_or_insert_default();
+        components.add_security_scheme("bearer", scheme);
+    }
+}
+
+/// The routes of sessions, with what the document says about them.
+pub fn sessions() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(create::create))
+        .routes(routes!(session::get, session::delete, create_named::put))
+        .routes(routes!(frames::post))
+        .routes(routes!(correction::put))
+        .routes(routes!(snapshot::get))
+        .routes(routes!(bag_picture::get))
+        .routes(routes!(token::create))
+        .routes(routes!(track::post))
+        .routes(routes!(cvat::post))
+        .routes(routes!(handshake::open))
+}
+
+/// `/metrics`.
+pub fn metrics() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(metrics::get))
+}
+
+/// The probes, which everybody may use.
+pub fn probes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(health::live))
+        .routes(routes!(health::ready))
+}
+
+/// What the handlers say; the document has more.
+pub fn handlers() -> utoipa::openapi::OpenApi {
+    OpenApiRouter::with_openapi(Api::openapi())
+        .merge(sessions())
+        .merge(metrics())
+        .merge(probes())
+        .into_openapi()
+}

@@ -1,0 +1,127 @@
+//! `PUT /sessions/{id}/target`: the user corrects the box.
+
+use crate::http::extract::session_request::SessionRequest;
+use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::openapi::example_frames;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::{Answer, replayed_header};
+use crate::http::respond::json::Json;
+use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
+use crate::http::service::advance::{Answered, GivenBox, NextFrames};
+use crate::http::service::advance_session::advance_session;
+use crate::http::service::frame_order::wait_for_turn;
+use crate::http::service::state::AppState;
+use axum::extract::State;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+
+/// The settings of a correction.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct TargetSettings {
+    /// The corrected box: `x,y,width,height`, or a JSON object with these names. In the query or in the
+    /// body; that of the body counts.
+    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
+    #[schema(value_type = BoxInput, inline, required = false)]
+    r#box: Option<TargetBox>,
+    /// The number of this frame; see `POST /sessions/{id}/frames`.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    frame: Option<WholeNumber>,
+    /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    target: Option<WholeNumber>,
+}
+
+impl Settings for TargetSettings {
+    const FRAMES: FrameCount = FrameCount::One;
+    const SCHEMA_PREFIX: &'static str = "Target";
+}
+
+type TargetForm = FormBody<TargetSettings>;
+type TargetJson = JsonBody<TargetSettings>;
+
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    problem_responses::SESSION,
+    &[
+        Kind::MissingBox,
+        Kind::FrameOutOfOrder,
+        Kind::NotInOrder,
+        Kind::FrameDiffers,
+        Kind::FrameSizeMismatch,
+        Kind::InvalidBox,
+        Kind::SessionBusy,
+    ]
+);
+
+/// Correct the box
+///
+/// The frame counts as the session's next frame, with the box given as its answer. The tracker keeps what it knew of
+/// the target and gains the new look. To correct the answer to a frame, send that frame again here; it gets a new
+/// number.
+///
+/// `curl -X PUT --data-binary @frame.jpg 'http://localhost:8080/sessions/$ID/target?box=12,22,30,40'`
+#[utoipa::path(
+    put, path = "/sessions/{id}/target", tag = "sessions", operation_id = "putTarget",
+    params(
+        ("id" = Uuid, Path, description = "The session's id"),
+        TargetSettings,
+    ),
+    request_body(
+        description = "The frame in one of three forms.",
+        content(
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
+            (TargetForm = "multipart/form-data"),
+            (
+                TargetJson = "application/json",
+                example = json!({
+                    "frame": example_frames::next(),
+                    "box": {"x": 12, "y": 22, "width": 30, "height": 40}
+                })
+            ),
+        )
+    ),
+    responses(
+        (
+            status = 200, description = "The correction is taken", body = Answer,
+            headers(
+                ("Replayed" = bool, description = "`true` where this answer was given before"),
+                ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
+                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
+        ),
+        Problems
+    )
+)]
+pub async fn put(
+    State(state): State<AppState>,
+    request: SessionRequest<TargetSettings>,
+) -> Result<Response, Problem> {
+    let settings = request.upload.settings;
+    let to = settings.r#box.ok_or_else(Problem::missing_box)?;
+    let target = settings.target.map(|number| number.as_index());
+    let number = settings.frame.map(|number| number.0);
+    let next = NextFrames::posted(number, request.upload.files, Some(GivenBox { target, to }));
+    let targets = request.permit.session().target_count();
+    let queue = request.queue.for_frames(targets);
+    let (permit, client) = (request.permit, request.client);
+    let queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
+    let Answered {
+        estimates,
+        replayed,
+        durability,
+        ..
+    } = advance_session(&state, permit, queue, &client, next).await?;
+    let answer = Json(Answer::from(&estimates[0])).into_response();
+    let frame = estimates[0].first().frame;
+    Ok(durability.write(frame, replayed_header(replayed, answer)))
+}

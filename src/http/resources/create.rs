@@ -1,0 +1,83 @@
+//! `POST /sessions`: a first frame and a box, or a snapshot, open a session.
+
+use super::create_request::{CreateRequest, CreateSettings};
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
+use crate::http::openapi::{example_frames, param_limits};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::service::open_once::open_once;
+use crate::http::service::opening::CreatedSession;
+use crate::http::service::state::AppState;
+use axum::extract::State;
+use axum::response::Response;
+
+/// The form of a request to open a session.
+pub type CreateForm = FormBody<CreateSettings>;
+/// The JSON of a request to open a session.
+pub type CreateJson = JsonBody<CreateSettings>;
+
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    &[
+        Kind::Unauthorized,
+        Kind::Forbidden,
+        Kind::MissingBox,
+        Kind::InvalidBox,
+        Kind::InvalidParameter,
+        Kind::InvalidSnapshot,
+        Kind::IdempotencyKeyReused,
+        Kind::TooManySessions,
+        Kind::NotReady,
+        Kind::StoreUnavailable,
+    ]
+);
+
+/// Open a session
+#[utoipa::path(
+    post, path = "/sessions", tag = "sessions", operation_id = "createSession",
+    description = param_limits::create_description(),
+    params(
+        CreateSettings,
+        (
+            "Idempotency-Key" = Option<String>, Header, nullable = false, min_length = 1, max_length = 255,
+            pattern = "^[!-~]+$",
+            description = "A text of your own, a new one for each session: the same request with the same key gets \
+                the same answer as long as the session lives, and opens no second one."
+        )
+    ),
+    request_body(
+        description = "The first frame in one of three forms, or a snapshot.",
+        content(
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
+            (CreateForm = "multipart/form-data"),
+            (
+                CreateJson = "application/json",
+                example = json!({
+                    "frame": example_frames::first(),
+                    "box": {"x": 10, "y": 20, "width": 30, "height": 40},
+                    "seed": 7
+                })
+            ),
+            (BinaryBody = "application/vnd.bagtrack.snapshot"),
+        )
+    ),
+    responses(
+        (
+            status = 201, description = "The session is open", body = CreatedSession,
+            headers(
+                ("Location" = String, description = "The session's path"),
+                ("Replayed" = bool, description = "`true` where this answer was given before")
+            )
+        ),
+        Problems
+    )
+)]
+pub async fn create(
+    State(state): State<AppState>,
+    request: CreateRequest,
+) -> Result<Response, Problem> {
+    open_once(&state, request).await
+}

@@ -1,0 +1,172 @@
+//! A request to open a session, as it is read.
+
+use crate::http::auth::caller::Caller;
+use crate::http::extract::admit::admit;
+use crate::http::extract::overrides::{ParamOverrides, PresetName};
+use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::switch::Switch;
+use crate::http::extract::texts::Texts;
+use crate::http::extract::uploaded::Upload;
+use crate::http::openapi::params_schema::ParametersText;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::quotas::clients::Account;
+use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
+use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes};
+use crate::http::service::idempotency::{self, OpeningName};
+use crate::http::service::state::AppState;
+use crate::sessions::{Fingerprint, QueuePermit};
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::request::Parts;
+use serde::Deserialize;
+use std::sync::Arc;
+use uuid::Uuid;
+
+/// The settings of a new session.
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct CreateSettings {
+    /// The target's box: `x,y,width,height`, or a JSON object with these names. In the query or in the
+    /// body; that of the body counts.
+    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
+    #[schema(value_type = BoxInput, inline, required = false)]
+    pub r#box: Option<TargetBox>,
+    /// In place of `box`, the boxes of several targets, at most 16: `x,y,width,height;x,y,width,height`, or a JSON
+    /// array of boxes. Then answers have an array `targets`, in this order.
+    #[param(value_type = BoxesText, inline, required = false)]
+    #[schema(value_type = BoxesInput, inline, required = false)]
+    pub boxes: Option<TargetBoxes>,
+    /// `robust` (the default) or `paper`.
+    #[param(nullable = false)]
+    pub preset: Option<PresetName>,
+    /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    pub seed: Option<WholeNumber>,
+    /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
+    /// together; see the call.
+    #[serde(rename = "parameters")]
+    #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
+    pub params: Option<ParamOverrides>,
+    /// Whether the answer names the tracker's parameters.
+    #[param(value_type = bool, required = false, default = false)]
+    #[schema(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    pub verbose: Switch,
+}
+
+impl Settings for CreateSettings {
+    const FRAMES: FrameCount = FrameCount::One;
+    const SCHEMA_PREFIX: &'static str = "Create";
+}
+
+/// A request to open a session, with its place in the queue.
+#[derive(Debug)]
+pub struct CreateRequest {
+    /// Who opens it.
+    pub caller: Caller,
+    /// Where it comes from.
+    pub client: Client,
+    /// What the client calls the session, where it gives it a name.
+    pub name: Option<OpeningName>,
+    /// What the client has in use.
+    pub account: Arc<Account>,
+    /// The place in the queue.
+    pub queue: QueuePermit,
+    /// The frame and the settings.
+    pub upload: Upload<CreateSettings>,
+}
+
+impl FromRequest<AppState> for CreateRequest {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
+        let texts = Texts::of_query::<CreateSettings>(request.uri())?;
+        let (mut parts, body) = request.into_parts();
+        let caller = Caller::from_request_parts(&mut parts, state).await?;
+        caller.require_key()?;
+        let key = idempotency::key_of(&parts.headers)?;
+        let name = match (id_of_path(&mut parts).await?, key) {
+            (Some(_), Some(_)) => {
+                let detail = "The id in the path stands for the `Idempotency-Key`; leave that out.";
+                return Err(Problem::malformed(detail));
+            }
+            (Some(id), None) => Some(OpeningName::Id(id)),
+            (None, Some(key)) => {
+                let key = scoped(key, state, &Client::of(&parts));
+                Some(OpeningName::Key(caller.owner().clone(), key))
+            }
+            (None, None) => None,
+        };
+        let client = Client::of(&parts);
+        let account = state.clients.account(&client);
+        // A request that comes again may have its answer already.
+        if name.is_none() {
+            check_room(state, &account)?;
+        }
+        let admitted = admit(state, &parts)?;
+        let request = Request::from_parts(parts, body);
+        let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
+        Ok(Self {
+            caller,
+            client,
+            name,
+            account,
+            queue,
+            upload,
+        })
+    }
+}
+
+impl CreateRequest {
+    /// A digest of the frame and the settings, whichever form they came in. It is compared with others of this version
+    /// only.
+    pub fn digest(&self) -> [u8; 32] {
+        let (file, upload) = (Fingerprint::of(&self.upload.files[0]), &self.upload);
+        let CreateSettings {
+            r#box,
+            boxes,
+            preset,
+            seed,
+            params,
+            // Another request for the same session.
+            verbose: _,
+        } = &upload.settings;
+        let settings = (r#box, boxes, preset, seed, params);
+        let text = format!("{file:?} {settings:?} {}", upload.is_snapshot);
+        *blake3::hash(text.as_bytes()).as_bytes()
+    }
+}
+
+/// Refuses new sessions where there is no room for them, or when the service is about to end.
+///
+/// # Errors
+/// `too-many-sessions`, `quota-exceeded` and `not-ready`.
+pub fn check_room(state: &AppState, account: &Account) -> Result<(), Problem> {
+    if state.is_draining() {
+        return Err(Problem::not_ready());
+    }
+    state.registry.check_room()?;
+    account.check_session()
+}
+
+/// An idempotency key as it is kept. Each client has keys of its own: where there are no API keys, which tell clients
+/// apart otherwise, each address.
+fn scoped(key: String, state: &AppState, client: &Client) -> String {
+    match client {
+        Client::Address(address) if !state.access.keys.are_needed() => format!("{address} {key}"),
+        _ => key,
+    }
+}
+
+/// The id that the client made, where the path has one.
+async fn id_of_path(parts: &mut Parts) -> Result<Option<Uuid>, Problem> {
+    match Option::<Path<String>>::from_request_parts(parts, &()).await {
+        Ok(None) => Ok(None),
+        Ok(Some(Path(id))) if id.parse::<Uuid>().is_ok() => Ok(id.parse().ok()),
+        _ => Err(Problem::malformed(
+            "The id in the path must be a UUID, like 67e55044-10b1-426f-9247-bb680e5fe0c8.",
+        )),
+    }
+}

@@ -1,0 +1,186 @@
+//! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
+
+use super::snapshot::charged;
+use crate::http::extract::session_request::SessionRequest;
+use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::switch::Switch;
+use crate::http::openapi::example_frames;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::annotated_image::answer_drawn;
+use crate::http::respond::answer::{FrameAnswers, answer_bytes, replayed_header};
+use crate::http::respond::json;
+use crate::http::respond::ndjson::{FrameSource, LineWork};
+use crate::http::respond::response_format::AnswerForm;
+use crate::http::service::advance::NextFrames;
+use crate::http::service::advance_session::advance_session;
+use crate::http::service::frame_order::wait_for_turn;
+use crate::http::service::state::AppState;
+use crate::http::service::video_frames::VideoFrames;
+use crate::http::service::video_place::VideoPlace;
+use crate::sessions::ByteCharge;
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// The settings of a request with the next frames.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct FramesSettings {
+    /// The number of the (first) frame of this request.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    frame: Option<WholeNumber>,
+    /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
+    /// has the answer as JSON.
+    #[serde(default)]
+    #[param(value_type = bool, required = false, default = false)]
+    #[schema(value_type = bool, required = false, default = false)]
+    draw: Switch,
+}
+
+impl Settings for FramesSettings {
+    const FRAMES: FrameCount = FrameCount::Several;
+    const TAKES_VIDEO: bool = true;
+    const SCHEMA_PREFIX: &'static str = "Frames";
+}
+
+type FramesForm = FormBody<FramesSettings>;
+type FramesJson = JsonBody<FramesSettings>;
+
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    problem_responses::SESSION,
+    &[
+        Kind::FrameOutOfOrder,
+        Kind::NotInOrder,
+        Kind::FrameDiffers,
+        Kind::FrameSizeMismatch,
+        Kind::SessionBusy,
+        Kind::RequestTooCostly,
+    ]
+);
+
+/// Send the next frame, or several
+///
+/// The answer is that to the last frame. Where several were sent, in order, `answers` has one for each of them. All
+/// frames of a request are decoded before the first is tracked: if one is bad, none is taken. In a session that was
+/// opened with `boxes` an answer has an array `targets`, in the order of the boxes, and its own box is the first's.
+///
+/// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
+/// number is processed, one that comes a little early waits for its turn, and the last request's numbers with the same
+/// bytes get the stored answers again, with the header `Replayed: true`.
+///
+/// With `Accept: application/x-ndjson` each frame is answered by a line of JSON as soon as it is tracked. Frames before
+/// one that is refused count then; its problem document is the last line. So is a video answered, where the service has
+/// an `ffmpeg`. With `Accept: image/png` or `draw` the answer is the frame with boxes, scores and particles drawn on it.
+///
+/// `curl --data-binary @next.jpg http://localhost:8080/sessions/$ID/frames`
+#[utoipa::path(
+    post, path = "/sessions/{id}/frames", tag = "sessions", operation_id = "postFrames",
+    params(
+        ("id" = Uuid, Path, description = "The session's id"),
+        FramesSettings,
+    ),
+    request_body(
+        description = "The frame in one of three forms; the second and third take several.",
+        content(
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
+            (BinaryBody = "video/mp4"), (BinaryBody = "video/webm"), (BinaryBody = "image/gif"),
+            (BinaryBody = "video/x-motion-jpeg"),
+            (FramesForm = "multipart/form-data"),
+            (FramesJson = "application/json", example = json!({"frame": example_frames::next()})),
+        )
+    ),
+    responses(
+        (
+            status = 200, description = "Where the target is",
+            content(
+                (FrameAnswers = "application/json"), (String = "application/x-ndjson"), (BinaryBody = "image/png")
+            ),
+            headers(
+                ("Replayed" = bool, description = "`true` where these answers were given before"),
+                ("Answer" = String, description = "With a picture: the answer as JSON"),
+                ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
+                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
+                ("Draining" = bool, description = "`true` where the service is about to end")
+            )
+        ),
+        Problems
+    )
+)]
+pub async fn post(
+    State(state): State<AppState>,
+    request: SessionRequest<FramesSettings>,
+) -> Result<Response, Problem> {
+    let SessionRequest {
+        client,
+        form,
+        path,
+        request_id,
+        permit,
+        queue,
+        upload,
+    } = request;
+    let number = upload.settings.frame.map(|number| number.0);
+    let form = match upload.settings.draw.0 {
+        true => AnswerForm::Picture,
+        false => form,
+    };
+    let mut queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
+    let (mut files, targets) = (upload.files, permit.session().target_count());
+    let frames = match (upload.video, form) {
+        (Some(_), AnswerForm::Picture) => {
+            let detail = "A drawn answer is one picture; leave out `draw` for a video.";
+            return Err(Problem::malformed(detail));
+        }
+        (Some(format), _) => {
+            let video = files.swap_remove(0);
+            let place;
+            (place, queue) = VideoPlace::take(&state, &client, queue).await?;
+            FrameSource::Video(VideoFrames::decode(&state, video, format, place)?)
+        }
+        (None, AnswerForm::Lines) => FrameSource::of_files(&state, queue.clone(), files).await?,
+        (None, AnswerForm::Picture) => {
+            let next = NextFrames::posted(number, files, None);
+            let queue = queue.for_frames(targets);
+            return answer_drawn(&state, permit, queue, &client, next).await;
+        }
+        (None, AnswerForm::Json) => {
+            let queue = queue.for_frames(files.len() * targets);
+            let account = state.clients.account(&client);
+            // Before the frames are tracked: what cannot be answered must not count.
+            let mut charge = ByteCharge::new(&state.uploads, account.bytes());
+            charge.grow(answer_bytes(files.len(), targets))?;
+            let next = NextFrames::posted(number, files, None);
+            let answered = advance_session(&state, permit, queue, &client, next).await?;
+            let answers = json::line(&FrameAnswers::from(&answered.estimates[..]));
+            let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
+            charge.shrink(answers.len());
+            let headers = [(CONTENT_TYPE, "application/json")];
+            let answers = (headers, charged(answers, charge)).into_response();
+            let response = replayed_header(answered.replayed, answers);
+            let last = answered.estimates.last();
+            let last = last.map_or(0, |last| last.first().frame);
+            return Ok(answered.durability.write(last, response));
+        }
+    };
+    let work = LineWork {
+        queue: queue.for_frames(targets),
+        state,
+        permit,
+        client,
+        frames,
+        number,
+        path,
+        request_id,
+    };
+    work.answer().await
+}

@@ -1,0 +1,66 @@
+//! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
+
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::json::Json;
+use crate::http::service::state::AppState;
+use crate::sessions::StoreAway;
+use axum::extract::State;
+use serde::Serialize;
+
+/// The service runs.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct Health {
+    /// Always `ok`.
+    #[schema(example = "ok")]
+    status: &'static str,
+}
+
+const OK: Json<Health> = Json(Health { status: "ok" });
+
+operation_problems!(LiveProblems, problem_responses::ALWAYS);
+
+operation_problems!(ReadyProblems, problem_responses::ALWAYS, &[Kind::NotReady]);
+
+/// Whether the process runs
+///
+/// Answers as long as the process can answer at all. A supervisor may end it when this does not come.
+#[utoipa::path(
+    get, path = "/healthz", tag = "service", operation_id = "getHealth", security(()),
+    responses((status = 200, description = "It runs", body = Health), LiveProblems)
+)]
+pub async fn live() -> Json<Health> {
+    OK
+}
+
+/// Whether the service wants requests
+///
+/// A load balancer should send none while this answers 503: the service was asked to end, its queue or its memory for
+/// bodies is full, or the store of its sessions gives no answer or takes no writes. What was full counts as full until
+/// half of it is free.
+#[utoipa::path(
+    get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
+    responses((status = 200, description = "It does", body = Health), ReadyProblems)
+)]
+pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Problem> {
+    if state.is_draining() {
+        return Err(Problem::not_ready());
+    }
+    if let Some(store) = &state.store
+        && !store.best_effort
+        && !store.calls.is_ready()
+    {
+        return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));
+    }
+    let (places, bytes) = (state.admission.queue_places(), state.uploads.left());
+    let queue = state.queue_saturation.update(places, state.config.queue);
+    let uploads = state
+        .upload_saturation
+        .update(bytes, state.config.max_upload_bytes);
+    match (queue, uploads) {
+        (true, _) => Err(Problem::saturated("The queue is full.")),
+        (_, true) => Err(Problem::saturated("The memory for bodies is used up.")),
+        (false, false) => Ok(OK),
+    }
+}

@@ -1,0 +1,19 @@
+//! The resources of the interface, a file each: extract the request, do one act, respond.
+//!
+//! In: requests that passed the layers. Out: responses or problems, by the types in `extract`, `respond` and
+//! `problems`.
+
+pub mod bag_picture;
+pub mod correction;
+pub mod create;
+pub mod create_named;
+pub mod create_request;
+pub mod cvat;
+pub mod frames;
+pub mod health;
+pub mod metrics;
+pub mod session;
+pub mod session_path;
+pub mod snapshot;
+pub mod token;
+pub mod track;

@@ -1,0 +1,96 @@
+//! `GET` and `DELETE /sessions/{id}`.
+
+use super::session_path::SessionPath;
+use crate::http::extract::overrides::ParamOverrides;
+use crate::http::extract::texts::refuse_query;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::{Answer, ImageSize};
+use crate::http::respond::json::Json;
+use crate::http::service::state::AppState;
+use crate::http::service::stored;
+use crate::tracker::Params;
+use axum::extract::State;
+use axum::http::{StatusCode, Uri};
+use serde::Serialize;
+use uuid::Uuid;
+
+/// The state of a session.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct SessionView {
+    /// The session's id.
+    id: Uuid,
+    /// Frames taken, the first one included.
+    #[schema(example = 2)]
+    frames: u64,
+    /// The last answer.
+    answer: Answer,
+    /// The size that all frames of the session have.
+    image: ImageSize,
+    /// The tracker's parameters; with `boxes` the seed is that of the first target.
+    #[serde(rename = "parameters")]
+    #[schema(value_type = ParamOverrides)]
+    params: Params,
+    /// When the session ends if no frame comes (RFC 3339); this request does not move it on.
+    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
+    expires_at: String,
+}
+
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[Kind::MalformedRequest]
+);
+
+/// See where a session stands
+///
+/// Answers at once, also while a frame is being tracked.
+#[utoipa::path(
+    get, path = "/sessions/{id}", tag = "sessions", operation_id = "getSession",
+    params(("id" = Uuid, Path, description = "The session's id")),
+    responses((status = 200, description = "The session", body = SessionView), Problems)
+)]
+pub async fn get(
+    State(state): State<AppState>,
+    path: SessionPath,
+    uri: Uri,
+) -> Result<Json<SessionView>, Problem> {
+    refuse_query(&uri)?;
+    let session = path.find_newest(&state).await?;
+    let latest = session.latest();
+    Ok(Json(SessionView {
+        id: session.id(),
+        frames: latest.first().frame + 1,
+        answer: (&latest).into(),
+        image: session.source_size().into(),
+        params: session.params().clone(),
+        expires_at: state.expires_at(&session),
+    }))
+}
+
+/// End a session
+///
+/// A frame that is being tracked still gets its answer; frames that wait do not.
+#[utoipa::path(
+    delete, path = "/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
+    params(("id" = Uuid, Path, description = "The session's id")),
+    responses((status = 204, description = "The session has ended"), Problems)
+)]
+pub async fn delete(
+    State(state): State<AppState>,
+    path: SessionPath,
+    uri: Uri,
+) -> Result<StatusCode, Problem> {
+    refuse_query(&uri)?;
+    // What is in memory may be a session that had the id before.
+    for _ in 0..2 {
+        let session = path.find(&state).await?;
+        if stored::end(&state, &session).await? {
+            tracing::info!(session = session.short_id(), "deleted");
+            return Ok(StatusCode::NO_CONTENT);
+        }
+    }
+    Err(Problem::session_not_found())
+}

@@ -1,0 +1,52 @@
+//! The `{id}` of a session's path.
+
+use crate::http::auth::caller::Caller;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::service::newest;
+use crate::http::service::state::AppState;
+use crate::http::service::stored;
+use crate::sessions::Session;
+use axum::extract::{FromRequestParts, Path};
+use axum::http::request::Parts;
+use std::sync::Arc;
+
+/// The id as it stands in the path, and who asks for it. It is looked up by [`SessionPath::find`], after the rest of the
+/// request head has been checked.
+pub struct SessionPath {
+    id: String,
+    caller: Caller,
+    client: Client,
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        // Bytes that are not UTF-8 are the id of no session.
+        let caller = Caller::from_request_parts(parts, state).await?;
+        let path = Path::<String>::from_request_parts(parts, state).await;
+        let client = Client::of(parts);
+        path.map(|Path(id)| Self { id, caller, client })
+            .map_err(|_| Problem::session_not_found())
+    }
+}
+
+impl SessionPath {
+    /// The caller's live session of this id. Text that is not an id is the id of no session.
+    pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
+        match self.id.parse() {
+            Ok(id) if self.caller.may_use(id) => {
+                stored::find(state, id, self.caller.owner(), &self.client).await
+            }
+            _ => Err(Problem::session_not_found()),
+        }
+    }
+
+    /// The same, with its last answer up to the store's.
+    pub async fn find_newest(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
+        let session = self.find(state).await?;
+        newest::refresh(state, &session, &self.client).await?;
+        Ok(session)
+    }
+}

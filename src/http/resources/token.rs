@@ -1,0 +1,94 @@
+//! `POST /sessions/{id}/token`: a token with which a web page may use this session, and nothing else.
+
+use super::session_path::SessionPath;
+use crate::http::auth::caller::Caller;
+use crate::http::auth::token::SessionToken;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::json::Json;
+use crate::http::service::state::AppState;
+use axum::extract::{Query, State};
+use axum::http::Uri;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+const DEFAULT_SECONDS: u32 = 3600;
+const MAX_SECONDS: u32 = 86_400;
+
+/// The settings of a token.
+#[derive(Debug, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct TokenSettings {
+    /// Seconds that the token is good for.
+    #[param(
+        required = false,
+        nullable = false,
+        minimum = 1,
+        maximum = 86_400,
+        default = 3600
+    )]
+    seconds: Option<u32>,
+}
+
+/// A session token.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct TokenView {
+    /// The token, to be sent as `Authorization: Bearer …`.
+    token: String,
+    /// When it ends (RFC 3339), if the session lives so long.
+    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
+    expires_at: String,
+}
+
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    problem_responses::SESSION,
+    &[Kind::MalformedRequest, Kind::Forbidden]
+);
+
+/// Make a session token
+///
+/// A web page should not hold an API key. Whoever has one opens a session and gives the page a token for it: the page
+/// may then send frames, read, correct, copy and end this session, and do nothing else.
+#[utoipa::path(
+    post, path = "/sessions/{id}/token", tag = "sessions", operation_id = "createToken",
+    params(
+        ("id" = Uuid, Path, description = "The session's id"),
+        TokenSettings,
+    ),
+    responses((status = 200, description = "The token", body = TokenView), Problems)
+)]
+pub async fn create(
+    State(state): State<AppState>,
+    caller: Caller,
+    path: SessionPath,
+    uri: Uri,
+) -> Result<Json<TokenView>, Problem> {
+    let seconds = seconds(&uri)?;
+    caller.require_key()?;
+    let session = path.find(&state).await?;
+    let expires = state.now() + Duration::from_secs(seconds.into());
+    let token = state.access.tokens.sign(&SessionToken {
+        session: session.id(),
+        owner: session.owner().clone(),
+        expires,
+    });
+    Ok(Json(TokenView {
+        token,
+        expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
+    }))
+}
+
+fn seconds(uri: &Uri) -> Result<u32, Problem> {
+    let Query(TokenSettings { seconds }) = Query::try_from_uri(uri)
+        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
+    match seconds.unwrap_or(DEFAULT_SECONDS) {
+        seconds @ 1..=MAX_SECONDS => Ok(seconds),
+        _ => Err(Problem::malformed(format!(
+            "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
+        ))),
+    }
+}

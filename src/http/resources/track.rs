@@ -1,0 +1,218 @@
+//! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
+
+use super::snapshot::charged;
+use crate::http::auth::caller::Caller;
+use crate::http::extract::admit::admit;
+use crate::http::extract::overrides::{ParamOverrides, PresetName};
+use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::texts::Texts;
+use crate::http::extract::uploaded::Upload;
+use crate::http::openapi::example_frames;
+use crate::http::openapi::params_schema::ParametersText;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::{FrameAnswers, answer_bytes};
+use crate::http::respond::json;
+use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
+use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::service::advance::{self, GivenBox, NextFrames};
+use crate::http::service::first_frame::FirstFrame;
+use crate::http::service::state::AppState;
+use crate::http::service::work;
+use crate::sessions::{ByteCharge, SessionState, WorkMeter};
+use axum::extract::{FromRequestParts, Request, State};
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The settings of a request without a session.
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct TrackSettings {
+    /// Without a snapshot, the target's box in the first frame; with one, a correction, as in
+    /// `PUT /sessions/{id}/target`: `x,y,width,height`, or a JSON object with these names.
+    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
+    #[schema(value_type = BoxInput, inline, required = false)]
+    r#box: Option<TargetBox>,
+    /// In place of `box`, the boxes of several targets; see `POST /sessions`. Only without a snapshot.
+    #[param(value_type = BoxesText, inline, required = false)]
+    #[schema(value_type = BoxesInput, inline, required = false)]
+    boxes: Option<TargetBoxes>,
+    /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    target: Option<WholeNumber>,
+    /// `robust` (the default) or `paper`. Only without a snapshot.
+    #[param(nullable = false)]
+    preset: Option<PresetName>,
+    /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
+    /// snapshot.
+    #[param(value_type = NumberText, inline, required = false)]
+    #[schema(value_type = NumberInput, inline, required = false)]
+    seed: Option<WholeNumber>,
+    /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
+    #[serde(rename = "parameters")]
+    #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
+    params: Option<ParamOverrides>,
+}
+
+impl Settings for TrackSettings {
+    const FRAMES: FrameCount = FrameCount::Several;
+    const TAKES_SNAPSHOT: bool = true;
+    const SCHEMA_PREFIX: &'static str = "Track";
+}
+
+type TrackForm = FormBody<TrackSettings>;
+type TrackJson = JsonBody<TrackSettings>;
+
+/// The answers to the frames, and the track up to there.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct Tracked {
+    /// The answers.
+    #[serde(flatten)]
+    answers: FrameAnswers,
+    /// The track up to here as base64, to be sent with the next frame.
+    #[schema(content_encoding = "base64", example = "iWJhZ3RyYWNrDQo…")]
+    snapshot: String,
+}
+
+operation_problems!(
+    Problems,
+    problem_responses::UPLOAD,
+    &[
+        Kind::Unauthorized,
+        Kind::Forbidden,
+        Kind::MissingBox,
+        Kind::InvalidBox,
+        Kind::InvalidParameter,
+        Kind::InvalidSnapshot,
+        Kind::FrameSizeMismatch,
+        Kind::RequestTooCostly,
+    ]
+);
+
+/// Track without a session
+///
+/// A first frame and a box begin a track. Every answer has a snapshot, which goes with the next frame, to this instance
+/// or to another one with the same secret (`BAGTRACK_SNAPSHOT_KEYS`). Nothing is kept here, so the same request gets
+/// the same answer again, but for the random seed of a new track.
+///
+/// `curl -F frame=@next.jpg -F snapshot=@last.snapshot http://localhost:8080/track`
+#[utoipa::path(
+    post, path = "/track", tag = "sessions", operation_id = "track",
+    params(TrackSettings),
+    request_body(
+        description = "The frames and the snapshot. A raw frame begins a track.",
+        content(
+            (TrackForm = "multipart/form-data"),
+            (
+                TrackJson = "application/json",
+                example = json!({
+                    "frames": [example_frames::first(), example_frames::next()],
+                    "box": {"x": 10, "y": 20, "width": 30, "height": 40},
+                    "seed": 7
+                })
+            ),
+            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
+            (BinaryBody = "application/octet-stream"),
+        )
+    ),
+    responses(
+        (status = 200, description = "Where the target is, and the new snapshot", body = Tracked),
+        Problems
+    )
+)]
+pub async fn post(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
+    let texts = Texts::of_query::<TrackSettings>(request.uri())?;
+    let (mut parts, body) = request.into_parts();
+    let caller = Caller::from_request_parts(&mut parts, &state).await?;
+    caller.require_key()?;
+    let admitted = admit(&state, &parts)?;
+    let mut charge = ByteCharge::new(&state.uploads, admitted.bytes());
+    let request = Request::from_parts(parts, body);
+    let (upload, queue) = Upload::read(&state, admitted, texts, request).await?;
+    let queue = queue.for_frames(upload.files.len());
+    let worker = state.clone();
+    let track = move |meter: &mut WorkMeter| {
+        let body = track(&worker, upload, meter, &mut charge)?;
+        Ok((body, charge))
+    };
+    let (body, charge) = work::run(&state, queue, track).await?;
+    Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
+}
+
+/// The body of the answer, whose memory is charged before it is taken.
+fn track(
+    state: &AppState,
+    upload: Upload<TrackSettings>,
+    meter: &mut WorkMeter,
+    charge: &mut ByteCharge,
+) -> Result<Vec<u8>, Problem> {
+    let keys = &state.access.snapshots;
+    let (mut estimates, mut files) = (Vec::new(), upload.files);
+    let (mut track, correction) = match &upload.snapshot {
+        Some(snapshot) => {
+            let allowed = TrackSettings {
+                r#box: upload.settings.r#box,
+                target: upload.settings.target,
+                ..TrackSettings::default()
+            };
+            if upload.settings != allowed {
+                let detail = "A snapshot holds the parameters; leave out all settings but `box` and `target`.";
+                return Err(Problem::malformed(detail));
+            }
+            if files.len() > 1 && allowed.r#box.is_some() {
+                let detail = "A box corrects one frame; send the others in another request.";
+                return Err(Problem::malformed(detail));
+            }
+            let track = SessionState::restore(snapshot, keys, state.config.max_frames)?;
+            let target = allowed.target.map(|number| number.as_index());
+            let correction = allowed.r#box.map(|to| GivenBox { target, to });
+            (track, correction)
+        }
+        None => {
+            advance::check_pixels(&files, &state.config.request_limits())?;
+            let first = files.remove(0);
+            let track = begin(upload.settings)?.begin(state, &first, meter)?;
+            estimates.push(track.latest());
+            (track, None)
+        }
+    };
+    if !files.is_empty() {
+        let next = NextFrames::posted(None, files, correction);
+        let limits = state.config.request_limits();
+        let answered = next.advance_state(&mut track, &limits, meter, &state.metrics.tracking)?;
+        estimates.extend(answered.estimates);
+    }
+    let snapshot = track.snapshot(keys);
+    // It is there as base64, and once more in the body.
+    let text = snapshot.len().div_ceil(3) * 4;
+    charge.grow(2 * text + answer_bytes(estimates.len(), track.target_count()))?;
+    let tracked = Tracked {
+        answers: FrameAnswers::from(&estimates[..]),
+        snapshot: STANDARD.encode(snapshot),
+    };
+    let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;
+    charge.shrink(body.len());
+    Ok(body)
+}
+
+/// What a new track begins with.
+fn begin(settings: TrackSettings) -> Result<FirstFrame, Problem> {
+    if settings.target.is_some() {
+        let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
+        return Err(Problem::malformed(detail));
+    }
+    Ok(FirstFrame {
+        boxes: boxes_of(settings.r#box, settings.boxes.as_ref())?,
+        preset: settings.preset,
+        seed: settings.seed,
+        params: settings.params,
+    })
+}
