@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use bagtrack_ingest::{self, IngestError, Limits};
+use bagtrack_ingest::{self as ingest, IngestError, Limits};
 use bagtrack_tracker::{Frame, Preset, Rect, Tracker};
 
 use crate::clock;

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use bagtrack_ingest::{self, Limits};
+use bagtrack_ingest::{self as ingest, Limits};
 use bagtrack_tracker::{Frame, Params, Preset, Tracker};
 use jpeg_encoder::{ColorType, Encoder};
 

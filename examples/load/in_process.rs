@@ -1,6 +1,6 @@
 //! The baseline of the service: decoding and tracking in this process, on one thread.
 
-use bagtrack_ingest::{self, Limits};
+use bagtrack_ingest::{self as ingest, Limits};
 use bagtrack_tracker::{Preset, Rect, Tracker};
 
 use crate::Outcome;

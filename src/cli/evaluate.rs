@@ -11,7 +11,11 @@ const PROGRAM: &str = "bagtrack-eval";
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The arguments of `bagtrack-eval`.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+    #[arg(
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "ARGUMENTS"
+    )]
     arguments: Vec<OsString>,
 }
 
@@ -27,6 +31,9 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 /// The program beside this one, or else the one on the path.
 fn program() -> PathBuf {
     let this = std::env::current_exe().ok();
-    let beside = this.map(|this| this.with_file_name(format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX)));
-    beside.filter(|path| path.is_file()).unwrap_or_else(|| PROGRAM.into())
+    let beside =
+        this.map(|this| this.with_file_name(format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX)));
+    beside
+        .filter(|path| path.is_file())
+        .unwrap_or_else(|| PROGRAM.into())
 }

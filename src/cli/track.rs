@@ -1,11 +1,11 @@
 //! `bagtrack track`.
 
-use bagtrack_cli::{BOXES, ParamFlags, read_boxes};
-use bagtrack_cli::progress;
 use super::track_frames::Frames;
 use super::track_writer::Writer;
 use bagtrack::ingest::{self, Limits};
 use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
+use bagtrack_cli::progress;
+use bagtrack_cli::{BOXES, ParamFlags, read_boxes};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! What `--help` says: commands on one screen, and the parameters that `--set` takes.
 
-use bagtrack_tracker::{Params, Preset};
 use crate::command::succeeds;
+use bagtrack_tracker::{Params, Preset};
 use serde_json::Value;
 
 /// The lines of the long help after the flags, in words.

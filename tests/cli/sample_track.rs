@@ -1,7 +1,7 @@
 //! `bagtrack sample` and `bagtrack track`, as a person types them.
 
-use bagtrack_tracker::Rect;
 use crate::command::{bagtrack, clip, fails, folder, succeeds, text};
+use bagtrack_tracker::Rect;
 use serde_json::Value;
 use std::fs;
 

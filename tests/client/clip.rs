@@ -1,9 +1,9 @@
 //! The sample clip, and what the library says of it.
 
-use bagtrack_ingest::{self, Limits};
+use bagtrack_client::Answer;
+use bagtrack_ingest::{self as ingest, Limits};
 use bagtrack_sample::{Clip as Sample, Format, Settings};
 use bagtrack_tracker::{Estimate, Preset, Rect, Status, Tracker};
-use bagtrack_client::Answer;
 use serde_json::{Value, json};
 use std::sync::LazyLock;
 

@@ -1,7 +1,7 @@
 //! Real video over HTTP.
 
 use crate::application::{TestApplication, expect};
-use bagtrack_ingest::{self, Limits};
+use bagtrack_ingest::{self as ingest, Limits};
 use bagtrack_tracker::{Estimate, Preset, Rect, Tracker};
 use reqwest::StatusCode;
 use serde_json::Value;

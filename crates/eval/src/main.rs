@@ -5,8 +5,8 @@
 use bagtrack_cli::{ParamFlags, frames, output, progress, read_boxes};
 use bagtrack_eval::plots::{self, Evaluated};
 use bagtrack_eval::{
-    Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns,
-    Variant, ablation, parse_sweep, results,
+    Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns, Variant,
+    ablation, parse_sweep, results,
 };
 use bagtrack_ingest::Limits;
 use bagtrack_tracker::Params;

@@ -27,7 +27,10 @@ pub fn run(name: &str, args: &[&str]) -> Output {
 pub fn success(output: Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
-    assert_eq!(errors, "", "it complains, or draws a progress bar for nobody");
+    assert_eq!(
+        errors, "",
+        "it complains, or draws a progress bar for nobody"
+    );
     String::from_utf8(output.stdout).expect("the output is text")
 }
 

@@ -61,7 +61,9 @@ fn evaluation(criterion: &mut Criterion) {
         })
     });
     criterion.bench_function("textbook", |bencher| {
-        bencher.iter(|| bagtrack_testing::textbook::evaluate(&candidates, black_box(history), &bag, &params))
+        bencher.iter(|| {
+            bagtrack_testing::textbook::evaluate(&candidates, black_box(history), &bag, &params)
+        })
     });
 }
 

@@ -26,17 +26,45 @@
 //! - The draws of a frame depend on the seed and the frame's number alone, so a session that is replayed gives the same
 //!   boxes bit for bit on the same machine.
 //!
-//! ```
-//! use bagtrack_tracker::{Frame, Preset, Rect, Tracker};
+//! A frame is a width, a height and one byte of luma for each pixel, row by row:
 //!
-//! let still = |shift: usize| {
-//!     let luma = (0..64 * 48).map(|i| ((i % 64 + shift) * 7 % 250) as u8).collect();
-//!     Frame::from_luma(64, 48, luma)
-//! };
-//! let mut tracker = Tracker::new(&still(0)?, Rect::new(10.0, 10.0, 20.0, 16.0), Preset::Paper.params())?;
-//! let answer = tracker.step(&still(1)?)?;
-//! println!("frame {}: {:?}, {:.2}", answer.frame, answer.target, answer.score);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//! use bagtrack_tracker::{FrameError, Frame, Preset, Rect, Tracker};
+//!
+//! /// Where the target is in frame `t`: it moves by 2 pixels to the right and 1 down in each frame.
+//! fn target(t: u32) -> Rect {
+//!     Rect::new(40.0 + 2.0 * f64::from(t), 30.0 + f64::from(t), 24.0, 20.0)
+//! }
+//!
+//! /// Draws frame `t`: a bright target with a texture, on a darker ground with another one.
+//! fn frame(t: u32) -> Result<Frame, FrameError> {
+//!     let (left, top) = (40 + 2 * t, 30 + t);
+//!     let mut luma = Vec::new();
+//!     for y in 0..120 {
+//!         for x in 0..160 {
+//!             let is_target = (left..left + 24).contains(&x) && (top..top + 20).contains(&y);
+//!             luma.push(match is_target {
+//!                 true => 150 + (((x - left) * 5) ^ ((y - top) * 9)) as u8 % 100,
+//!                 false => 40 + ((x * 3) ^ (y * 7)) as u8 % 60,
+//!             });
+//!         }
+//!     }
+//!     Frame::from_luma(160, 120, luma)
+//! }
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut tracker = Tracker::new(&frame(0)?, target(0), Preset::Robust.params())?;
+//! for t in 1..10 {
+//!     let estimate = tracker.step(&frame(t)?)?;
+//!     println!("frame {}: {:?}, score {:.2}", estimate.frame, estimate.target, estimate.score);
+//! }
+//! assert!(tracker.estimate().target.overlap(&target(9)) > 0.7);
+//!
+//! // A tracker goes on from its snapshot exactly as it would have gone on itself.
+//! let mut restored = Tracker::restore(&tracker.snapshot())?;
+//! assert_eq!(restored.step(&frame(10)?)?, tracker.step(&frame(10)?)?);
+//! # Ok(())
+//! # }
 //! ```
 
 mod appearance;
@@ -73,10 +101,10 @@ pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
 pub use features::gray::patch;
 pub use grassmann::evaluation::Evaluation;
+pub use image::area_average::area_average;
 pub use image::frame::{Frame, FrameError, FrameFormat};
 pub use image::rect::Rect;
 pub use image::resolution::{MAX_WORKING_SIDE, MIN_WORKING_SIDE};
-pub use image::area_average::area_average;
 pub use image::ycbcr;
 pub use input::MIN_BOX_SIDE;
 pub use params::presets::Preset;

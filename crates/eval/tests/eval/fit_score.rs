@@ -1,6 +1,6 @@
 //! `bagtrack-eval --fit-score`: the coefficients of the score, fitted anew.
 
-use crate::command::{eval, clip, fails, folder, succeeds, text};
+use crate::command::{clip, eval, fails, folder, succeeds, text};
 use serde_json::Value;
 use std::path::Path;
 
@@ -33,7 +33,7 @@ fn the_fit_stands_beside_the_trackers_own_coefficients() {
     let [one, two] = clips(parent.path());
     let fit = |format: &str| {
         succeeds(&[
-                        &one,
+            &one,
             &two,
             "--fit-score",
             "--seeds",
@@ -74,14 +74,7 @@ fn the_fit_stands_beside_the_trackers_own_coefficients() {
         assert!(difference.abs() < 1e-3, "{field}: {difference}");
     }
     // Leaving out the one of two is fitting the other.
-    let alone = succeeds(&[
-                &two,
-        "--fit-score",
-        "--seeds",
-        "2",
-        "--format",
-        "json",
-    ]);
+    let alone = succeeds(&[&two, "--fit-score", "--seeds", "2", "--format", "json"]);
     let alone: Value = serde_json::from_str(&alone).expect("it is JSON");
     let left_out = &report["sequences"][0]["fitted"];
     assert_eq!(left_out["coefficients"], alone["fitted"]["coefficients"]);

@@ -11,4 +11,3 @@ mod sample_scenes;
 mod status;
 mod textbook_video;
 mod videos;
-

@@ -1,6 +1,6 @@
 //! `bagtrack-eval` on sequences that are played backwards, or from a share of their length on.
 
-use crate::command::{eval, clip, fails, folder, succeeds, text};
+use crate::command::{clip, eval, fails, folder, succeeds, text};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -38,7 +38,7 @@ fn json_has_exactly_the_promised_fields_and_the_mean_is_the_mean() {
     let one = clip(parent.path(), "one", 1, 12);
     let two = clip(parent.path(), "two", 2, 6);
     let json = succeeds(&[
-                text(&one),
+        text(&one),
         text(&two),
         "--preset",
         "paper",
@@ -107,7 +107,7 @@ fn jobs_change_the_time_only() {
     let dir = clip(parent.path(), "clip", 0, 12);
     let figures = |jobs: &str| {
         let json = succeeds(&[
-                        text(&dir),
+            text(&dir),
             "--seeds",
             "4",
             "--jobs",
@@ -134,7 +134,7 @@ fn a_tracker_that_cannot_move_is_measured_as_a_box_that_stays() {
     truth += &"0,0,0,0\n".repeat(7);
     fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
     let json = succeeds(&[
-                text(&dir),
+        text(&dir),
         "--format",
         "json",
         "--seeds",

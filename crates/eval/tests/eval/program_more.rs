@@ -239,7 +239,7 @@ fn figures_are_drawn_with_a_curve_for_each_variant() {
     fs::write(&sweep, lines).expect("the folder is writable");
     let draw = || {
         succeeds(&[
-                        text(&dir),
+            text(&dir),
             text(&same_name),
             "--sweep",
             text(&sweep),
@@ -290,11 +290,7 @@ fn figures_are_drawn_with_a_curve_for_each_variant() {
     assert_eq!(draw(), names);
     assert_eq!(read("precision.svg"), precision);
     // A folder that cannot be made is told before the run.
-    let line = fails(&[
-                text(&dir),
-        "--plots",
-        text(&dir.join("img/0001.jpg")),
-    ]);
+    let line = fails(&[text(&dir), "--plots", text(&dir.join("img/0001.jpg"))]);
     assert!(line.contains("0001.jpg"), "{line}");
 }
 

@@ -1,7 +1,7 @@
 //! `bagtrack-eval --results`: the boxes as other toolkits read them.
 
-use bagtrack_cli::parse_boxes;
 use crate::command::{clip, eval, fails, folder, succeeds, text, tracked};
+use bagtrack_cli::parse_boxes;
 use bagtrack_tracker::Preset;
 use std::fs;
 

@@ -1,7 +1,7 @@
 //! The clips in which the target goes out of sight: nothing of it is seen when the clip says so, and something when
 //! not.
 
-use bagtrack_eval::Sequence;
+use bagtrack_cli::read_boxes;
 use bagtrack_sample::{Clip, Format, Scene, Settings};
 use image::RgbImage;
 
@@ -151,7 +151,7 @@ fn frames_out_of_sight_are_not_annotated_in_the_folder() {
     let clip = clip(Scene::Leaves, 1);
     clip.write(parent.path(), Format::Jpeg, || ())
         .expect("the folder is writable");
-    let boxes = Sequence::read_boxes(parent.path()).expect("it was written");
+    let boxes = read_boxes(parent.path()).expect("it was written");
     let visible =
         std::fs::read_to_string(parent.path().join("visible.txt")).expect("it was written");
     let visible: Vec<&str> = visible.lines().collect();

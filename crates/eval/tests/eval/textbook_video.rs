@@ -87,7 +87,8 @@ fn frames_of_real_video_agree() {
                     patch(&frame, &area, &params)
                 })
                 .collect();
-            let textbook = bagtrack_testing::textbook::evaluate(&candidates, &history, &bag, &params);
+            let textbook =
+                bagtrack_testing::textbook::evaluate(&candidates, &history, &bag, &params);
             let shipped = bagtrack_testing::textbook::shipped(&candidates, &history, &bag, &params);
             for (sum, value) in greatest
                 .iter_mut()

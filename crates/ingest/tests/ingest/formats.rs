@@ -1,10 +1,12 @@
 //! Ingest of valid files: every format gives the same luma, the right way up.
 
 use bagtrack_ingest::{Limits, decode};
+use bagtrack_testing::picture_files::{
+    BASELINE, JpegForm, color, encode, exif, gray, jpeg, jpeg_forms, jpeg_of,
+};
 use bagtrack_tracker::Frame;
 use image::{DynamicImage, ImageFormat};
 use jpeg_encoder::ColorType;
-use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, encode, exif, gray, jpeg, jpeg_forms, jpeg_of};
 
 // Small enough that the working image is the picture itself; no multiple of a block.
 const SIZE: (u32, u32) = (101, 75);

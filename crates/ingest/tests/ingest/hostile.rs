@@ -1,8 +1,8 @@
 //! Ingest of damaged and hostile bytes: an error that says what is wrong, never a panic, never a large bill.
 
 use bagtrack_ingest::{IngestError, Limits, decode};
-use image::{DynamicImage, ImageFormat};
 use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, encode, jpeg};
+use image::{DynamicImage, ImageFormat};
 use proptest::prelude::*;
 
 const SMALL: Limits = Limits {

@@ -3,4 +3,3 @@
 mod formats;
 mod hostile;
 mod memory;
-

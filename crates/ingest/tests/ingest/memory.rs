@@ -1,12 +1,12 @@
 //! What decoding one frame allocates, counted by the allocator: never more than `max_memory`.
 
 use bagtrack_ingest::{Limits, decode_to};
+use bagtrack_testing::picture_files::{BASELINE, JpegForm, jpeg, jpeg_of};
 use bagtrack_tracker::FrameFormat;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb, Rgba};
 use jpeg_encoder::{ColorType, SamplingFactor};
-use bagtrack_testing::picture_files::{BASELINE, JpegForm, jpeg, jpeg_of};
 use std::io::{Cursor, Write};
 
 /// Room for the working image, which is no part of the promise.

@@ -52,11 +52,7 @@ pub enum Order {
 }
 
 /// Luma and chroma of an image of `size` in rows of whole pixels.
-pub fn planes(
-    pixels: &[[u8; 3]],
-    size: (u32, u32),
-    order: Order,
-) -> (Vec<u8>, [Vec<u8>; 2]) {
+pub fn planes(pixels: &[[u8; 3]], size: (u32, u32), order: Order) -> (Vec<u8>, [Vec<u8>; 2]) {
     let half = chroma_size(size);
     let half = half.0 as usize * half.1 as usize;
     let mut weights = [LUMA, CHROMA[0], CHROMA[1]];

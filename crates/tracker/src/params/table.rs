@@ -231,7 +231,7 @@ impl Params {
 
 impl Features {
     /// Values of a pixel or a cell.
-    pub(crate) fn channels(self) -> usize {
+    pub fn channels(self) -> usize {
         match self {
             Self::Gray => 1,
             Self::Gradients => CELL_VALUES,

@@ -1,7 +1,7 @@
 //! After warm-up a step allocates nothing: counted by an allocator that counts.
 
-use bagtrack_tracker::{Frame, Params, Preset, Rect, Status, Tracker};
 use bagtrack_testing::scene::{near, panned};
+use bagtrack_tracker::{Frame, Params, Preset, Rect, Status, Tracker};
 
 /// A target that is held: the bag of one that is not is still growing when others are full.
 fn frame(t: usize) -> Frame {

@@ -1,8 +1,8 @@
 //! Input at the edge of what has an answer: a finite box or a typed error, never NaN, never a panic.
 
+use bagtrack_testing::scene::{flat, frame, params, robust, variants};
 use bagtrack_tracker::{Estimate, Frame, MIN_BOX_SIDE, Params, Rect, Tracker, TrackerError};
 use proptest::prelude::*;
-use bagtrack_testing::scene::{flat, frame, params, robust, variants};
 
 fn assert_sound(answer: &Estimate) {
     assert!(answer.target.is_valid(), "{answer:?}");
@@ -147,7 +147,12 @@ fn the_smallest_parameters_and_no_motion() {
         ..params(6)
     };
     for answer in run(&frames, bagtrack_testing::scene::target(0), params) {
-        assert!(answer.target.center_distance(&bagtrack_testing::scene::target(0)) < 1e-9);
+        assert!(
+            answer
+                .target
+                .center_distance(&bagtrack_testing::scene::target(0))
+                < 1e-9
+        );
     }
 }
 

@@ -1,7 +1,7 @@
 //! The tracker through its public surface: what a session may rely on.
 
-use bagtrack_tracker::{Frame, Params, Preset, Rect, Search, Status, Tracker, TrackerError};
 use bagtrack_testing::scene::{flat, frame, params, target};
+use bagtrack_tracker::{Frame, Params, Preset, Rect, Search, Status, Tracker, TrackerError};
 
 fn start(seed: u64) -> Tracker {
     Tracker::new(&frame(0), target(0), params(seed)).expect("a box inside the frame")

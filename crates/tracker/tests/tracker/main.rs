@@ -12,4 +12,3 @@ mod robust;
 mod seen;
 mod snapshot;
 mod textbook_step;
-

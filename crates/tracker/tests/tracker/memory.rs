@@ -1,7 +1,7 @@
 //! What a session keeps between frames, counted by the allocator.
 
-use bagtrack_tracker::{Params, Preset, Tracker};
 use bagtrack_testing::scene::{panned, robust};
+use bagtrack_tracker::{Params, Preset, Tracker};
 
 /// What dropping `tracker` gives back, in bytes.
 fn heap(tracker: Tracker) -> usize {

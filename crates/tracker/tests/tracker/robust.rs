@@ -1,7 +1,7 @@
 //! What the default parameters promise: the target is held, also when the camera swings, and after a correction.
 
-use bagtrack_tracker::{Frame, Params, Preset, Rect, Tracker};
 use bagtrack_testing::scene::{frame, leaping, near, panned, receding, robust, target, tilting};
+use bagtrack_tracker::{Frame, Params, Preset, Rect, Tracker};
 
 /// The mean overlap with the exact boxes of `scene` in its frames from 1 to `last`.
 fn mean_overlap(scene: impl Fn(usize) -> (Frame, Rect), last: usize, params: Params) -> f64 {

@@ -1,7 +1,7 @@
 //! What a step saw, told to those who ask.
 
-use bagtrack_tracker::{Preset, Tracker};
 use bagtrack_testing::scene::{frame, target};
+use bagtrack_tracker::{Preset, Tracker};
 
 #[test]
 fn a_step_that_tells_what_it_saw_answers_like_one_that_does_not() {

@@ -1,8 +1,8 @@
 //! Snapshots: a restored tracker goes on bit for bit, and no bytes can harm the program.
 
+use bagtrack_testing::scene::{frame, params, robust, target};
 use bagtrack_tracker::{Frame, Params, Tracker, TrackerError};
 use proptest::prelude::*;
-use bagtrack_testing::scene::{frame, params, robust, target};
 
 /// A session of some frames, with vectors short enough that random damage hits everything.
 fn session(steps: usize, params: Params) -> Tracker {

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
-use bagtrack_tracker::{AffineSubspace, Frame, Params, Preset, Rect, Tracker, patch};
 use bagtrack_testing::scene::{frame, target};
+use bagtrack_tracker::{AffineSubspace, Frame, Params, Preset, Rect, Tracker, patch};
 
 /// What the textbook remembers of the frames before.
 struct Memory {
@@ -70,7 +70,8 @@ fn every_frame_has_the_textbook_weights_and_answer() {
             .map(|area| patch(&frame, area, &params))
             .collect();
         let bag = memory.bag.make_contiguous().to_vec();
-        let textbook = bagtrack_testing::textbook::evaluate(&candidates, &memory.history(), &bag, &params);
+        let textbook =
+            bagtrack_testing::textbook::evaluate(&candidates, &memory.history(), &bag, &params);
         assert_eq!(weights.len(), textbook.weights.len());
         for (i, (weight, expected)) in weights.iter().zip(&textbook.weights).enumerate() {
             let difference = (weight - expected).abs();

@@ -57,9 +57,7 @@ pub(crate) fn describe_simd<S: Simd, A: Iterator<Item = Rect>>(
 mod tests {
     use super::*;
     use crate::features::hog::cells::{MAX_DIRECTION, MIN_STRENGTH};
-    use crate::features::hog::channels::{
-        CHROMA, DIRECTIONS, GRAY, GRAY_WEIGHT, HALF_CHROMA,
-    };
+    use crate::features::hog::channels::{CHROMA, DIRECTIONS, GRAY, GRAY_WEIGHT, HALF_CHROMA};
     use crate::image::frame::Frame;
     use crate::params::presets::Preset;
 
