@@ -88,7 +88,7 @@ impl Registry {
 
     /// Removes those sessions that were not used for longest, unless they are in use. They go on living in the store.
     fn evict(&self) {
-        let idle = |session: &&Arc<Session>| !session.is_busy() && session.is_stored();
+        let idle = |session: &&Arc<Session>| !session.is_busy() && session.version().is_some();
         let mut oldest: Vec<(Duration, Uuid)> = {
             let sessions = self.map();
             let idle = sessions.values().filter(idle);

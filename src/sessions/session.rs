@@ -166,10 +166,9 @@ impl Session {
         *self.version.lock().unwrap_or_else(PoisonError::into_inner) = version;
     }
 
-    /// Whether the store has the last answer's frame.
-    pub fn is_stored(&self) -> bool {
-        let version = self.version();
-        version.is_some_and(|version| version.frame >= self.latest_frame())
+    /// The last frame whose state is in the store, where there is one.
+    pub fn checkpoint(&self) -> Option<u64> {
+        self.version().map(|version| version.checkpoint)
     }
 
     /// When the session expires unless a frame comes, by its clock.

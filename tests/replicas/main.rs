@@ -8,7 +8,6 @@ mod failures;
 mod incarnations;
 mod lossy;
 mod lost_records;
-mod outage;
 mod pair;
 mod prefix;
 mod refusing;

@@ -10,17 +10,6 @@ use super::flag_values::parse_duration;
 #[cfg(feature = "cli")]
 use super::limits::shown;
 
-/// What is done with a frame while the store gives no answer.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum StoreMode {
-    /// It is refused.
-    #[default]
-    Strict,
-    /// It is tracked in memory, and its answer says `Durable: false`.
-    BestEffort,
-}
-
 /// The store that replicas share. Without one, sessions live in this process only.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -51,12 +40,6 @@ pub struct StoreConfig {
         value_parser = parse_duration
     ))]
     pub store_timeout: Duration,
-    /// While the store gives no answer: `strict` refuses frames, `best-effort` tracks on and says `Durable: false`.
-    #[cfg_attr(feature = "cli", arg(
-        long, env = "BAGTRACK_STORE_MODE", value_enum,
-        default_value_t = StoreConfig::default().store_mode
-    ))]
-    pub store_mode: StoreMode,
     /// What the keys in the store begin with. Services that share a server without sharing sessions have different
     /// ones.
     #[cfg_attr(feature = "cli", arg(
@@ -72,7 +55,6 @@ impl Default for StoreConfig {
             store: None,
             store_every: 1,
             store_timeout: Duration::from_secs(1),
-            store_mode: StoreMode::Strict,
             store_prefix: "bagtrack".to_owned(),
         }
     }
@@ -109,8 +91,6 @@ pub struct SharedStore {
     pub calls: Store,
     /// The state is written at every so many frames.
     pub every: u64,
-    /// Whether frames are tracked while the store gives no answer.
-    pub best_effort: bool,
 }
 
 impl SharedStore {
@@ -125,7 +105,6 @@ impl SharedStore {
         Some(Self {
             calls,
             every: config.store_every,
-            best_effort: config.store_mode == StoreMode::BestEffort,
         })
     }
 }

@@ -44,7 +44,6 @@ pub fn cors(origins: &[String]) -> CorsLayer {
             RATE_LIMIT_POLICY,
             name("replayed"),
             name("checkpoint"),
-            name("durable"),
             ANSWER,
         ])
         .max_age(MAX_AGE)

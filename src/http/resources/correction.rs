@@ -8,6 +8,7 @@ use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, replayed_header};
+use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json::Json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::service::advance::{Answered, GivenBox, NextFrames};
@@ -95,7 +96,6 @@ operation_problems!(
             headers(
                 ("Replayed" = bool, description = "`true` where this answer was given before"),
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
-                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -118,10 +118,12 @@ pub async fn put(
     let Answered {
         estimates,
         replayed,
-        durability,
+        checkpoint,
         ..
     } = advance_session(&state, permit, queue, &client, next).await?;
     let answer = Json(Answer::from(&estimates[0])).into_response();
-    let frame = estimates[0].first().frame;
-    Ok(durability.write(frame, replayed_header(replayed, answer)))
+    Ok(with_checkpoint(
+        checkpoint,
+        replayed_header(replayed, answer),
+    ))
 }

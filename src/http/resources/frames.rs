@@ -11,6 +11,7 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes, replayed_header};
+use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json;
 use crate::http::respond::ndjson::{FrameSource, LineWork};
 use crate::http::respond::response_format::AnswerForm;
@@ -109,7 +110,6 @@ operation_problems!(
                 ("Replayed" = bool, description = "`true` where these answers were given before"),
                 ("Answer" = String, description = "With a picture: the answer as JSON"),
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
-                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -167,9 +167,7 @@ pub async fn post(
             let headers = [(CONTENT_TYPE, "application/json")];
             let answers = (headers, charged(answers, charge)).into_response();
             let response = replayed_header(answered.replayed, answers);
-            let last = answered.estimates.last();
-            let last = last.map_or(0, |last| last.first().frame);
-            return Ok(answered.durability.write(last, response));
+            return Ok(with_checkpoint(answered.checkpoint, response));
         }
     };
     let work = LineWork {

@@ -48,7 +48,6 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
         return Err(Problem::not_ready());
     }
     if let Some(store) = &state.store
-        && !store.best_effort
         && !store.calls.is_ready()
     {
         return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));

@@ -1,6 +1,7 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
 use super::answer::{Answer, replayed_header};
+use super::checkpoint::with_checkpoint;
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
@@ -53,7 +54,6 @@ pub async fn answer_drawn(
     let (estimates, seen) = (answered.estimates.swap_remove(0), answered.seen);
     let answer = serde_json::to_string(&Answer::from(&estimates));
     let answer = answer.map_err(|error| Problem::internal(Arc::new(error)))?;
-    let frame = estimates.first().frame;
     let draw = move |_: &mut WorkMeter| draw(picture, &estimates, &seen);
     let bytes = work::run(state, queue, draw).await?;
     let headers = [(CONTENT_TYPE, HeaderValue::from_static("image/png"))];
@@ -62,7 +62,7 @@ pub async fn answer_drawn(
         response.headers_mut().insert(ANSWER, answer);
     }
     let response = replayed_header(answered.replayed, response);
-    Ok(answered.durability.write(frame, response))
+    Ok(with_checkpoint(answered.checkpoint, response))
 }
 
 /// The picture as a file. What was answered before has no particles.

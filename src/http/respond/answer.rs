@@ -69,13 +69,6 @@ impl From<&Estimate> for TargetView {
     }
 }
 
-impl Answer {
-    /// Which frame it answers.
-    pub fn frame(&self) -> u64 {
-        self.frame
-    }
-}
-
 impl From<&Estimates> for Answer {
     fn from(estimates: &Estimates) -> Self {
         let first = estimates.first();

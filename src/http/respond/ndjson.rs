@@ -6,7 +6,6 @@
 //! together: pixels, processor time, and the time until the last is tracked. A video has the processor time of as many
 //! requests as its frames would be posted in, and no end but that of its frames.
 
-use super::durability::Durability;
 use super::json;
 use super::response_format;
 use crate::http::problems::document::ProblemDocument;
@@ -138,7 +137,7 @@ impl LineWork {
             let estimates = newest::look(state, permit, queue, &self.client, look).await?;
             self.number = Some(number + 1);
             let answer = StreamAnswer::new(&estimates, 0, true, state.is_draining());
-            return Ok(answer.with_durability(Durability::of(&session, state.store.is_some())));
+            return Ok(answer.with_checkpoint(session.checkpoint()));
         }
         if matches!(self.frames, FrameSource::Video(_)) {
             self.count_frame().await?;
@@ -151,7 +150,7 @@ impl LineWork {
         // No other request may come between two frames of this one.
         self.number = Some(estimates.first().frame + 1);
         let answer = StreamAnswer::new(estimates, 0, answered.replayed, state.is_draining());
-        Ok(answer.with_durability(answered.durability))
+        Ok(answer.with_checkpoint(answered.checkpoint))
     }
 
     /// Waits for a place in the quota of frames.

@@ -2,7 +2,6 @@
 
 use crate::http::metrics::tracking::TrackingMetrics;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::durability::Durability;
 use crate::http::respond::target_box::TargetBox;
 use crate::http::stream::open_streams::StreamPlace;
 use crate::ingest::{self, Limits};
@@ -72,8 +71,8 @@ pub struct Answered {
     pub replayed: bool,
     /// What the tracker of each target saw in the last frame, where that was asked for and the frame was tracked now.
     pub seen: Vec<Seen>,
-    /// What the store has.
-    pub durability: Durability,
+    /// The last frame whose state is in the store, where there is one.
+    pub checkpoint: Option<u64>,
 }
 
 impl NextFrames {
@@ -145,7 +144,7 @@ impl NextFrames {
                 estimates,
                 replayed: true,
                 seen: Vec::new(),
-                durability: Durability::default(),
+                checkpoint: None,
             });
         }
         self.check_sizes(limits, state.source_size())?;
@@ -171,7 +170,7 @@ impl NextFrames {
             estimates,
             replayed: false,
             seen,
-            durability: Durability::default(),
+            checkpoint: None,
         })
     }
 

@@ -8,13 +8,11 @@ use super::advance::{Answered, NextFrames};
 use super::newest;
 use super::state::AppState;
 use super::stored;
-use super::stored_writes::{Written, write};
 use super::work;
 use crate::http::config::store::SharedStore;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::respond::durability::Durability;
 use crate::sessions::{
     LockedSession, QueuePermit, Reply, SessionBusy, SessionPermit, SessionState, Version, WorkMeter,
 };
@@ -80,87 +78,69 @@ async fn advance_stored(
         true => newest::lock(state, permit, client, true).await?,
         false => permit.lock().await?,
     };
-    // Whether another frame was there first, the state is what the store told, and the store has lost the record.
-    let (mut was_late, mut is_told, mut is_lost) = (false, false, false);
+    // Whether another frame was there first, and whether the state is what the store told.
+    let (mut was_late, mut is_told) = (false, false);
     for _ in 0..MAX_ATTEMPTS {
         let outcome;
         let queue = queue.clone();
-        (locked, outcome) = attempt(state, store, queue, locked, next.clone(), is_lost).await?;
+        (locked, outcome) = attempt(state, store, queue, locked, next.clone()).await?;
         let session = locked.session().clone();
         let idle = state.registry.idle_lease();
-        let reply = match &outcome {
+        let (name, before) = (
+            session.name(),
+            session.version().unwrap_or(Version::first(0)),
+        );
+        let (reply, after) = match &outcome {
             Outcome::Tracked(tracked, _, bytes) => {
-                let written = Written {
-                    frame: tracked.latest_frame(),
-                    bytes: bytes.as_deref(),
-                    is_lost,
-                    // A frame that comes late, after others that only another replica has, takes nothing back.
-                    goes_on: is_told || next.number.is_none(),
-                    lives: idle,
+                let frame = tracked.latest_frame();
+                // A frame that comes late, after others that only another replica has, takes nothing back.
+                let goes_on = is_told || next.number.is_none();
+                let bytes = bytes.as_deref();
+                let advanced = store
+                    .calls
+                    .advance(name, before, frame, bytes, goes_on, idle);
+                let after = match bytes {
+                    Some(_) => before.written(frame),
+                    None => Version { frame, ..before },
                 };
-                write(store, &session, written).await
+                (advanced.await?, after)
             }
             Outcome::Settled(Err(problem)) if !depends_on_state(problem) => {
                 return Err(problem.clone());
             }
-            Outcome::Settled(settled) => match session.version() {
-                Some(version) => {
-                    let latest = locked.state().latest_frame();
-                    let is_past = next.number.is_some_and(|number| number <= latest);
-                    let (name, lives) = (session.name(), settled.is_ok().then_some(idle));
-                    let checked = store.calls.check(name, version, !is_past, lives).await;
-                    match checked {
-                        // The store may have later frames that only another replica has; this one is before them.
-                        Ok(Reply::Other(_)) if is_past && is_told => {
-                            Ok((Reply::Done(idle), version))
-                        }
-                        checked => checked.map(|reply| (reply, version)),
-                    }
-                }
-                // Whatever was answered is written, so this is a problem, of a session that only this replica has.
-                None => Ok((Reply::Done(idle), Version::first(0))),
-            },
-        };
-        let version = match reply {
-            Ok((Reply::Done(_), version)) => Some(version),
-            Ok((Reply::Ended, _)) => return Err(stored::ended(state, &session)),
-            Ok((Reply::Missing, _)) => {
-                stored::missing(state, &session)?;
+            Outcome::Settled(settled) => {
                 let latest = locked.state().latest_frame();
-                match outcome {
-                    // The client has got further answers: another replica may have a later state.
-                    Outcome::Settled(Err(_)) if next.number > Some(latest + 1) => {
-                        return Err(Problem::record_lost(latest));
-                    }
-                    Outcome::Settled(Err(problem)) => return Err(problem),
-                    _ => is_lost = true,
+                let is_past = next.number.is_some_and(|number| number <= latest);
+                let lives = settled.is_ok().then_some(idle);
+                let checked = store.calls.check(name, before, !is_past, lives).await?;
+                match checked {
+                    // The store may have later frames that only another replica has; this one is before them.
+                    Reply::Other(_) if is_past && is_told => (Reply::Done(idle), before),
+                    checked => (checked, before),
                 }
-                continue;
             }
-            Ok((Reply::Other(record), _)) => {
+        };
+        match reply {
+            Reply::Done(_) => {}
+            Reply::Ended => return Err(stored::ended(state, &session)),
+            Reply::Missing => return Err(stored::missing(state, &session)),
+            Reply::Other(record) => {
                 was_late |= matches!(outcome, Outcome::Tracked(..));
-                (is_told, is_lost) = (true, false);
+                is_told = true;
                 stored::take_over(state, &mut locked, *record, client).await?;
                 if is_unordered {
                     return Err(Problem::not_in_order());
                 }
                 continue;
             }
-            // The frame is in memory only.
-            Err(_) if store.best_effort => session.version(),
-            Err(away) => return Err(away.into()),
-        };
+        }
         if !matches!(outcome, Outcome::Settled(Err(_))) {
             session.renew();
         }
         return match outcome {
             Outcome::Tracked(tracked, mut answered, _) => {
-                let is_new = is_lost || session.version().is_none();
-                locked.replace(*tracked, version);
-                if let (true, Some(stream)) = (is_new, &next.stream) {
-                    stream.begin(&session);
-                }
-                answered.durability = Durability::of(&session, true);
+                locked.replace(*tracked, Some(after));
+                answered.checkpoint = session.checkpoint();
                 Ok(answered)
             }
             // Another frame with its number won, at another replica.
@@ -168,7 +148,7 @@ async fn advance_stored(
                 Err(problem.with_kind(Kind::FrameOutOfOrder))
             }
             Outcome::Settled(settled) => settled.map(|mut answered| {
-                answered.durability = Durability::of(&session, true);
+                answered.checkpoint = session.checkpoint();
                 answered
             }),
         };
@@ -176,14 +156,13 @@ async fn advance_stored(
     Err(SessionBusy.into())
 }
 
-/// Looks at the frames on a worker. What the store has not, or has lost, is written, also where it was answered before.
+/// Looks at the frames on a worker.
 async fn attempt(
     state: &AppState,
     store: &SharedStore,
     queue: QueuePermit,
     mut locked: LockedSession,
     next: Arc<NextFrames>,
-    is_lost: bool,
 ) -> Result<(LockedSession, Outcome), Problem> {
     let limits = state.config.request_limits();
     let metrics = state.metrics.tracking.clone();
@@ -193,13 +172,12 @@ async fn attempt(
         let session = locked.session().clone();
         next.check_stream(&session)?;
         let mut tracked = locked.state().clone();
-        let version = session.version().filter(|_| !is_lost);
-        let is_stored = version.is_some_and(|version| version.frame >= tracked.latest_frame());
         let outcome = match next.advance_state(&mut tracked, &limits, meter, &metrics) {
-            Ok(answered) if !(answered.replayed && is_stored) => {
+            Ok(answered) if !answered.replayed => {
                 let frame = tracked.latest_frame();
-                let is_due = |version: Version| frame >= version.checkpoint + every;
-                let bytes = version.is_none_or(is_due).then(|| tracked.stored());
+                let is_due = |checkpoint| frame >= checkpoint + every;
+                let bytes = session.checkpoint().is_none_or(is_due);
+                let bytes = bytes.then(|| tracked.stored());
                 Outcome::Tracked(Box::new(tracked), answered, bytes)
             }
             settled => Outcome::Settled(settled),

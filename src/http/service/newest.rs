@@ -4,7 +4,6 @@
 
 use super::state::AppState;
 use super::stored;
-use super::stored_writes::save;
 use super::work;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
@@ -36,15 +35,8 @@ pub async fn lock(
     match store.calls.check(name, version, goes_on, None).await {
         Ok(Reply::Done(lives)) => locked.session().set_lives(lives),
         Ok(Reply::Ended) => return Err(stored::ended(state, locked.session())),
-        Ok(Reply::Missing) => {
-            stored::missing(state, locked.session())?;
-            // Nothing tells whether this is the newest state, unless frames were answered that are nowhere else.
-            if goes_on && locked.session().is_stored() {
-                return Err(Problem::record_lost(locked.state().latest_frame()));
-            }
-        }
+        Ok(Reply::Missing) => return Err(stored::missing(state, locked.session())),
         Ok(Reply::Other(record)) => stored::take_over(state, &mut locked, *record, client).await?,
-        Err(_) if store.best_effort => {}
         Err(away) => return Err(away.into()),
     }
     Ok(locked)
@@ -84,10 +76,9 @@ async fn is_behind(state: &AppState, session: &Arc<Session>) -> Result<bool, Pro
     {
         Ok(Reply::Done(lives)) => session.set_lives(lives),
         Ok(Reply::Ended) => return Err(stored::ended(state, session)),
-        Ok(Reply::Missing) => stored::missing(state, session)?,
+        Ok(Reply::Missing) => return Err(stored::missing(state, session)),
         // It may be this replica that is about to note the newer frame.
         Ok(Reply::Other(_)) => return Ok(true),
-        Err(_) if store.best_effort => {}
         Err(away) => return Err(away.into()),
     }
     Ok(false)
@@ -123,54 +114,34 @@ pub async fn catch_up(
     Ok(())
 }
 
-/// Waits for the session with its newest state, and lets no other replica go on from its own copy. `from` is the first
-/// frame whose answer the client has not got, where it says so.
+/// Waits for the session with its newest state, and lets no other replica go on from its own copy.
 ///
 /// # Errors
-/// The session has ended, or the store gives no answer, or it has lost the session, which the client has got further
-/// answers of.
+/// The session has ended, or the store gives no answer.
 pub async fn lock_fenced(
     state: &AppState,
     permit: SessionPermit,
     client: &Client,
-    from: Option<u64>,
 ) -> Result<LockedSession, Problem> {
     let mut locked = permit.lock().await?;
     let Some(store) = &state.store else {
         return Ok(locked);
     };
     for _ in 0..MAX_ATTEMPTS {
-        let reply = match locked.session().version() {
-            Some(version) => store.calls.fence(locked.session().name(), version).await,
-            None => Ok(Reply::Missing),
+        let Some(version) = locked.session().version() else {
+            return Ok(locked);
         };
-        let reply = match reply {
-            Ok(Reply::Missing) => {
-                stored::missing(state, locked.session())?;
-                let latest = locked.state().latest_frame();
-                if from.is_some_and(|from| from > latest + 1) {
-                    return Err(Problem::record_lost(latest));
-                }
-                match save(store, &mut locked).await {
-                    Ok(Reply::Done(_)) => continue,
-                    reply => reply,
-                }
-            }
-            reply => reply,
-        };
-        match reply {
+        match store.calls.fence(locked.session().name(), version).await {
             Ok(Reply::Done(lives)) => {
                 locked.session().set_lives(lives);
                 locked.fenced();
                 return Ok(locked);
             }
             Ok(Reply::Ended) => return Err(stored::ended(state, locked.session())),
-            // Another replica was there between.
-            Ok(Reply::Missing) => {}
+            Ok(Reply::Missing) => return Err(stored::missing(state, locked.session())),
             Ok(Reply::Other(record)) => {
                 stored::take_over(state, &mut locked, *record, client).await?;
             }
-            Err(_) if store.best_effort => return Ok(locked),
             Err(away) => return Err(away.into()),
         }
     }

@@ -20,7 +20,7 @@ pub async fn open_once(state: &AppState, request: CreateRequest) -> Result<Respo
     let is_verbose = request.upload.settings.verbose.0;
     let Some(name) = request.name.clone() else {
         let session = open(state, request, Uuid::new_v4()).await?;
-        return Ok(created(state, &session, false, is_verbose));
+        return Ok(created(&session, false, is_verbose));
     };
     let is_live = |id| state.registry.is_live(id);
     let entry = state.opened.entry(name.clone(), is_live);
@@ -34,7 +34,7 @@ pub async fn open_once(state: &AppState, request: CreateRequest) -> Result<Respo
     let client = request.client.clone();
     if let Some(session) = stored::live(state, id, &client).await? {
         is_same(&session, request.caller.owner(), request.digest(), &name)?;
-        return Ok(created(state, &session, true, is_verbose));
+        return Ok(created(&session, true, is_verbose));
     }
     check_room(state, &request.account)?;
     let (caller, digest) = (request.caller.clone(), request.digest());
@@ -44,12 +44,12 @@ pub async fn open_once(state: &AppState, request: CreateRequest) -> Result<Respo
             let session = stored::live(state, id, &client).await?;
             let session = session.ok_or(problem)?;
             is_same(&session, caller.owner(), digest, &name)?;
-            Ok(created(state, &session, true, is_verbose))
+            Ok(created(&session, true, is_verbose))
         }
         session => {
             let session = session?;
             *opened = Some(session.id());
-            Ok(created(state, &session, false, is_verbose))
+            Ok(created(&session, false, is_verbose))
         }
     }
 }
@@ -68,7 +68,6 @@ async fn id_of_key(
     let new = Uuid::new_v4();
     match &state.store {
         None => Ok(new),
-        // Without an answer nobody knows whether another replica has opened it, whatever the store's mode.
         Some(store) => Ok(store.calls.claim(owner, key, new).await?),
     }
 }

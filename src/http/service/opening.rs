@@ -8,7 +8,7 @@ use crate::http::extract::uploaded::Upload;
 use crate::http::problems::problem::Problem;
 use crate::http::resources::create_request::{CreateRequest, CreateSettings};
 use crate::http::respond::answer::{ImageSize, replayed_header};
-use crate::http::respond::durability::Durability;
+use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json::Json;
 use crate::http::respond::target_box::TargetBox;
 use crate::http::respond::target_boxes::boxes_of;
@@ -73,12 +73,11 @@ impl CreatedSession {
 }
 
 /// The answer to the request that opened a session.
-pub fn created(state: &AppState, session: &Session, replayed: bool, is_verbose: bool) -> Response {
+pub fn created(session: &Session, replayed: bool, is_verbose: bool) -> Response {
     let location = [(LOCATION, format!("/sessions/{}", session.id()))];
     let body = Json(CreatedSession::of(session, is_verbose));
     let response = (StatusCode::CREATED, location, body).into_response();
-    let frame = session.opening().estimates.first().frame;
-    Durability::of(session, state.store.is_some()).write(frame, replayed_header(replayed, response))
+    with_checkpoint(session.checkpoint(), replayed_header(replayed, response))
 }
 
 /// Opens the session of a request, under this id.
@@ -152,7 +151,6 @@ async fn create_record(
     match store.calls.create(id, &record).await {
         Ok(Reply::Done(_)) => Ok(Some(version)),
         Ok(_) => Err(InsertError::Taken.into()),
-        Err(_) if store.best_effort => Ok(None),
         Err(away) => Err(away.into()),
     }
 }

@@ -59,12 +59,10 @@ pub async fn live(
         Ok(Reply::Done(_)) => Ok(Some(session)),
         Ok(Reply::Other(record)) if is_of(&record, &session) => Ok(Some(session)),
         Ok(Reply::Other(record)) => insert(state, id, *record, client).await.map(Some),
-        Ok(Reply::Missing) if is_alive(&session) => Ok(Some(session)),
         Ok(Reply::Missing | Reply::Ended) => {
             state.registry.forget(&session);
             Ok(None)
         }
-        Err(_) if store.best_effort => Ok(Some(session)),
         Err(away) => Err(away.into()),
     }
 }
@@ -83,7 +81,6 @@ async fn load(
     let Some(store) = &state.store else {
         return Ok(None);
     };
-    // Without an answer nobody knows whether there is one, whatever the store's mode.
     match store.calls.load(id).await? {
         Some(record) => insert(state, id, record, client).await.map(Some),
         None => Ok(None),
@@ -158,21 +155,13 @@ pub async fn take_over(
     Ok(())
 }
 
-/// Whether a session lives whose record is missing: then the store has lost it.
-pub fn is_alive(session: &Session) -> bool {
-    session.lives() > LATE
-}
-
-/// The store has no record of a session.
-///
-/// # Errors
-/// The session has expired.
-pub fn missing(state: &AppState, session: &Arc<Session>) -> Result<(), Problem> {
-    if is_alive(session) {
-        return Ok(());
-    }
+/// The store has no record of a session: its time is over, or the store has lost it.
+pub fn missing(state: &AppState, session: &Arc<Session>) -> Problem {
     state.registry.forget(session);
-    Err(NoSession::Expired.into())
+    match session.lives() > LATE {
+        true => Problem::session_lost(),
+        false => NoSession::Expired.into(),
+    }
 }
 
 /// The session was ended at another replica.

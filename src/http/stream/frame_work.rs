@@ -7,7 +7,6 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Account;
-use crate::http::respond::durability::Durability;
 use crate::http::service::advance::{Answered, NextFrames};
 use crate::http::service::advance_session::advance_session;
 use crate::http::service::newest;
@@ -57,8 +56,8 @@ pub struct Given {
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
     pub seen: Option<Seen>,
-    /// What the store has.
-    pub durability: Durability,
+    /// The last frame whose state is in the store.
+    pub checkpoint: Option<u64>,
 }
 
 /// What became of a frame.
@@ -201,7 +200,7 @@ impl Given {
             estimates: answered.estimates.swap_remove(0),
             replayed: answered.replayed,
             seen,
-            durability: answered.durability,
+            checkpoint: answered.checkpoint,
         }
     }
 }

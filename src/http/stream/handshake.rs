@@ -15,7 +15,6 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
-use crate::http::respond::durability::Durability;
 use crate::http::service::newest;
 use crate::http::service::state::AppState;
 use crate::sessions::{ReplayError, Session};
@@ -72,7 +71,7 @@ operation_problems!(
 /// `?from=N`, N being the first frame without an answer: the stored answers come again, with `"replayed": true`, and
 /// frames go on with the number `next`. With `drop=true` a frame that waits is skipped for a newer one; `"skipped"` in
 /// an answer counts the frames before it that were. With a store, `"checkpoint": N` in an answer names the last frame
-/// whose state is in it, and `"durable": false` says that the store could not be reached and has not this frame.
+/// whose state is in it.
 ///
 /// A page sends its session token as a protocol: `new WebSocket(url, ["bagtrack", token])`. The service closes with
 /// 4000 and the status of a problem (410: the session has expired), 4409 when a newer stream of the session has taken
@@ -156,7 +155,7 @@ async fn stand(
     place: &StreamPlace,
     from: Option<u64>,
 ) -> Result<Stand, Problem> {
-    let waiting = newest::lock_fenced(state, session.visit()?, client, from);
+    let waiting = newest::lock_fenced(state, session.visit()?, client);
     let waiting = timeout(state.config.work_timeout, waiting);
     let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
     place.begin(session);
@@ -170,6 +169,6 @@ async fn stand(
     Ok(Stand {
         next,
         stored,
-        durability: Durability::of(session, state.store.is_some()),
+        checkpoint: session.checkpoint(),
     })
 }

@@ -2,7 +2,6 @@
 
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
-use crate::http::respond::durability::Durability;
 use crate::http::respond::target_box::TargetBox;
 use crate::http::service::advance::GivenBox;
 use crate::sessions::Estimates;
@@ -90,9 +89,6 @@ pub struct StreamAnswer {
     /// With a store: the last frame whose state is in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<u64>,
-    /// `false` where the store could not be reached and has not this frame.
-    #[serde(skip_serializing_if = "is_true")]
-    durable: bool,
     /// Whether the service is about to end.
     #[serde(skip_serializing_if = "is_false")]
     draining: bool,
@@ -138,16 +134,14 @@ impl StreamAnswer {
             skipped,
             replayed,
             checkpoint: None,
-            durable: true,
             draining,
             seen: None,
         }
     }
 
-    /// With what the store has.
-    pub fn with_durability(mut self, durability: Durability) -> Self {
-        self.checkpoint = durability.checkpoint();
-        self.durable = !durability.lacks(self.answer.frame());
+    /// With the last frame whose state is in the store.
+    pub fn with_checkpoint(mut self, checkpoint: Option<u64>) -> Self {
+        self.checkpoint = checkpoint;
         self
     }
 
@@ -160,10 +154,6 @@ impl StreamAnswer {
 
 fn is_zero(number: &u64) -> bool {
     *number == 0
-}
-
-fn is_true(flag: &bool) -> bool {
-    *flag
 }
 
 fn is_false(flag: &bool) -> bool {
