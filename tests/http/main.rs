@@ -11,7 +11,6 @@ mod capacity;
 mod connections;
 mod containers;
 mod counted;
-mod cvat;
 mod drawn;
 mod expiry;
 #[cfg(feature = "otel")]

@@ -19,7 +19,6 @@ pub mod base64_file;
 mod body;
 mod fields;
 mod json;
-pub mod json_body;
 mod multipart;
 pub mod overrides;
 mod pace;

@@ -8,7 +8,6 @@ pub mod correction;
 pub mod create;
 pub mod create_named;
 pub mod create_request;
-pub mod cvat;
 pub mod frames;
 pub mod health;
 pub mod metrics;
