@@ -7,7 +7,7 @@
 use super::connection_hold::ConnectionHold;
 use super::connection_io::ConnectionIo;
 use super::connections::{Connections, NoRoom};
-use super::head_problems;
+use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
@@ -231,7 +231,7 @@ async fn accept(
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
         let activity = permit.activity.clone();
-        let io = ConnectionIo::new(stream, peer.ip(), activity.clone(), state.clone());
+        let io = ConnectionIo::new(stream, activity.clone(), limits);
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
         let service = service.clone().layer(Extension(Peer(peer)));
         let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
@@ -249,7 +249,7 @@ async fn accept(
 /// Tells a client that it has too many connections, as far as its system takes that at once.
 fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
     let problem = Problem::too_many_connections();
-    let answer = head_problems::answer_of(&problem, peer.ip(), &state.metrics);
+    let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
     if let Ok(mut stream) = stream.into_std() {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);

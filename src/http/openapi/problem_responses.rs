@@ -129,8 +129,6 @@ fn example(kind: Kind) -> Problem {
             expected: 4,
         }),
         Kind::BodyTooLarge => Problem::body_too_large(33_554_432),
-        Kind::UriTooLong => Problem::uri_too_long(),
-        Kind::HeadTooLarge => Problem::head_too_large(),
         Kind::RequestTooCostly => Problem::too_many_pixels(500_000_000, 160_000_000),
         Kind::FrameTooLarge => {
             let limit = "a side of 9000 px is over the limit of 8192 px".to_owned();
