@@ -33,7 +33,7 @@ mod quotas;
 mod resources;
 mod respond;
 mod router;
-mod service;
+mod state;
 mod stream;
 
 pub use auth::access::AccessError;

@@ -2,8 +2,8 @@
 
 use super::new_session::NewSession;
 use super::opening::Opening;
-use super::queue_permit::Held;
 use super::registry::{Registry, TooManySessions};
+use super::scheduler::queue_permit::Held;
 use super::session::Session;
 use super::state::SessionState;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl Registry {
             request,
             estimates: state.latest(),
             expires: expires.map_or(0, |time| time.as_secs()),
-            birth: rand::random(),
+            incarnation: rand::random(),
         }
     }
 

@@ -5,7 +5,7 @@ use super::lease::Lease;
 use super::new_session::NewSession;
 use super::opening::Opening;
 use super::owner::Owner;
-use super::queue_permit::Held;
+use super::scheduler::queue_permit::Held;
 use super::short_id::short_id;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
@@ -75,11 +75,11 @@ impl Session {
             opening,
             owner,
             version,
-            lives,
+            ttl,
             state,
             held,
         } = new;
-        let expires = clock.now() + lives;
+        let expires = clock.now() + ttl;
         Arc::new(Self {
             id,
             owner,
@@ -127,7 +127,7 @@ impl Session {
     pub fn name(&self) -> SessionName {
         SessionName {
             id: self.id,
-            birth: self.opening.birth,
+            incarnation: self.opening.incarnation,
         }
     }
 
@@ -177,13 +177,13 @@ impl Session {
     }
 
     /// How long the session lives without a frame.
-    pub fn lives(&self) -> Duration {
+    pub fn ttl(&self) -> Duration {
         self.expires().saturating_sub(self.clock.now())
     }
 
     /// The session expires after this time without a frame.
-    pub fn set_lives(&self, lives: Duration) {
-        let expires = milliseconds(self.clock.now() + lives);
+    pub fn set_ttl(&self, ttl: Duration) {
+        let expires = milliseconds(self.clock.now() + ttl);
         self.expires_ms.store(expires, Ordering::Relaxed);
     }
 

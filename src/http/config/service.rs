@@ -5,7 +5,6 @@ use super::access::AccessConfig;
 use super::limits::LimitsConfig;
 use super::store::StoreConfig;
 use crate::http::middleware::base_path::BasePath;
-use crate::http::service::advance::RequestLimits;
 use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -229,14 +228,6 @@ impl Config {
     pub fn session_bytes(&self) -> usize {
         let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
         self.limits.max_session_bytes.unwrap_or(default)
-    }
-
-    /// The limits of one request.
-    pub(in crate::http) fn request_limits(&self) -> RequestLimits {
-        RequestLimits {
-            frame: self.frame_limits(),
-            max_pixels: self.limits.max_request_pixels,
-        }
     }
 }
 

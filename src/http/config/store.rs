@@ -1,7 +1,8 @@
 //! The settings of the store that replicas share.
 
 use super::access::Secret;
-use crate::sessions::{Store, StoreAddress};
+use crate::sessions::{RedisStore, SessionStore, StoreAddress};
+use std::sync::Arc;
 use std::time::Duration;
 
 #[cfg(feature = "cli")]
@@ -84,27 +85,11 @@ impl StoreConfig {
     }
 }
 
-/// The store, and how it is used.
-#[derive(Debug, Clone)]
-pub struct SharedStore {
-    /// The store.
-    pub calls: Store,
-    /// The state is written at every so many frames.
-    pub every: u64,
-}
-
-impl SharedStore {
-    /// The store of these settings, where they name one.
-    pub async fn connect(config: &StoreConfig) -> Option<Self> {
-        let text = config.store.as_ref()?.text();
-        let address = StoreAddress::parse(text, config.store_timeout).ok()?;
-        let store = Store::connect(address, &config.store_prefix, config.store_timeout).await;
-        let calls = store
-            .inspect_err(|error| tracing::error!(%error, "no store"))
-            .ok()?;
-        Some(Self {
-            calls,
-            every: config.store_every,
-        })
-    }
+/// The store of these settings, where they name one.
+pub async fn connect(config: &StoreConfig) -> Option<Arc<dyn SessionStore>> {
+    let text = config.store.as_ref()?.text();
+    let address = StoreAddress::parse(text, config.store_timeout).ok()?;
+    let store = RedisStore::connect(address, &config.store_prefix, config.store_timeout).await;
+    let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
+    Some(Arc::new(store.ok()?))
 }

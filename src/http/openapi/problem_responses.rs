@@ -5,7 +5,7 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::ingest::IngestError;
 use crate::sessions::{
-    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreAway, TooManySessions,
+    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreUnavailable, TooManySessions,
 };
 use crate::tracker::TrackerError;
 use std::collections::BTreeMap;
@@ -158,6 +158,6 @@ fn example(kind: Kind) -> Problem {
         Kind::TooManySessions => TooManySessions(1024).into(),
         Kind::WorkTimeout => Problem::work_timeout(),
         Kind::NotReady => Problem::not_ready(),
-        Kind::StoreUnavailable => StoreAway::default().into(),
+        Kind::StoreUnavailable => StoreUnavailable::default().into(),
     }
 }

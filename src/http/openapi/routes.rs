@@ -12,7 +12,7 @@ use crate::http::resources::session;
 use crate::http::resources::snapshot;
 use crate::http::resources::token;
 use crate::http::resources::track;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use crate::http::stream::handshake;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};

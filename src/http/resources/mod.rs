@@ -11,6 +11,7 @@ pub mod create_request;
 pub mod frames;
 pub mod health;
 pub mod metrics;
+pub mod saturation;
 pub mod session;
 pub mod session_path;
 pub mod snapshot;

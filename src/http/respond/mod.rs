@@ -6,6 +6,7 @@
 pub mod annotated_image;
 pub mod answer;
 pub mod checkpoint;
+pub mod created_session;
 pub mod json;
 pub mod ndjson;
 pub mod response_format;

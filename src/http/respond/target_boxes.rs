@@ -13,7 +13,8 @@ use utoipa::openapi::{RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
 /// The boxes of the targets, 1 to [`MAX_TARGETS`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[serde(transparent)]
 pub struct TargetBoxes(Vec<TargetBox>);
 
 /// The text is no list of boxes.

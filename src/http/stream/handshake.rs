@@ -1,7 +1,6 @@
 //! Opens a stream.
 
 use super::frame_work::FrameWork;
-use super::open_streams::StreamPlace;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::Upgrade;
 use super::waiting::Waiting;
@@ -15,16 +14,14 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::sessions::{ReplayError, Session};
+use crate::http::state::AppState;
+use crate::sessions::{Lane, ReplayError, Session, StreamPlace};
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
 use axum::response::Response;
 use serde::Deserialize;
 use std::io;
 use std::sync::{Arc, Mutex};
-use tokio::time::timeout;
 use tracing::Instrument;
 
 /// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
@@ -101,8 +98,8 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let account = state.clients.account(&client);
     let permit = account.stream()?;
     // The stream before this one tracks no further frame.
-    let place = Arc::new(state.streams.take(session.id()));
-    let stand = stand(&state, &session, &client, &place, settings.from).await?;
+    let place = Arc::new(state.service.streams.take(session.id()));
+    let stand = stand(&state, &session, account.lane(), &place, settings.from).await?;
     let newest_wins = settings.drop.0;
     let max_bytes = max_message_bytes(&state, &session);
     let budgets = [state.uploads.clone(), account.bytes().clone()];
@@ -112,7 +109,6 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
         work: Arc::new(FrameWork {
             state,
             caller,
-            client,
             account,
             session: session.id(),
             place,
@@ -151,13 +147,12 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
 async fn stand(
     state: &AppState,
     session: &Arc<Session>,
-    client: &Client,
+    flow: Lane,
     place: &StreamPlace,
     from: Option<u64>,
 ) -> Result<Stand, Problem> {
-    let waiting = newest::lock_fenced(state, session.visit()?, client);
-    let waiting = timeout(state.config.work_timeout, waiting);
-    let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
+    let fenced = state.service.fence(session.read_permit()?, flow);
+    let mut locked = fenced.await?;
     place.begin(session);
     let next = locked.state().latest_frame() + 1;
     let from = from.unwrap_or(next);

@@ -3,8 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
 use crate::http::respond::target_box::TargetBox;
-use crate::http::service::advance::GivenBox;
-use crate::sessions::Estimates;
+use crate::sessions::{Estimates, GivenBox};
 use crate::tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
@@ -46,7 +45,10 @@ impl FrameHeader {
     /// The correction, where there is one.
     pub fn correction(&self) -> Option<GivenBox> {
         let target = self.target;
-        self.r#box.map(|to| GivenBox { target, to })
+        self.r#box.map(|to| GivenBox {
+            target,
+            to: to.into(),
+        })
     }
 
     /// Reads a text message.

@@ -1,17 +1,18 @@
 //! What all handlers share.
 
-use super::idempotency::IdempotencyStore;
-use super::saturation::Saturation;
 use crate::http::auth::access::Access;
 use crate::http::config::service::Config;
-use crate::http::config::store::SharedStore;
 use crate::http::metrics::registry::Metrics;
+use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
-use crate::http::stream::open_streams::OpenStreams;
-use crate::sessions::{Admission, ByteBudget, Clock, Lease, Registry, Session};
+use crate::http::resources::saturation::Saturation;
+use crate::sessions::{
+    Admission, ByteBudget, Clock, IdempotencyStore, Lane, Lease, OpenStreams, Registry,
+    ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
+};
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::SystemTime;
 use tokio::sync::Semaphore;
 
@@ -24,12 +25,8 @@ pub struct AppState(Arc<Shared>);
 pub struct Shared {
     /// The settings, validated.
     pub config: Config,
-    /// The live sessions.
-    pub registry: Registry,
-    /// The store that replicas share.
-    pub store: Option<SharedStore>,
-    /// Which requests may work.
-    pub admission: Admission,
+    /// The one door to sessions.
+    pub service: SessionService,
     /// The memory of all uploads together.
     pub uploads: ByteBudget,
     /// What each client has in use.
@@ -38,10 +35,6 @@ pub struct Shared {
     pub access: Access,
     /// What is counted and measured.
     pub metrics: Metrics,
-    /// The answers to requests with an idempotency key.
-    pub opened: IdempotencyStore,
-    /// The open streams.
-    pub streams: OpenStreams,
     /// Places for the processes that decode videos.
     pub videos: Arc<Semaphore>,
     /// Whether `/readyz` has found the queue full.
@@ -49,8 +42,6 @@ pub struct Shared {
     /// Whether `/readyz` has found the memory of uploads used up.
     pub upload_saturation: Saturation,
     clock: Clock,
-    /// Set from the moment that the service was asked to end.
-    draining: AtomicBool,
 }
 
 impl std::ops::Deref for AppState {
@@ -69,46 +60,39 @@ impl AppState {
         config: Config,
         access: Access,
         clock: Clock,
-        store: Option<SharedStore>,
+        store: Option<Arc<dyn SessionStore>>,
     ) -> io::Result<Self> {
-        let lease = Lease {
-            first: config.session_first,
-            idle: config.session_idle,
-        };
-        let (most, requests) = (config.max_sessions, config.session_queue);
-        let registry = Registry::new(most, requests, lease, clock.clone());
-        let registry = registry.with_memory(config.session_bytes());
-        Ok(Self(Arc::new(Shared {
-            registry: match store {
-                Some(_) => registry.with_eviction(),
-                None => registry,
-            },
+        let metrics = Metrics::new();
+        let service = SessionService::new(ServiceParts {
+            settings: settings(&config),
+            registry: registry(&config, &clock, store.is_some()),
             store,
             admission: Admission::new(config.queue, config.worker_count())?,
+            streams: OpenStreams::default(),
+            opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
+            keys: access.snapshots.clone(),
+            tracking: metrics.tracking.clone(),
+            queue_wait: metrics.queue_wait.clone(),
+            draining: AtomicBool::new(false),
+        });
+        Ok(Self(Arc::new(Shared {
+            service,
             uploads: ByteBudget::new(config.max_upload_bytes),
             clients: Clients::new(&config),
             access,
-            metrics: Metrics::new(),
-            opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
-            streams: OpenStreams::default(),
+            metrics,
             // A client has one at a time, and no client all of them.
             videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
             clock,
-            draining: AtomicBool::new(false),
             config,
         })))
     }
 
-    /// Makes `/readyz` answer 503 from now on.
-    pub fn drain(&self) {
-        self.draining.store(true, Ordering::Release);
-    }
-
     /// Whether the service was asked to end.
     pub fn is_draining(&self) -> bool {
-        self.draining.load(Ordering::Acquire)
+        self.service.is_draining()
     }
 
     /// The time.
@@ -116,14 +100,39 @@ impl AppState {
         self.clock.wall(self.clock.now())
     }
 
-    /// Drops what is kept on behalf of sessions that have ended.
-    pub fn prune(&self) {
-        self.opened.prune(|id| self.registry.is_live(id));
+    /// In whose turn the work of a client is done.
+    pub fn flow(&self, client: &Client) -> Lane {
+        self.clients.account(client).lane()
     }
 
     /// When the session expires, in RFC 3339.
     pub fn expires_at(&self, session: &Session) -> String {
-        let moment = self.registry.expires_at(session);
+        let moment = self.service.registry.expires_at(session);
         humantime::format_rfc3339_seconds(moment).to_string()
+    }
+}
+
+fn settings(config: &Config) -> ServiceSettings {
+    ServiceSettings {
+        work_timeout: config.work_timeout,
+        max_request_cpu: config.limits.max_request_cpu,
+        frame: config.frame_limits(),
+        max_request_pixels: config.limits.max_request_pixels,
+        max_frames: config.max_frames,
+        store_every: config.store.store_every,
+    }
+}
+
+fn registry(config: &Config, clock: &Clock, has_store: bool) -> Registry {
+    let lease = Lease {
+        first: config.session_first,
+        idle: config.session_idle,
+    };
+    let (most, requests) = (config.max_sessions, config.session_queue);
+    let registry = Registry::new(most, requests, lease, clock.clone());
+    let registry = registry.with_memory(config.session_bytes());
+    match has_store {
+        true => registry.with_eviction(),
+        false => registry,
     }
 }

@@ -1,50 +1,28 @@
 //! What decoding and tracking measure.
 
-use super::maker::Maker;
 use crate::sessions::Estimates;
 use crate::tracker::Status;
-use metrics::{Counter, Histogram, Label};
+use metrics::{Counter, Histogram};
 use std::time::{Duration, Instant};
 
 /// What decoding and tracking measure. Clones are the same metrics.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct TrackingMetrics {
-    decode: Histogram,
-    step: Histogram,
-    tracking: Counter,
-    uncertain: Counter,
-    lost: Counter,
-    losses: Counter,
+    /// Seconds to decode a frame.
+    pub decode: Histogram,
+    /// Seconds of processor time to track a target through a frame.
+    pub step: Histogram,
+    /// Answers of targets that are tracked.
+    pub tracking: Counter,
+    /// Answers that are uncertain.
+    pub uncertain: Counter,
+    /// Answers of targets that are out of sight.
+    pub lost: Counter,
+    /// Times that a target went out of sight.
+    pub losses: Counter,
 }
 
 impl TrackingMetrics {
-    /// Metrics that stand at zero.
-    pub fn new(make: &Maker) -> Self {
-        let frames = |status: &'static str| {
-            let labels = [Label::from_static_parts("status", status)];
-            make.counter(
-                "bagtrack_frames_total",
-                "Frames answered, by status; once for each target.",
-                &labels,
-            )
-        };
-        Self {
-            decode: make.seconds("bagtrack_frame_decode_seconds", "Time to decode a frame."),
-            step: make.seconds(
-                "bagtrack_frame_step_seconds",
-                "Processor time to track a target through a frame.",
-            ),
-            tracking: frames("tracking"),
-            uncertain: frames("uncertain"),
-            lost: frames("lost"),
-            losses: make.counter(
-                "bagtrack_targets_lost_total",
-                "Times that a target went out of sight.",
-                &[],
-            ),
-        }
-    }
-
     /// Decodes with `work`, and measures it.
     pub fn decoding<T>(&self, work: impl FnOnce() -> T) -> T {
         let started = Instant::now();

@@ -1,5 +1,6 @@
 //! The connection to the store: calls that end in bounded time, and a probe that finds the store again.
 
+use super::super::session_store::StoreUnavailable;
 use super::address::{Kind, StoreAddress};
 use redis::aio::{ConnectionLike, ConnectionManager, ConnectionManagerConfig};
 use redis::cluster::ClusterConfig;
@@ -15,18 +16,6 @@ use tokio::time::{Instant, sleep, timeout_at};
 
 /// Between two attempts of one call.
 const PAUSE: Duration = Duration::from_millis(10);
-
-/// The store gave no answer in time.
-#[derive(Debug, Clone, Default, thiserror::Error)]
-#[error("the store gives no answer: {0}")]
-pub struct StoreAway(String);
-
-impl StoreAway {
-    /// For this reason.
-    pub(super) fn because(error: &RedisError) -> Self {
-        Self(error.to_string())
-    }
-}
 
 /// What is sent to the store. It can be sent again.
 pub(super) enum Call<'a> {
@@ -148,16 +137,19 @@ impl Connection {
     ///
     /// # Errors
     /// There is no answer.
-    pub(super) async fn call<T: FromRedisValue>(&self, call: Call<'_>) -> Result<T, StoreAway> {
+    pub(super) async fn call<T: FromRedisValue>(
+        &self,
+        call: Call<'_>,
+    ) -> Result<T, StoreUnavailable> {
         if !self.is_up() {
             self.failures.fetch_add(1, Ordering::Relaxed);
-            return Err(StoreAway("it did not answer lately".to_owned()));
+            return Err(StoreUnavailable("it did not answer lately".to_owned()));
         }
         let value = self.attempt(call).await?;
-        T::from_redis_value(value).map_err(|error| StoreAway(error.to_string()))
+        T::from_redis_value(value).map_err(|error| StoreUnavailable(error.to_string()))
     }
 
-    async fn attempt(&self, call: Call<'_>) -> Result<Value, StoreAway> {
+    async fn attempt(&self, call: Call<'_>) -> Result<Value, StoreUnavailable> {
         let deadline = Instant::now() + self.timeout;
         let mut reason: Option<RedisError> = None;
         while Instant::now() < deadline {
@@ -175,7 +167,7 @@ impl Connection {
                     if !self.refuses.load(Ordering::Acquire) {
                         tracing::error!(%error, "the store refuses a call");
                     }
-                    return Err(StoreAway::because(&error));
+                    return Err(StoreUnavailable(error.to_string()));
                 }
                 Ok(Err(error)) => reason = Some(error),
                 // A connection over which nothing comes may be dead without knowing it.
@@ -188,7 +180,7 @@ impl Connection {
         if self.is_up.swap(false, Ordering::AcqRel) {
             tracing::error!(reason, "the store gives no answer");
         }
-        Err(StoreAway(reason))
+        Err(StoreUnavailable(reason))
     }
 
     fn answers(&self) {

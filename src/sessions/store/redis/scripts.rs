@@ -28,7 +28,7 @@ local function tell(key, takes_over)
 end
 ";
 
-/// ARGV: generation, frame, token, birth, head, state, milliseconds to live.
+/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live.
 const CREATE: &str = r"
 local key = KEYS[1]
 local token = redis.call('HGET', key, 'token')
@@ -36,25 +36,25 @@ if token == ARGV[3] then return {1, 0} end
 if token then return tell(key, false) end
 if redis.call('EXISTS', KEYS[2]) == 1 then return {3} end
 redis.call('HSET', key, 'generation', ARGV[1], 'frame', ARGV[2], 'checkpoint', ARGV[2],
-  'token', ARGV[3], 'birth', ARGV[4], 'head', ARGV[5], 'state', ARGV[6])
+  'token', ARGV[3], 'incarnation', ARGV[4], 'head', ARGV[5], 'state', ARGV[6])
 redis.call('PEXPIRE', key, ARGV[7])
 return {1, ARGV[7]}
 ";
 
-/// ARGV: birth, milliseconds for which the session is known to have ended. Answers 0 where it had ended before. What is
+/// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before. What is
 /// deleted first makes room, so this works where the memory is used up.
 const END: &str = r"
 local key, ended = KEYS[1], KEYS[2]
-local birth = redis.call('HGET', key, 'birth')
-local is_here = birth == ARGV[1] or (not birth and redis.call('EXISTS', ended) == 0)
-if birth == ARGV[1] then redis.call('DEL', key) end
+local incarnation = redis.call('HGET', key, 'incarnation')
+local is_here = incarnation == ARGV[1] or (not incarnation and redis.call('EXISTS', ended) == 0)
+if incarnation == ARGV[1] then redis.call('DEL', key) end
 redis.call('SET', ended, '', 'PX', ARGV[2])
 return is_here and 1 or 0
 ";
 
 /// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the record
 /// where it has another version ('1' or ''), and the state where it is written.
-const ADVANCE: &str = r"
+const COMMIT: &str = r"
 local key = KEYS[1]
 local generation, frame, token = unpack(redis.call('HMGET', key, 'generation', 'frame', 'token'))
 if not generation then return absent() end
@@ -104,7 +104,7 @@ return 1
 
 pub(super) struct Scripts {
     pub(super) create: Script,
-    pub(super) advance: Script,
+    pub(super) commit: Script,
     pub(super) check: Script,
     pub(super) fence: Script,
     pub(super) claim: Script,
@@ -117,7 +117,7 @@ impl Scripts {
         let telling = |body: &str| Script::new(&format!("{ABSENT}{TELL}{body}"));
         Self {
             create: telling(CREATE),
-            advance: telling(ADVANCE),
+            commit: telling(COMMIT),
             check: telling(CHECK),
             fence: telling(FENCE),
             claim: Script::new(CLAIM),

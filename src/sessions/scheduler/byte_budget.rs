@@ -36,7 +36,7 @@ impl ByteBudget {
     }
 
     /// Takes bytes until the returned value is dropped; none if there are too few left.
-    pub(super) fn hold(&self, bytes: usize) -> Option<OwnedSemaphorePermit> {
+    pub(crate) fn hold(&self, bytes: usize) -> Option<OwnedSemaphorePermit> {
         self.take(u32::try_from(bytes.div_ceil(BYTES_PER_PERMIT)).ok()?)
     }
 

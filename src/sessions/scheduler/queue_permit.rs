@@ -54,6 +54,11 @@ impl QueuePermit {
         (self.request.lane, self.request.length)
     }
 
+    /// Whose turn the request's work is done in.
+    pub fn lane(&self) -> Lane {
+        self.request.lane
+    }
+
     /// For work on so many frames, which gives way to shorter work between two of them.
     pub fn for_frames(mut self, count: usize) -> Self {
         self.request.length = match count {

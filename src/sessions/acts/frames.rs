@@ -1,21 +1,21 @@
-//! A session's next frames: decode them, then track through them or take the box that the user gives.
+//! The next frames of a session, as they were received: decode them, then track through them, or take the box that the
+//! user gives.
 
-use crate::http::metrics::tracking::TrackingMetrics;
-use crate::http::problems::problem::Problem;
-use crate::http::respond::target_box::TargetBox;
-use crate::http::stream::open_streams::StreamPlace;
+use super::error::{FrameFault, FramesError};
+use super::tracking_metrics::TrackingMetrics;
 use crate::ingest::{self, Limits};
+use crate::sessions::streams::StreamPlace;
 use crate::sessions::{
-    ByteCharge, Correction, Estimates, Fingerprint, LockedSession, ReplayDecision, Session,
-    SessionState, StepError, WorkMeter,
+    ByteCharge, Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError,
+    WorkMeter,
 };
-use crate::tracker::{Frame, FrameFormat, Seen, TrackerError};
-use axum::body::Bytes;
+use crate::tracker::{Frame, FrameFormat, Rect, Seen, TrackerError};
+use bytes::Bytes;
 use std::sync::Arc;
 
 /// The next frames of a session, as they were received.
-#[derive(Debug)]
-pub struct NextFrames {
+#[derive(Debug, Default)]
+pub struct FrameBatch {
     /// What the client calls the first of them, where it numbers them.
     pub number: Option<u64>,
     /// The files, at least one.
@@ -23,13 +23,13 @@ pub struct NextFrames {
     /// The box in the only frame, where the user corrects it.
     pub correction: Option<GivenBox>,
     /// How many of the last answers are kept at least, for a client that takes up where its line broke.
-    pub kept: usize,
+    pub min_answers: usize,
     /// Whether the client wants to know what the trackers saw.
-    pub sees: bool,
+    pub with_diagnostics: bool,
     /// The stream that they came over. It tells their order, and tracks none after a newer one has taken its place.
     pub stream: Option<Arc<StreamPlace>>,
     /// The memory of the files, where the place in the queue does not hold it.
-    pub _charge: Option<Arc<ByteCharge>>,
+    pub charge: Option<Arc<ByteCharge>>,
 }
 
 /// The box of a target, given by the user.
@@ -38,112 +38,84 @@ pub struct GivenBox {
     /// Which target, counted from 0, where the user says it.
     pub target: Option<usize>,
     /// The box.
-    pub to: TargetBox,
+    pub to: Rect,
 }
 
 impl GivenBox {
     /// The correction in a session with so many targets.
-    ///
-    /// # Errors
-    /// There is no such target, or it is not told which of several is meant.
-    fn of(self, count: usize) -> Result<Correction, Problem> {
-        let target = match self.target {
-            Some(target) => target,
-            None if count == 1 => 0,
-            None => return Err(Problem::which_target(count)),
-        };
-        match target < count {
-            true => Ok(Correction {
-                target,
-                to: self.to.into(),
+    fn of(self, count: usize) -> Result<Correction, FramesError> {
+        match self.target {
+            None if count != 1 => Err(FramesError::NoSuchTarget { count }),
+            Some(target) if target >= count => Err(FramesError::NoSuchTarget { count }),
+            target => Ok(Correction {
+                target: target.unwrap_or(0),
+                to: self.to,
             }),
-            false => Err(Problem::which_target(count)),
         }
     }
 }
 
-/// The answers to a request.
+/// The answers to frames.
 #[derive(Debug)]
-pub struct Answered {
+pub struct Tracked {
     /// One for each frame, in the order of the frames.
     pub estimates: Vec<Estimates>,
     /// Whether they were given before.
     pub replayed: bool,
     /// What the tracker of each target saw in the last frame, where that was asked for and the frame was tracked now.
-    pub seen: Vec<Seen>,
+    pub diagnostics: Vec<Seen>,
     /// The last frame whose state is in the store, where there is one.
     pub checkpoint: Option<u64>,
 }
 
-impl NextFrames {
+/// What the frames of one request may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct RequestLimits {
+    /// The limits of each frame.
+    pub frame: Limits,
+    /// Most pixels of several frames together. A single frame has its own limit.
+    pub max_pixels: u64,
+}
+
+impl FrameBatch {
     /// The frames of a plain request.
     pub fn posted(number: Option<u64>, files: Vec<Bytes>, correction: Option<GivenBox>) -> Self {
         Self {
             number,
             files,
             correction,
-            kept: 0,
-            sees: false,
-            stream: None,
-            _charge: None,
+            ..Self::default()
         }
     }
 
-    /// Refuses frames of a stream whose place a newer one has taken.
-    ///
-    /// # Errors
-    /// It has. The newer one has told its client which frame is the next.
-    pub fn check_stream(&self, session: &Session) -> Result<(), Problem> {
-        let stream = self.stream.as_ref();
-        match stream.is_some_and(|place| place.has_ended(session)) {
-            true => Err(Problem::work_timeout()),
-            false => Ok(()),
-        }
+    /// Whether nothing tells their order.
+    pub(super) fn is_unordered(&self) -> bool {
+        self.number.is_none() && self.stream.is_none()
     }
 
-    /// The answers: the stored ones if the request was answered before, else those of the tracker. The sizes of all
-    /// frames are checked before the first is decoded, and all are decoded before the first is tracked. Between frames
-    /// `meter` says whether to go on.
+    /// Takes the frames into `state`: the stored answers if the request was answered before, else those of the tracker.
+    /// The sizes of all frames are checked before the first is decoded, and all are decoded before the first is tracked.
+    /// Between frames `meter` says whether to go on.
     ///
     /// # Errors
-    /// The problem of the first bad frame, or of a request that costs too much. The session is unchanged.
-    pub fn advance(
-        &self,
-        locked: &mut LockedSession,
-        limits: &RequestLimits,
-        meter: &mut WorkMeter,
-        metrics: &TrackingMetrics,
-    ) -> Result<Answered, Problem> {
-        self.check_stream(locked.session())?;
-        let answered = self.advance_state(locked.state(), limits, meter, metrics)?;
-        locked.session().renew();
-        Ok(answered)
-    }
-
-    /// The same with a state that need not be a session's.
-    ///
-    /// # Errors
-    /// See [`Self::advance`]. The state is unchanged.
-    pub fn advance_state(
+    /// That of the first bad frame, or of a request that costs too much. The state is to be dropped then.
+    pub(super) fn track(
         &self,
         state: &mut SessionState,
         limits: &RequestLimits,
         meter: &mut WorkMeter,
         metrics: &TrackingMetrics,
-    ) -> Result<Answered, Problem> {
-        let fingerprints: Vec<Fingerprint> = self
-            .files
-            .iter()
-            .map(|file| Fingerprint::of(file))
-            .collect();
+    ) -> Result<Tracked, FramesError> {
+        let fingerprints = self.files.iter().map(|file| Fingerprint::of(file));
+        let fingerprints: Vec<Fingerprint> = fingerprints.collect();
         let correction = self.correction.map(|given| given.of(state.target_count()));
         let correction = correction.transpose()?;
         let decision = state.replay_decision(self.number, &fingerprints, correction)?;
         if let ReplayDecision::Replay(estimates) = decision {
-            return Ok(Answered {
+            return Ok(Tracked {
                 estimates,
                 replayed: true,
-                seen: Vec::new(),
+                diagnostics: Vec::new(),
                 checkpoint: None,
             });
         }
@@ -152,24 +124,22 @@ impl NextFrames {
         let decoded = decode(&self.files, &limits.frame, &|_| format, meter, metrics)?;
         let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let before = state.latest();
-        let mut seen = Vec::new();
-        let sees = (self.sees && correction.is_none()).then_some(&mut seen);
-        let estimates = state.advance(&frames, correction, meter, self.kept, sees);
+        let mut diagnostics = Vec::new();
+        let wanted = self.with_diagnostics && correction.is_none();
+        let seen = wanted.then_some(&mut diagnostics);
+        let estimates = state.advance(&frames, correction, meter, self.min_answers, seen);
         frames
             .into_iter()
             .for_each(|(_, frame)| ingest::recycle(frame));
-        let refused = |error| match error {
-            StepError::Refused { index, error } => {
-                Problem::from(error).of_frame(index, self.files.len())
-            }
+        let estimates = estimates.map_err(|error| match error {
+            StepError::Refused { index, error } => self.fault(index, error),
             StepError::Stopped(stopped) => stopped.into(),
-        };
-        let estimates = estimates.map_err(refused)?;
+        })?;
         metrics.tracked(&before, &estimates, &meter.take_steps());
-        Ok(Answered {
+        Ok(Tracked {
             estimates,
             replayed: false,
-            seen,
+            diagnostics,
             checkpoint: None,
         })
     }
@@ -182,12 +152,11 @@ impl NextFrames {
         &self,
         limits: &RequestLimits,
         (width, height): (u32, u32),
-    ) -> Result<(), Problem> {
+    ) -> Result<(), FramesError> {
         let mut pixels = 0;
         for (index, file) in self.files.iter().enumerate() {
-            let of_frame = |problem: Problem| problem.of_frame(index, self.files.len());
             let size = ingest::size(file, &limits.frame);
-            let (got_width, got_height) = size.map_err(|error| of_frame(error.into()))?;
+            let (got_width, got_height) = size.map_err(|error| self.fault(index, error))?;
             if (got_width, got_height) != (width, height) {
                 let error = TrackerError::FrameSize {
                     width,
@@ -195,27 +164,33 @@ impl NextFrames {
                     got_width,
                     got_height,
                 };
-                return Err(of_frame(error.into()));
+                return Err(self.fault(index, error));
             }
             pixels += u64::from(width) * u64::from(height);
         }
         limits.check_pixels(pixels, self.files.len())
     }
+
+    fn fault(&self, index: usize, fault: impl Into<FrameFault>) -> FramesError {
+        fault_of(index, self.files.len(), fault)
+    }
 }
 
-/// What the frames of one request may cost.
-#[derive(Debug, Clone, Copy)]
-pub struct RequestLimits {
-    /// The limits of each frame.
-    pub frame: Limits,
-    /// Most pixels of several frames together. A single frame has its own limit.
-    pub max_pixels: u64,
+fn fault_of(index: usize, count: usize, fault: impl Into<FrameFault>) -> FramesError {
+    FramesError::Frame {
+        index,
+        count,
+        fault: fault.into(),
+    }
 }
 
 impl RequestLimits {
-    fn check_pixels(&self, pixels: u64, files: usize) -> Result<(), Problem> {
+    fn check_pixels(&self, pixels: u64, files: usize) -> Result<(), FramesError> {
         match files > 1 && pixels > self.max_pixels {
-            true => Err(Problem::too_many_pixels(pixels, self.max_pixels)),
+            true => Err(FramesError::TooManyPixels {
+                pixels,
+                limit: self.max_pixels,
+            }),
             false => Ok(()),
         }
     }
@@ -225,12 +200,11 @@ impl RequestLimits {
 ///
 /// # Errors
 /// They have, or one of them is no image.
-pub fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), Problem> {
+pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let mut pixels = 0;
     for (index, file) in files.iter().enumerate() {
         let size = ingest::size(file, &limits.frame);
-        let (width, height) =
-            size.map_err(|error| Problem::from(error).of_frame(index, files.len()))?;
+        let (width, height) = size.map_err(|error| fault_of(index, files.len(), error))?;
         pixels += u64::from(width) * u64::from(height);
     }
     limits.check_pixels(pixels, files.len())
@@ -240,7 +214,7 @@ pub fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), Probl
 ///
 /// # Errors
 /// Those that are images have too many pixels.
-pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), Problem> {
+pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let sizes = files
         .iter()
         .filter_map(|file| ingest::size(file, &limits.frame).ok());
@@ -252,19 +226,19 @@ pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<
 /// whether to go on.
 ///
 /// # Errors
-/// The problem of the first bad file, or that the work was stopped.
-pub fn decode(
+/// That of the first bad file, or that the work was stopped.
+pub(super) fn decode(
     files: &[Bytes],
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
     meter: &mut WorkMeter,
     metrics: &TrackingMetrics,
-) -> Result<Vec<Frame>, Problem> {
+) -> Result<Vec<Frame>, FramesError> {
     let decode_one = |(index, file): (usize, &Bytes)| {
         meter.check()?;
         metrics
             .decoding(|| ingest::decode_to(file, limits, format))
-            .map_err(|error| Problem::from(error).of_frame(index, files.len()))
+            .map_err(|error| fault_of(index, files.len(), error))
     };
     files.iter().enumerate().map(decode_one).collect()
 }

@@ -1,8 +1,8 @@
 //! Places for the processes that decode videos: a client has one at a time, so that another client gets the next.
 
-use super::state::AppState;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
+use crate::http::state::AppState;
 use crate::sessions::{QueueFull, QueuePermit};
 use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, timeout_at};
@@ -35,7 +35,7 @@ impl VideoPlace {
         let all = all.ok().and_then(Result::ok).ok_or(QueueFull)?;
         let requests = config.limits.max_video_frames.div_ceil(config.max_frames);
         let requests = u32::try_from(requests).unwrap_or(u32::MAX);
-        let queue = state.admission.enter_again(request)?;
+        let queue = state.service.admission.enter_again(request)?;
         let place = Self {
             _of_client: own,
             _of_all: all,

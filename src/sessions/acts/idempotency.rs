@@ -1,44 +1,18 @@
 //! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
 //! `Idempotency-Key`, or an id that its client made.
 //!
-//! A name is kept as long as its session lives, so there are never more of them than sessions. Requests with one name
+//! A name is kept as long as its session ttl, so there are never more of them than sessions. Requests with one name
 //! are served one after the other. Problems are not stored: the request can be sent again after them.
 
-use crate::http::problems::problem::Problem;
 use crate::sessions::Owner;
-use axum::http::HeaderMap;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Mutex as AsyncMutex;
 use uuid::Uuid;
 
-/// The header.
-pub const IDEMPOTENCY_KEY: &str = "idempotency-key";
-const MAX_KEY_BYTES: usize = 255;
-
-/// The key of a request.
-///
-/// # Errors
-/// There is more than one, or it is empty, too long, or not visible ASCII.
-pub fn key_of(headers: &HeaderMap) -> Result<Option<String>, Problem> {
-    let mut values = headers.get_all(IDEMPOTENCY_KEY).iter();
-    let Some(value) = values.next() else {
-        return Ok(None);
-    };
-    let text = value.to_str().unwrap_or("");
-    let usable = (1..=MAX_KEY_BYTES).contains(&text.len())
-        && text.bytes().all(|byte| byte.is_ascii_graphic());
-    match usable && values.next().is_none() {
-        true => Ok(Some(text.to_owned())),
-        false => Err(Problem::malformed(
-            "`Idempotency-Key` must be given once, with 1 to 255 visible ASCII characters.",
-        )),
-    }
-}
-
 /// What a client calls a session before it is open.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum OpeningName {
+pub enum CreationKey {
     /// An idempotency key. Each owner has keys of its own.
     Key(Owner, String),
     /// The session's id, which the client has made.
@@ -51,7 +25,7 @@ pub type Entry = Arc<AsyncMutex<Option<Uuid>>>;
 /// The sessions by the names under which they were opened.
 #[derive(Debug)]
 pub struct IdempotencyStore {
-    entries: Mutex<HashMap<OpeningName, Entry>>,
+    entries: Mutex<HashMap<CreationKey, Entry>>,
     max_entries: usize,
 }
 
@@ -67,7 +41,7 @@ impl IdempotencyStore {
     }
 
     /// The entry of a name: the one that is there, or a new one.
-    pub fn entry(&self, name: OpeningName, is_live: impl Fn(Uuid) -> bool) -> Entry {
+    pub fn entry(&self, name: CreationKey, is_live: impl Fn(Uuid) -> bool) -> Entry {
         if self.map().len() >= self.max_entries {
             self.prune(is_live);
         }
@@ -84,7 +58,7 @@ impl IdempotencyStore {
         });
     }
 
-    fn map(&self) -> MutexGuard<'_, HashMap<OpeningName, Entry>> {
+    fn map(&self) -> MutexGuard<'_, HashMap<CreationKey, Entry>> {
         // Nothing panics while it is held.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -97,7 +71,7 @@ mod tests {
     #[tokio::test]
     async fn answers_go_with_their_sessions_and_entries_in_use_stay() {
         let store = IdempotencyStore::new(4);
-        let name = |key: &str| OpeningName::Key(Owner::default(), key.to_owned());
+        let name = |key: &str| CreationKey::Key(Owner::default(), key.to_owned());
         let live = |id| id == Uuid::from_u128(1);
         for (key, session) in [("a", 1), ("b", 2)] {
             *store.entry(name(key), live).lock().await = Some(Uuid::from_u128(session));

@@ -1,9 +1,9 @@
 //! The frames of an uploaded video, as they are decoded.
 
-use super::state::AppState;
 use super::video_place::VideoPlace;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
 use crate::ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
 use axum::body::Bytes;
 use std::sync::Arc;
