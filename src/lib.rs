@@ -23,7 +23,3 @@
 pub mod drawing;
 pub mod http;
 pub mod sessions;
-
-pub use bagtrack_ingest as ingest;
-pub use bagtrack_sample as sample;
-pub use bagtrack_tracker as tracker;

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use bagtrack_ingest::{self as ingest, Limits};
+use bagtrack_ingest::Limits;
 use bagtrack_tracker::{Frame, Params, Preset, Tracker};
 use jpeg_encoder::{ColorType, Encoder};
 
@@ -106,7 +106,7 @@ fn frame_sizes() -> [Row; 4] {
     let mut sizes = [1, 2, 4, 6, 8].map(FrameSize::new);
     let limits = Limits::default();
     let decode = timed(&mut sizes, |size| {
-        black_box(ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
+        black_box(bagtrack_ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
     });
     let downscale = timed(&mut sizes, |size| {
         black_box(frame(size.zoom, &size.luma));

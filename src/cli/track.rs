@@ -2,10 +2,10 @@
 
 use super::track_frames::Frames;
 use super::track_writer::Writer;
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
 use bagtrack_cli::progress;
 use bagtrack_cli::{BOXES, ParamFlags, read_boxes};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Estimate, Params, Rect, Tracker};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,7 @@ struct Line<'a> {
     #[serde(rename = "box")]
     target: Rect,
     score: f32,
-    status: bagtrack::tracker::Status,
+    status: bagtrack_tracker::Status,
 }
 
 /// Runs `track`.
@@ -104,12 +104,12 @@ fn advance(
     match tracker {
         Some(tracker) => {
             let format = tracker.frame_format();
-            let frame = ingest::decode_to(bytes, &limits, &|_| format)?;
+            let frame = bagtrack_ingest::decode_to(bytes, &limits, &|_| format)?;
             Ok(tracker.step(&frame)?)
         }
         None => {
             let format = |source| params.frame_format(source, &target);
-            let frame = ingest::decode_to(bytes, &limits, &format)?;
+            let frame = bagtrack_ingest::decode_to(bytes, &limits, &format)?;
             let first = Tracker::new(&frame, target, params.clone())?;
             Ok(tracker.insert(first).estimate())
         }

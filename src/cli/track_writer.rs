@@ -2,8 +2,8 @@
 
 use super::draw;
 use super::track_frames::{FFMPEG, FrameFile};
-use bagtrack::tracker::Estimate;
 use bagtrack_cli::output;
+use bagtrack_tracker::Estimate;
 use std::error::Error;
 use std::fs;
 use std::io::{Read, Write};

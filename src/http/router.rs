@@ -18,7 +18,7 @@ use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::HeaderValue;

@@ -10,7 +10,6 @@ mod capacity;
 mod connections;
 mod containers;
 mod counted;
-mod cvat;
 mod drawn;
 mod expiry;
 #[cfg(feature = "otel")]

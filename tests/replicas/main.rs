@@ -7,7 +7,6 @@ mod clip;
 mod failures;
 mod incarnations;
 mod lost_records;
-mod outage;
 mod pair;
 mod prefix;
 mod refusing;

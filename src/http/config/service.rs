@@ -5,8 +5,6 @@ use super::access::AccessConfig;
 use super::limits::LimitsConfig;
 use super::store::StoreConfig;
 use crate::http::middleware::base_path::BasePath;
-use crate::http::service::advance::RequestLimits;
-use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -166,7 +164,7 @@ pub struct Config {
 impl Default for Config {
     /// The settings that hold where no other is given. Neither flags nor the environment are read.
     fn default() -> Self {
-        let limits = ingest::Limits::default();
+        let limits = bagtrack_ingest::Limits::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             workers: None,
@@ -210,8 +208,8 @@ impl Config {
     }
 
     /// The limits of one frame.
-    pub fn frame_limits(&self) -> ingest::Limits {
-        ingest::Limits {
+    pub fn frame_limits(&self) -> bagtrack_ingest::Limits {
+        bagtrack_ingest::Limits {
             max_bytes: self.max_frame_bytes,
             max_side: self.max_frame_side,
             max_pixels: self.max_frame_pixels,
@@ -223,14 +221,6 @@ impl Config {
     pub fn session_bytes(&self) -> usize {
         let default = self.max_sessions.saturating_mul(USUAL_SESSION_BYTES);
         self.limits.max_session_bytes.unwrap_or(default)
-    }
-
-    /// The limits of one request.
-    pub(in crate::http) fn request_limits(&self) -> RequestLimits {
-        RequestLimits {
-            frame: self.frame_limits(),
-            max_pixels: self.limits.max_request_pixels,
-        }
     }
 }
 

@@ -1,22 +1,13 @@
 //! The settings of the store that replicas share.
 
 use super::access::Secret;
-use crate::sessions::{Store, StoreAddress};
+use crate::sessions::{RedisStore, SessionStore, StoreAddress};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::flag_values::parse_duration;
 
 use super::limits::shown;
-
-/// What is done with a frame while the store gives no answer.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum StoreMode {
-    /// It is refused.
-    #[default]
-    Strict,
-    /// It is tracked in memory, and its answer says `Durable: false`.
-    BestEffort,
-}
 
 /// The store that replicas share. Without one, sessions live in this process only.
 #[derive(Debug, Clone, clap::Args)]
@@ -44,12 +35,6 @@ pub struct StoreConfig {
         value_parser = parse_duration
     )]
     pub store_timeout: Duration,
-    /// While the store gives no answer: `strict` refuses frames, `best-effort` tracks on and says `Durable: false`.
-    #[arg(
-        long, env = "BAGTRACK_STORE_MODE", value_enum,
-        default_value_t = StoreConfig::default().store_mode
-    )]
-    pub store_mode: StoreMode,
     /// What the keys in the store begin with. Services that share a server without sharing sessions have different
     /// ones.
     #[arg(
@@ -65,7 +50,6 @@ impl Default for StoreConfig {
             store: None,
             store_every: 1,
             store_timeout: Duration::from_secs(1),
-            store_mode: StoreMode::Strict,
             store_prefix: "bagtrack".to_owned(),
         }
     }
@@ -95,30 +79,11 @@ impl StoreConfig {
     }
 }
 
-/// The store, and how it is used.
-#[derive(Debug, Clone)]
-pub struct SharedStore {
-    /// The store.
-    pub calls: Store,
-    /// The state is written at every so many frames.
-    pub every: u64,
-    /// Whether frames are tracked while the store gives no answer.
-    pub best_effort: bool,
-}
-
-impl SharedStore {
-    /// The store of these settings, where they name one.
-    pub async fn connect(config: &StoreConfig) -> Option<Self> {
-        let text = config.store.as_ref()?.text();
-        let address = StoreAddress::parse(text, config.store_timeout).ok()?;
-        let store = Store::connect(address, &config.store_prefix, config.store_timeout).await;
-        let calls = store
-            .inspect_err(|error| tracing::error!(%error, "no store"))
-            .ok()?;
-        Some(Self {
-            calls,
-            every: config.store_every,
-            best_effort: config.store_mode == StoreMode::BestEffort,
-        })
-    }
+/// The store of these settings, where they name one.
+pub async fn connect(config: &StoreConfig) -> Option<Arc<dyn SessionStore>> {
+    let text = config.store.as_ref()?.text();
+    let address = StoreAddress::parse(text, config.store_timeout).ok()?;
+    let store = RedisStore::connect(address, &config.store_prefix, config.store_timeout).await;
+    let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
+    Some(Arc::new(store.ok()?))
 }
