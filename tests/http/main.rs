@@ -1,7 +1,6 @@
 //! The service over a real socket, with a real client.
 
 mod access;
-mod application;
 mod bag;
 mod base_path;
 mod binary;
@@ -12,7 +11,6 @@ mod compressed;
 mod connections;
 mod containers;
 mod counted;
-mod cvat;
 mod drawn;
 mod expiry;
 #[cfg(feature = "otel")]
@@ -35,7 +33,6 @@ mod openapi;
 mod openapi_examples;
 mod origins;
 mod page;
-mod pictures;
 mod problem_page;
 mod problems;
 mod process;
@@ -56,3 +53,5 @@ mod track_video;
 mod uploads;
 mod version;
 mod videos;
+
+use bagtrack_testing::service::{application, pictures};

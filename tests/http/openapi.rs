@@ -2,7 +2,7 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
-use bagtrack::tracker::{Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

@@ -3,8 +3,8 @@
 use super::settings::Settings;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::ingest::{self, video};
-use crate::tracker::Params;
+use bagtrack_ingest::{self as ingest, video};
+use bagtrack_tracker::Params;
 use serde_json::{Value, json};
 
 /// What files are called elsewhere, without `[]` at the end.

@@ -2,7 +2,7 @@
 
 use crate::http::extract::overrides::{ParamOverrides, by_name};
 use crate::http::extract::settings::{MAX_EXACT, number_schema};
-use crate::tracker::{Parameter, Params, Preset};
+use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;

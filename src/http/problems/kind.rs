@@ -112,9 +112,6 @@ kinds! {
     TooManyFrames: 413 "too-many-frames" "There are too many frames in the request"
         cause: "A request has more frames than `--max-frames`, or a video more than `--max-video-frames`."
         cure: "Send the rest in another request."
-    UriTooLong: 414 "uri-too-long" "The path and query are too long"
-        cause: "The settings in the query have too many bytes."
-        cure: "Send the settings in the body, as a form or JSON."
     UnsupportedImage: 415 "unsupported-image" "The frame is not a JPEG, PNG or WebP image"
         cause: "The file is of another type (HEIC, AVIF, BMP, TIFF), no image at all, or a video where none is \
             taken."
@@ -154,9 +151,6 @@ kinds! {
         cause: "One client may have so many sessions, requests, connections and frames a second. `RateLimit` \
             tells what is left."
         cure: "Try again after `Retry-After`. Delete sessions that are done."
-    HeadTooLarge: 431 "head-too-large" "The head of the request is too large"
-        cause: "The headers have too many bytes or lines."
-        cure: "Send fewer or shorter headers (cookies are not needed)."
     Internal: 500 "internal" "The service failed"
         cause: "A fault of the service."
         cure: "Report it with the `request_id`: the log has the cause under this id."

@@ -2,23 +2,20 @@
 //!
 //! The next frame is tracked when the line before it has been taken. A problem after the first line is the last line.
 
+use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::Answer;
 use crate::http::respond::{json, response_format};
-use crate::http::service::advance::NextFrames;
-use crate::http::service::box_check;
-use crate::http::service::first_frame::FirstFrame;
-use crate::http::service::state::AppState;
-use crate::http::service::video_frames::VideoFrames;
-use crate::http::service::video_place::{VideoPlace, count_frame};
-use crate::http::service::work;
-use crate::ingest::video::VideoFormat;
-use crate::sessions::{QueuePermit, SessionState, WorkMeter};
+use crate::http::state::AppState;
+use crate::sessions::{Boxes, QueuePermit, SessionState, Start, box_warnings};
 use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_ingest::video::VideoFormat;
+use bagtrack_tracker::Params;
 use futures_util::stream;
 use serde::Serialize;
 use std::convert::Infallible;
@@ -32,8 +29,10 @@ pub struct VideoRequest {
     pub video: Bytes,
     /// How it is stored.
     pub format: VideoFormat,
-    /// The boxes and parameters.
-    pub first: FirstFrame,
+    /// The targets' boxes in its first frame.
+    pub boxes: Boxes,
+    /// The trackers' parameters.
+    pub params: Box<Params>,
     /// The place in the queue.
     pub queue: QueuePermit,
     /// Who sends it.
@@ -59,18 +58,18 @@ struct VideoTrack {
 /// # Errors
 /// The problem of the first frame.
 pub async fn answer(state: AppState, request: VideoRequest) -> Result<Response, Problem> {
-    let (client, first) = (request.client, request.first);
+    let (client, boxes, params) = (request.client, request.boxes, request.params);
     let (place, queue) = VideoPlace::take(&state, &client, request.queue).await?;
     let frames = VideoFrames::decode(&state, request.video, request.format, place)?;
     let mut video = VideoTrack {
-        queue: queue.for_frames(first.boxes.as_slice().len()),
+        queue: queue.for_frames(boxes.as_slice().len()),
         state,
         client,
         frames,
         path: request.path,
         request_id: request.request_id,
     };
-    let (line, track) = video.begin(first).await?;
+    let (line, track) = video.begin(boxes, params).await?;
     let lines = stream::unfold(Some((video, Some(line), track)), |work| {
         let following = async move {
             let (mut video, first, track) = work?;
@@ -91,21 +90,26 @@ pub async fn answer(state: AppState, request: VideoRequest) -> Result<Response, 
 
 impl VideoTrack {
     /// The line of the first frame, and the track that begins there.
-    async fn begin(&mut self, first: FirstFrame) -> Result<(Bytes, SessionState), Problem> {
+    async fn begin(
+        &mut self,
+        boxes: Boxes,
+        params: Box<Params>,
+    ) -> Result<(Bytes, SessionState), Problem> {
         let file = self
             .frames
             .next()
             .await
             .ok_or_else(Problem::missing_frame)??;
         count_frame(&self.state, &self.client).await?;
-        let worker = self.state.clone();
-        let begin = move |meter: &mut WorkMeter| {
-            let boxes = first.boxes.clone();
-            let track = first.begin(&worker, &file, meter)?;
-            let warnings = box_check::warnings(boxes.as_slice(), track.source_size());
-            Ok((track, warnings))
+        let given = boxes.clone();
+        let start = Start::Frame {
+            file,
+            boxes,
+            params,
         };
-        let (track, warnings) = work::run(&self.state, self.queue.clone(), begin).await?;
+        let begun = self.state.service.begin_track(self.queue.clone(), start);
+        let track = begun.await?;
+        let warnings = box_warnings(given.as_slice(), track.source_size());
         let answer = Answer::from(&track.latest()).with_warnings(warnings);
         Ok((line(&answer)?, track))
     }
@@ -124,18 +128,13 @@ impl VideoTrack {
 
     async fn advance(
         &self,
-        mut track: SessionState,
+        track: SessionState,
         file: Bytes,
     ) -> Result<(Bytes, SessionState), Problem> {
         count_frame(&self.state, &self.client).await?;
-        let worker = self.state.clone();
-        let advance = move |meter: &mut WorkMeter| {
-            let next = NextFrames::posted(None, vec![file], None);
-            let (limits, metrics) = (worker.config.request_limits(), &worker.metrics.tracking);
-            next.advance_state(&mut track, &limits, meter, metrics)?;
-            Ok(track)
-        };
-        let track = work::run(&self.state, self.queue.clone(), advance).await?;
+        let service = &self.state.service;
+        let track = service.continue_track(self.queue.clone(), track, file);
+        let track = track.await?;
         Ok((line(&Answer::from(&track.latest()))?, track))
     }
 

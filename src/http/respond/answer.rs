@@ -2,8 +2,8 @@
 
 use super::target_box::TargetBox;
 use crate::sessions::{Estimates, PerTarget};
-use crate::tracker::{Estimate, Status};
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::{Estimate, Status};
 use serde::Serialize;
 
 /// Bytes of a target in an answer: the value, and its JSON with six numbers.
@@ -74,11 +74,6 @@ impl From<&Estimate> for TargetView {
 }
 
 impl Answer {
-    /// Which frame it answers.
-    pub fn frame(&self) -> u64 {
-        self.frame
-    }
-
     /// With what may be wrong with the box that was given, where anything is.
     pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
         self.warnings = warnings;
