@@ -1,12 +1,13 @@
 //! The commands of the program, one file each.
 //!
-//! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1
-//! after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
+//! In: flags and environment variables, read by clap. Out: standard output, new files, and an exit status: 0, or 1
+//! after an error that is printed as one line on standard error, or 2 from clap on wrong usage, or 128 and the number of
+//! the signal that ended `track`.
 
-mod draw;
 mod eval;
 #[cfg(feature = "otel")]
 mod export;
+mod formats;
 mod health;
 mod log;
 mod open_files;
@@ -17,8 +18,6 @@ mod sample;
 mod serve;
 mod signals;
 mod track;
-mod track_frames;
-mod track_writer;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -57,29 +56,30 @@ enum Command {
     Health(health::Args),
 }
 
-/// Reads the command line. The settings of the service are in the help of `serve` only, so that this one fits a screen.
+/// The commands. The settings of the service are in the help of `serve` only, so that the first help fits a screen.
+fn command() -> clap::Command {
+    let command = Cli::command().mut_args(|arg| arg.hide(true));
+    command.after_help(AFTER)
+}
+
+/// Reads the command line.
 pub fn parse() -> Cli {
-    let command = Cli::command()
-        .mut_args(|arg| arg.hide(true))
-        .after_help(AFTER);
-    let matches = command.get_matches();
+    let matches = command().get_matches();
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 /// Runs the command.
 pub fn run(cli: Cli) -> ExitCode {
+    let done = |()| ExitCode::SUCCESS;
     let result = match cli.command.unwrap_or(Command::Serve(Box::new(cli.serve))) {
-        Command::Serve(args) => serve::run(*args),
+        Command::Serve(args) => serve::run(*args).map(done),
         Command::Track(args) => track::run(args),
-        Command::Eval(args) => eval::run(args),
-        Command::Sample(args) => sample::run(args),
-        Command::Health(args) => health::run(args),
+        Command::Eval(args) => eval::run(args).map(done),
+        Command::Sample(args) => sample::run(args).map(done),
+        Command::Health(args) => health::run(args).map(done),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("bagtrack: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    result.unwrap_or_else(|error| {
+        eprintln!("bagtrack: {error}");
+        ExitCode::FAILURE
+    })
 }

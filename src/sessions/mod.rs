@@ -71,5 +71,6 @@ pub use store::{
 };
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+    target_seed,
 };
 pub use work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
