@@ -4,10 +4,13 @@
 //! after an error that is printed as one line on standard error, or 2 from clap on wrong usage, or 128 and the number of
 //! the signal that ended `track`.
 
+mod address;
+mod completions;
 mod eval;
 #[cfg(feature = "otel")]
 mod export;
 mod formats;
+mod headings;
 mod health;
 mod log;
 mod open_files;
@@ -54,12 +57,16 @@ enum Command {
     Sample(sample::Args),
     /// Ask a running service whether it is healthy.
     Health(health::Args),
+    /// Print what completes commands and flags in a shell.
+    Completions(completions::Args),
 }
 
 /// The commands. The settings of the service are in the help of `serve` only, so that the first help fits a screen.
 fn command() -> clap::Command {
     let command = Cli::command().mut_args(|arg| arg.hide(true));
-    command.after_help(AFTER)
+    command
+        .mut_subcommand("serve", |serve| serve.mut_args(headings::put))
+        .after_help(AFTER)
 }
 
 /// Reads the command line.
@@ -77,6 +84,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Eval(args) => eval::run(args).map(done),
         Command::Sample(args) => sample::run(args).map(done),
         Command::Health(args) => health::run(args).map(done),
+        Command::Completions(args) => completions::run(args, command()).map(done),
     };
     result.unwrap_or_else(|error| {
         eprintln!("bagtrack: {error}");

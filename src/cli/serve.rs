@@ -3,11 +3,16 @@
 //! It ends with status 0 when all open requests have ended in time, and with 1 when some were cut off, or when a second
 //! signal ended it at once.
 
+use super::address::Addresses;
 use super::log::{Log, LogFormat};
 use super::open_files;
 use super::signals::{self, Signals};
-use bagtrack::http::{Application, Config, MemoryBound};
+use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use std::error::Error;
+use std::net::SocketAddr;
+
+/// How clients speak with the service.
+const SCHEME: &str = "http";
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -39,6 +44,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
+    let base_path = config.base_path.clone();
     let application = Application::bind(config).await?;
     let keys = application.api_keys();
     let mut signals = Signals::listen()?;
@@ -46,7 +52,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    tracing::info!("listening on http://{}", application.local_addr()?);
+    tell_addresses(SCHEME, application.local_addr()?, &base_path);
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -72,5 +78,22 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     match ended {
         true => Ok(()),
         false => Err("requests were cut off".into()),
+    }
+}
+
+/// Logs where the service listens, and what to open in a browser.
+fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
+    tracing::info!("listening on {scheme}://{listen}");
+    let Addresses { here, elsewhere } = Addresses::of(scheme, listen, base_path);
+    if let Some(url) = here {
+        tracing::info!("open {url} in a browser");
+    }
+    if let Some(url) = elsewhere {
+        tracing::info!("on other machines, open {url}");
+        if scheme == "http" {
+            tracing::info!(
+                "a phone's browser gives its camera to https only: for that, put a proxy with TLS in front"
+            );
+        }
     }
 }
