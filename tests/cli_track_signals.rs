@@ -47,7 +47,8 @@ fn stop_by(signal: Signal, args: &[&str]) -> (String, String, ExitStatus) {
 /// A video that takes far longer than it takes to send a signal.
 fn long_video(parent: &Path) -> std::path::PathBuf {
     let dir = clip(parent, "clip", &["--width", "160", "--height", "120"]);
-    let video = parent.join("long.mp4");
+    // Without an index: it cannot be entered in the middle.
+    let video = parent.join("long.avi");
     video_of(&dir, &video, 100);
     video
 }

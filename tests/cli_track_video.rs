@@ -237,6 +237,104 @@ fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
     }
 }
 
+/// Frame n of these videos is of the gray 20 + 4 n. Files with an index are entered in the middle.
+#[test]
+fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    for (name, coded) in [
+        // With B-frames, and few frames that stand for themselves.
+        ("b.mp4", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        ("b.mkv", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        (
+            "late.mov",
+            ["-c:v", "mpeg4", "-output_ts_offset", "3", "-g", "20"],
+        ),
+        (
+            "golden.webm",
+            ["-c:v", "libvpx-vp9", "-cpu-used", "8", "-g", "20"],
+        ),
+        ("stream.ts", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        ("old.avi", ["-c:v", "mpeg4", "-bf", "2", "-g", "20"]),
+    ] {
+        let video = parent.path().join(name);
+        let mut command = Command::new("ffmpeg");
+        command.args(["-v", "error", "-f", "lavfi", "-i"]);
+        let gray = "lum='20+4*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
+        command.arg(format!("color=size=96x64:rate=30:duration=1.5,geq={gray}"));
+        command.args(coded).args(["-b:v", "2M", text(&video)]);
+        assert!(command.status().expect("ffmpeg starts").success(), "{name}");
+        for start in [0, 1, 19, 20, 21, 33, 44] {
+            let pictures = parent.path().join(format!("{name}-{start}"));
+            let start_at = start.to_string();
+            let flags = ["--box=30,20,24,24", "--start", &start_at, "--format", "csv"];
+            let out = format!("{}/", text(&pictures));
+            let printed = [&["track", text(&video)], &flags[..], &["--draw", &out]].concat();
+            let found = rows(&succeeds(&printed));
+            let numbers: Vec<u64> = found.iter().map(|row| row.frame).collect();
+            assert_eq!(
+                numbers,
+                (start..45).collect::<Vec<u64>>(),
+                "{name} from {start}"
+            );
+            let picture = image::open(pictures.join(format!("{start:06}.jpg")));
+            let picture = picture.expect("it was drawn").into_luma8();
+            // A square of the ground, away from the box.
+            let area = image::imageops::crop_imm(&picture, 66, 58, 4, 4).to_image();
+            let sum: f64 = area.pixels().map(|pixel| f64::from(pixel.0[0])).sum();
+            let mean = sum / 16.0;
+            let dark = if (66 / 8 + 58 / 8) % 2 == 0 {
+                0.0
+            } else {
+                25.0
+            };
+            // Luma is stored from 16 to 235.
+            let expected = (20.0 + dark + 4.0 * start as f64 - 16.0) * 255.0 / 219.0;
+            assert!(
+                (mean - expected).abs() < 2.3,
+                "{name} from {start}: {mean}, not {expected}"
+            );
+        }
+    }
+}
+
+/// A browser's recording of a screen is like this: frames come when something changes. Two of them are in the time of one.
+#[test]
+fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let video = parent.path().join("bursts.mkv");
+    let mut command = Command::new("ffmpeg");
+    let frames = dir.join("img/%04d.jpg");
+    command.args(["-v", "error", "-framerate", "30", "-i", text(&frames)]);
+    let bursts = "settb=1/1000,setpts=if(lt(N\\,6)\\,N*5\\,N*60)";
+    command.args(["-vf", bursts, "-vsync", "passthrough"]);
+    command.args(["-enc_time_base", "1:1000", text(&video)]);
+    assert!(command.status().expect("ffmpeg starts").success());
+    let flags = ["track", text(&video), &target, "--format", "csv"];
+    let times = |printed: &str| {
+        let rows = rows(printed).into_iter();
+        rows.map(|row| (row.frame, row.time.expect("a time")))
+            .collect::<Vec<_>>()
+    };
+    let expected: Vec<(u64, f64)> = (0..12)
+        .map(|frame| {
+            (
+                frame,
+                f64::from(frame as u32 * if frame < 6 { 5 } else { 60 }) / 1000.0,
+            )
+        })
+        .collect();
+    assert_eq!(times(&succeeds(&flags)), expected);
+    let from_four = [&flags[..], &["--start", "4"]].concat();
+    assert_eq!(times(&succeeds(&from_four)), expected[4..]);
+}
+
 /// Frames of a phone come at uneven times.
 #[test]
 fn times_are_those_of_the_video_also_where_its_rate_changes() {

@@ -15,9 +15,7 @@ use std::io::ErrorKind;
 pub struct Job {
     /// The frames.
     pub frames: Frames,
-    /// The number of the first frame that is tracked.
-    pub first: u64,
-    /// The targets in it.
+    /// The targets in the first frame that is wanted.
     pub boxes: Vec<Rect>,
     /// The parameters of all trackers.
     pub params: Params,
@@ -56,7 +54,7 @@ impl Job {
         let mut targets: Option<Targets> = None;
         let mut count = 0;
         while !interrupt.came() {
-            if self.frames.next_index() < self.first {
+            if self.frames.are_before_first() {
                 self.frames.pass_over()?;
                 self.bar.inc(1);
                 continue;

@@ -34,6 +34,8 @@ pub struct Frames {
     shown: String,
     /// The number of the next frame.
     next: u64,
+    /// The number of the first frame that is wanted.
+    first: u64,
 }
 
 enum Source {
@@ -42,17 +44,60 @@ enum Source {
 }
 
 impl Frames {
-    /// The frames of a folder or a video.
-    pub fn open(path: &Path) -> Result<Self, Box<dyn Error>> {
+    /// The frames of a folder or a video, from `start` on.
+    pub fn open(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
+        match path.is_file() {
+            true => Self::of_video(path, start),
+            false => Self::of_folder(path, start),
+        }
+    }
+
+    fn of_folder(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
-        let source = match path.is_file() {
-            true => open_video(path)?,
-            false => Source::Folder(frames::list(path)?.into_iter()),
+        let Start::Frame(first) = start else {
+            let text = "frames of a folder have no times: give --start the number of a frame";
+            return Err(format!("{shown}: {text}").into());
         };
+        let mut paths = frames::list(path)?;
+        let count = paths.len();
+        match usize::try_from(first) {
+            Ok(index) if index < count => drop(paths.drain(..index)),
+            _ => return Err(too_short(&shown, count as u64).into()),
+        }
         Ok(Self {
-            source,
+            source: Source::Folder(paths.into_iter()),
             shown,
-            next: 0,
+            next: first,
+            first,
+        })
+    }
+
+    /// Frames before the start are passed over where the file has no index.
+    fn of_video(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
+        let shown = path.display().to_string();
+        let path = path.canonicalize()?;
+        let info = VideoInfo::read(&path);
+        let first = match start {
+            Start::Frame(index) => index,
+            Start::Time(seconds) => info.frame_at(seconds),
+        };
+        if let Some(count) = info.count().filter(|count| first >= *count) {
+            return Err(too_short(&shown, count).into());
+        }
+        let limits = Limits::default();
+        let limits = VideoLimits {
+            max_pixels: limits.max_pixels,
+            max_bytes: limits.max_bytes,
+            max_pictures: usize::MAX,
+        };
+        let from = info.seek_to(first);
+        let decoder = VideoDecoder::of_file(FFMPEG, &path, from, limits)
+            .map_err(|error| format!("{error}; install ffmpeg"))?;
+        Ok(Self {
+            source: Source::Video(Box::new(decoder), info),
+            shown,
+            next: from.map_or(0, |_| first),
+            first,
         })
     }
 
@@ -77,25 +122,14 @@ impl Frames {
         }
     }
 
-    /// The number of the next frame.
-    pub fn next_index(&self) -> u64 {
-        self.next
+    /// The number of the first frame that is wanted.
+    pub fn first(&self) -> u64 {
+        self.first
     }
 
-    /// The number of the frame that `start` names.
-    pub fn find(&self, start: Start) -> Result<u64, String> {
-        let index = match (start, &self.source) {
-            (Start::Frame(index), _) => index,
-            (Start::Time(seconds), Source::Video(_, info)) => info.frame_at(seconds),
-            (Start::Time(_), Source::Folder(_)) => {
-                let text = "frames of a folder have no times: give --start the number of a frame";
-                return Err(format!("{}: {text}", self.shown));
-            }
-        };
-        match self.left().map(|left| self.next + left) {
-            Some(count) if index >= count => Err(self.too_short(count)),
-            _ => Ok(index),
-        }
+    /// Whether the next frame is before the first that is wanted.
+    pub fn are_before_first(&self) -> bool {
+        self.next < self.first
     }
 
     /// Passes over the next frame.
@@ -105,7 +139,7 @@ impl Frames {
             Source::Video(..) => self.picture()?.is_some(),
         };
         if !is_there {
-            return Err(self.too_short(self.next).into());
+            return Err(too_short(&self.shown, self.next).into());
         }
         self.next += 1;
         Ok(())
@@ -132,7 +166,7 @@ impl Frames {
         let (index, shown) = (self.next, format!("{}, frame {}", self.shown, self.next));
         let picture = decoder.next_picture();
         let picture = picture.map_err(|error| format!("{shown}: {error}"))?;
-        if picture.is_none() && index == 0 {
+        if picture.is_none() && index == self.first {
             return Err(format!("{}: there are no pictures in it", self.shown).into());
         }
         Ok(picture.map(|bytes| FrameFile {
@@ -143,24 +177,10 @@ impl Frames {
             bytes,
         }))
     }
-
-    fn too_short(&self, count: u64) -> String {
-        let shown = &self.shown;
-        format!("{shown}: --start is after its last frame: it has {count} frames, counted from 0")
-    }
 }
 
-fn open_video(path: &Path) -> Result<Source, Box<dyn Error>> {
-    let limits = Limits::default();
-    let limits = VideoLimits {
-        max_pixels: limits.max_pixels,
-        max_bytes: limits.max_bytes,
-        max_pictures: usize::MAX,
-    };
-    let path = path.canonicalize()?;
-    let decoder = VideoDecoder::of_file(FFMPEG, &path, limits)
-        .map_err(|error| format!("{error}; install ffmpeg"))?;
-    Ok(Source::Video(Box::new(decoder), VideoInfo::read(&path)))
+fn too_short(shown: &str, count: u64) -> String {
+    format!("{shown}: --start is after its last frame: it has {count} frames, counted from 0")
 }
 
 fn read(index: u64, path: &Path) -> Result<FrameFile, String> {

@@ -73,10 +73,9 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     params.seed = args.seed.unwrap_or(params.seed);
     check(&args)?;
     let destination = args.draw.as_deref().map(Destination::of).transpose()?;
-    let frames = Frames::open(&args.path)?;
-    let first = frames.find(args.start.unwrap_or(Start::Frame(0)))?;
+    let frames = Frames::open(&args.path, args.start.unwrap_or(Start::Frame(0)))?;
     let boxes = match args.boxes.is_empty() {
-        true => vec![annotated(&args.path, first)?],
+        true => vec![annotated(&args.path, frames.first())?],
         false => args.boxes,
     };
     let columns = Columns {
@@ -91,7 +90,6 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     };
     let job = Job {
         frames,
-        first,
         boxes,
         params,
         destination,

@@ -6,6 +6,8 @@ use std::process::Command;
 
 /// The program that tells about videos.
 const FFPROBE: &str = "ffprobe";
+/// The first names of formats whose files have an index.
+const INDEXED: [&str; 2] = ["mov", "matroska"];
 /// Encoders of MPEG-4 take no larger parts of a fraction.
 const MAX_PART: u32 = 65535;
 
@@ -23,6 +25,8 @@ pub struct VideoInfo {
     pub rate: Rate,
     /// When each frame is shown, in seconds; empty where that is not known of all.
     times: Vec<f64>,
+    /// The start time of a file with an index, in which ffmpeg finds any frame.
+    indexed_from: Option<f64>,
 }
 
 impl Default for Rate {
@@ -75,23 +79,27 @@ impl VideoInfo {
     pub fn read(path: &Path) -> Self {
         let mut command = Command::new(FFPROBE);
         command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
-        let entries = "stream=avg_frame_rate:packet=pts_time,flags";
+        let entries = "format=format_name,start_time:stream=avg_frame_rate:packet=pts_time,flags";
         command.args(["-show_entries", entries]).arg(path);
         let told = command.output().map(|output| output.stdout);
         Self::parse(&String::from_utf8_lossy(&told.unwrap_or_default()))
     }
 
-    /// Reads lines like `packet,0.040000,K__` and `stream,25/1`.
+    /// Reads lines like `packet,0.040000,K__`, `stream,25/1` and `format,"mov,mp4",0.000000`.
     fn parse(told: &str) -> Self {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
         let mut times = Vec::new();
         let mut rate = None;
+        let mut indexed_from = None;
         for line in told.lines().map(fields) {
             match line.iter().map(String::as_str).collect::<Vec<_>>()[..] {
                 // A packet that an edit list leaves out is decoded, but not shown.
                 ["packet", _, flags, ..] if flags.contains('D') => {}
                 ["packet", time, ..] => times.push(time.parse::<f64>()),
                 ["stream", fraction, ..] => rate = Rate::parse(fraction),
+                ["format", name, .., start] if INDEXED.contains(&name.trim_matches('"')) => {
+                    indexed_from = start.parse().ok();
+                }
                 _ => {}
             }
         }
@@ -103,7 +111,17 @@ impl VideoInfo {
         Self {
             rate: rate.unwrap_or_default(),
             times,
+            indexed_from,
         }
+    }
+
+    /// From when on the file is to be decoded so that frame `index` is the first, in seconds after its start time: between
+    /// this frame and the one before it. None where it has to be decoded from its beginning.
+    pub fn seek_to(&self, index: u64) -> Option<f64> {
+        let index = usize::try_from(index).ok()?;
+        let before = self.times.get(index.checked_sub(1)?)?;
+        let middle = (before + self.times.get(index)?) / 2.0;
+        Some(middle - self.indexed_from?)
     }
 
     /// How many frames there are, where that is known.
@@ -148,6 +166,20 @@ mod tests {
         );
         let at = |seconds| info.frame_at(seconds);
         assert_eq!((at(0.0), at(0.1), at(0.11), at(0.3)), (0, 1, 2, 3));
+    }
+
+    #[test]
+    fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
+        let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,10/1\n";
+        let seek_to = |format: &str| {
+            let info = VideoInfo::parse(&format!("{packets}{format}\n"));
+            [0, 1, 2, 3].map(|index| info.seek_to(index).map(|time| (time * 1e6).round() / 1e6))
+        };
+        let expected = [None, Some(0.05), Some(0.25), None];
+        assert_eq!(seek_to("format,\"mov,mp4,m4a\",1.000000"), expected);
+        assert_eq!(seek_to("format,\"matroska,webm\",1.000000"), expected);
+        assert_eq!(seek_to("format,avi,1.000000"), [None; 4]);
+        assert_eq!(seek_to("format,\"matroska,webm\",N/A"), [None; 4]);
     }
 
     #[test]
