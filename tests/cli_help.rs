@@ -90,11 +90,7 @@ fn each_setting_of_the_service_is_below_a_heading() {
         let is_heading = !line.starts_with(' ') && line.ends_with(':');
         if is_heading {
             heading = line.trim_end_matches(':');
-        } else if let Some(flag) = line
-            .trim_start()
-            .split_whitespace()
-            .find(|word| word.starts_with("--"))
-        {
+        } else if let Some(flag) = line.split_whitespace().find(|word| word.starts_with("--")) {
             flags.entry(heading).or_default().push(flag);
         }
     }

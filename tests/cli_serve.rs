@@ -18,7 +18,7 @@ impl Drop for Service {
 }
 
 impl Service {
-    /// Starts it, and reads its log up to the line that follows the addresses.
+    /// Starts it, and reads its log up to the address for this machine, which is said last.
     fn start(flags: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
         command.arg("serve").args(flags).env("NO_COLOR", "1");
@@ -30,7 +30,7 @@ impl Service {
         let mut messages = Vec::new();
         loop {
             let line = log.next().expect("it starts").expect("text");
-            let is_last = line.contains("resident memory");
+            let is_last = line.contains("in a browser");
             messages.push(line);
             if is_last {
                 break;

@@ -128,7 +128,6 @@ fn a_name_with_a_slash_at_its_end_is_a_folder_whatever_its_ending() {
     assert_eq!(fs::read_dir(&out).expect("a folder").count(), 12);
 }
 
-/// A program that does as an ffmpeg without the encoder of this name does.
 #[cfg(unix)]
 #[test]
 fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
@@ -143,8 +142,9 @@ fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
     let program = programs.join("ffmpeg");
     // The real one, which is told to take an encoder that it does not have.
     let path = std::env::var("PATH").expect("it is set");
+    let encode = "-f mjpeg -i pipe:0 -c:v nothing";
     let script = format!(
-        "#!/bin/sh\nPATH='{path}'\nfor last; do :; done\nexec ffmpeg -v error -f mjpeg -i pipe:0 -c:v nothing \"$last\"\n"
+        "#!/bin/sh\nPATH='{path}'\nfor last; do :; done\nexec ffmpeg -v error {encode} \"$last\"\n"
     );
     fs::write(&program, script).expect("the folder is writable");
     let executable = fs::Permissions::from_mode(0o755);
@@ -300,7 +300,7 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     }
 }
 
-/// A browser's recording of a screen is like this: frames come when something changes. Two of them are in the time of one.
+/// A browser's recording of a screen is like this: frames come when something changes.
 #[test]
 fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
     if !has_ffmpeg() {

@@ -52,7 +52,8 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    tell_addresses(SCHEME, application.local_addr()?, &base_path);
+    let address = application.local_addr()?;
+    tracing::info!("listening on {SCHEME}://{address}");
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -62,6 +63,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
+    tell_addresses(SCHEME, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload_keys(keys));
     let ended = tokio::select! {
@@ -81,13 +83,9 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Logs where the service listens, and what to open in a browser.
+/// Logs what to open in a browser.
 fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
-    tracing::info!("listening on {scheme}://{listen}");
     let Addresses { here, elsewhere } = Addresses::of(scheme, listen, base_path);
-    if let Some(url) = here {
-        tracing::info!("open {url} in a browser");
-    }
     if let Some(url) = elsewhere {
         tracing::info!("on other machines, open {url}");
         if scheme == "http" {
@@ -95,5 +93,8 @@ fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
                 "a phone's browser gives its camera to https only: for that, put a proxy with TLS in front"
             );
         }
+    }
+    if let Some(url) = here {
+        tracing::info!("open {url} in a browser");
     }
 }

@@ -1,7 +1,7 @@
 //! How `bagtrack track` writes boxes: one file a format.
 //!
-//! In: a [`Row`] for each target in each frame. Out: a line. `text`, `json` and `csv` have 0-based pixels, as the service
-//! does, with the score and the status; `otb` and `mot` are what the tools of these benchmarks read.
+//! In: a [`Row`] for each target in each frame. Out: a line. `text`, `json` and `csv` have 0-based pixels, as the
+//! service does, with the score and the status; `otb` and `mot` are what the tools of these benchmarks read.
 
 mod csv;
 mod json;

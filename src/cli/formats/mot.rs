@@ -1,5 +1,5 @@
-//! The result file of the MOTChallenge: `frame,id,left,top,width,height,confidence,-1,-1,-1`. Frames, targets and pixels
-//! count from 1; the last three are a place in the world, which is not known.
+//! The result file of the MOTChallenge: `frame,id,left,top,width,height,confidence,-1,-1,-1`. Frames, targets and
+//! pixels count from 1; the last three are a place in the world, which is not known.
 
 use super::row::Row;
 

@@ -35,8 +35,8 @@ use std::process::ExitCode;
 /// Flags of `track`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/; or a video file,
-    /// for which ffmpeg must be installed.
+    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/; or a video
+    /// file, for which ffmpeg must be installed.
     #[arg(value_name = "VIDEO|DIR")]
     path: PathBuf,
     /// The target in the first frame: x,y,width,height in pixels, 0-based from the top-left corner, as the service
@@ -59,9 +59,9 @@ pub struct Args {
     /// Writes the boxes to a new file, not to standard output.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4, .m4v,
-    /// .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it has no
-    /// ending, or a slash at its end.
+    /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
+    /// .m4v, .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it
+    /// has no ending, or a slash at its end.
     #[arg(long, value_name = "OUT")]
     draw: Option<PathBuf>,
 }

@@ -51,7 +51,7 @@ fn step(tracker: &mut Tracker, frame: &Frame) -> Result<(), String> {
             got_width,
             got_height,
         }) => Err(format!(
-            "the frame is {got_width} x {got_height}, the frames before it are {width} x {height}; all must have one size"
+            "the frame is {got_width} x {got_height}, the frames before it are {width} x {height}; all have one size"
         )),
         Err(error) => Err(error.to_string()),
     }

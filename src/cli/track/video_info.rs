@@ -40,8 +40,8 @@ impl Default for Rate {
 }
 
 impl Rate {
-    /// Reads a fraction as ffprobe writes it. One with large parts, as the average of a phone's video is, becomes one of
-    /// thousandths.
+    /// Reads a fraction as ffprobe writes it. One with large parts, as the average of a phone's video is, becomes one
+    /// of thousandths.
     fn parse(text: &str) -> Option<Self> {
         let (numerator, denominator) = text.split_once('/')?;
         let [numerator, denominator] = [numerator.parse().ok()?, denominator.parse().ok()?];
@@ -115,8 +115,8 @@ impl VideoInfo {
         }
     }
 
-    /// From when on the file is to be decoded so that frame `index` is the first, in seconds after its start time: between
-    /// this frame and the one before it. None where it has to be decoded from its beginning.
+    /// From when on the file is to be decoded so that frame `index` is the first, in seconds after its start time:
+    /// between this frame and the one before it. None where it has to be decoded from its beginning.
     pub fn seek_to(&self, index: u64) -> Option<f64> {
         let index = usize::try_from(index).ok()?;
         let before = self.times.get(index.checked_sub(1)?)?;
