@@ -1,5 +1,10 @@
-//! What `bagtrack serve` says at its start: the addresses to open.
+//! `bagtrack serve` beside the other commands: what it says at its start, and that it answers as `track` does.
 
+mod command;
+
+use command::{clip, folder, succeeds, text};
+use serde_json::Value;
+use std::fs;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
@@ -116,4 +121,59 @@ fn for_all_interfaces_it_says_the_address_of_this_machine_in_its_network() {
         .iter()
         .any(|line| line.contains("camera to https only"));
     assert!(hint, "{:?}", service.messages);
+}
+
+#[test]
+fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &["--frames", "6"]);
+    let boxes = ["44.1,101.4,46.1,57.6", "200,30,20,16"];
+    let flags = ["--seed", "5", "--format", "json"];
+    let targets = ["--box", boxes[0], "--box", boxes[1]];
+    let lines = succeeds(&[&["track", text(&dir)], &flags[..], &targets].concat());
+    let lines: Vec<Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let url = service
+        .address("open ", " in a browser")
+        .expect("it is said");
+    let client = reqwest::blocking::Client::new();
+    let post = |path: &str, index: usize| {
+        let frame = fs::read(dir.join(format!("img/{index:04}.jpg"))).expect("it is there");
+        let answer = client.post(format!("{url}{path}")).body(frame).send();
+        let answer = answer.expect("it answers");
+        assert!(answer.status().is_success(), "{}", answer.status());
+        answer
+    };
+    let opened = post(&format!("/sessions?seed=5&boxes={}", boxes.join(";")), 1);
+    let session = opened.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    for index in 2..=6 {
+        let answer = post(&format!("{session}/frames"), index);
+        let answer: Value = serde_json::from_str(&answer.text().expect("text")).expect("JSON");
+        for (target, found) in answer["targets"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .enumerate()
+        {
+            let line = &lines[2 * (index - 1) + target];
+            assert_eq!(
+                (&line["frame"], &line["target"]),
+                (&answer["frame"], &target.into())
+            );
+            // The service answers hundredths of a pixel.
+            for side in ["x", "y", "width", "height"] {
+                let exact = line["box"][side].as_f64().expect("a number");
+                let rounded = (100.0 * exact).round() / 100.0;
+                assert_eq!(found["box"][side], rounded, "{side}: {line} {found}");
+            }
+            assert_eq!(line["status"], found["status"]);
+        }
+        assert_eq!(answer["targets"].as_array().map(Vec::len), Some(2));
+    }
 }
