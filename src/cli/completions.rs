@@ -1,6 +1,6 @@
 //! `bagtrack completions`: a script that completes commands and flags in a shell.
 
-use super::output;
+use bagtrack_cli::output;
 use clap::Command;
 use clap_complete::Shell;
 use std::error::Error;

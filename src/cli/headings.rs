@@ -87,13 +87,7 @@ const HEADINGS: [(&str, &[&str]); 10] = [
     ),
     (
         "Store",
-        &[
-            "store",
-            "store_every",
-            "store_timeout",
-            "store_mode",
-            "store_prefix",
-        ],
+        &["store", "store_every", "store_timeout", "store_prefix"],
     ),
     ("Shutdown", &["shutdown_delay", "shutdown_timeout"]),
     ("Logging", &["log", "log_format"]),

@@ -1,7 +1,7 @@
 //! A JSON object a line: a box as the service answers it, with the frame and the target that it is of.
 
 use super::row::Row;
-use bagtrack::tracker::{Rect, Status};
+use bagtrack_tracker::{Rect, Status};
 
 #[derive(serde::Serialize)]
 struct Object<'a> {

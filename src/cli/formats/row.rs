@@ -1,6 +1,6 @@
 //! What is written of one target in one frame, whatever the format.
 
-use bagtrack::tracker::{Estimate, Status};
+use bagtrack_tracker::{Estimate, Status};
 
 /// What is written of one target in one frame.
 pub struct Row<'a> {

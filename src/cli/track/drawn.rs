@@ -3,10 +3,10 @@
 use super::frames::FrameFile;
 use super::video_file::{self, VideoFile};
 use super::video_info::Rate;
-use crate::cli::output;
 use bagtrack::drawing::{self, Picture};
-use bagtrack::ingest::Limits;
-use bagtrack::tracker::Estimate;
+use bagtrack_cli::output;
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::Estimate;
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};

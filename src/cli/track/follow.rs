@@ -6,7 +6,7 @@ use super::interrupt::Interrupt;
 use super::rows::Rows;
 use super::targets::Targets;
 use crate::cli::formats::Row;
-use bagtrack::tracker::{Params, Rect};
+use bagtrack_tracker::{Params, Rect};
 use indicatif::ProgressBar;
 use std::error::Error;
 use std::io::ErrorKind;

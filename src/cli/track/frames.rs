@@ -2,9 +2,9 @@
 
 use super::start::Start;
 use super::video_info::{Rate, VideoInfo};
-use bagtrack::eval::frames;
-use bagtrack::ingest::Limits;
-use bagtrack::ingest::video::{VideoDecoder, VideoLimits};
+use bagtrack_cli::frames;
+use bagtrack_ingest::Limits;
+use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};

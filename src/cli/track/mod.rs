@@ -17,11 +17,9 @@ mod video_file;
 mod video_info;
 
 use super::formats::{Columns, Format};
-use super::params::ParamFlags;
-use super::progress;
-use bagtrack::eval::Sequence;
 use bagtrack::sessions::MAX_TARGETS;
-use bagtrack::tracker::Rect;
+use bagtrack_cli::{BOXES, ParamFlags, progress, read_boxes};
+use bagtrack_tracker::Rect;
 use drawn::Destination;
 use follow::Job;
 use frames::Frames;
@@ -129,13 +127,13 @@ fn annotated(dir: &Path, index: u64) -> Result<Rect, String> {
             dir.display()
         )
     };
-    let name = Sequence::BOXES;
+    let name = BOXES;
     if !dir.join(name).is_file() {
         return Err(needed(format!(
             "there is no {name} to take the first box from"
         )));
     }
-    let boxes = Sequence::read_boxes(dir).map_err(|error| error.to_string())?;
+    let boxes = read_boxes(dir).map_err(|error| error.to_string())?;
     let found = usize::try_from(index)
         .ok()
         .and_then(|index| boxes.get(index).copied().flatten());

@@ -1,8 +1,8 @@
 //! The targets of `bagtrack track`: a tracker for each, which all see the same frames.
 
-use bagtrack::ingest::{self, Limits};
 use bagtrack::sessions::{PerTarget, frame_format, largest_format, target_seed};
-use bagtrack::tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
 use std::error::Error;
 
 /// A tracker for each target.
@@ -13,7 +13,7 @@ impl Targets {
     pub fn start(bytes: &[u8], boxes: &[Rect], params: &Params) -> Result<Self, Box<dyn Error>> {
         let list = PerTarget::List(boxes.to_vec());
         let format = |source| frame_format(params, source, &list);
-        let frame = ingest::decode_to(bytes, &Limits::default(), &format)?;
+        let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &format)?;
         let start = |(target, given): (usize, &Rect)| {
             let mut params = params.clone();
             params.seed = target_seed(params.seed, target);
@@ -29,7 +29,7 @@ impl Targets {
     /// Tracks through the next frame, which is decoded once for all targets.
     pub fn step(&mut self, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
         let format = largest_format(self.0.iter().map(Tracker::frame_format));
-        let frame = ingest::decode_to(bytes, &Limits::default(), &|_| format)?;
+        let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &|_| format)?;
         for tracker in &mut self.0 {
             step(tracker, &frame)?;
         }

@@ -9,6 +9,6 @@ pub mod activity;
 pub mod connection_hold;
 pub mod connection_io;
 pub mod connections;
-pub mod head_problems;
 pub mod least_rate;
+pub mod refusal;
 pub mod server;

@@ -7,19 +7,18 @@
 use super::connection_hold::ConnectionHold;
 use super::connection_io::ConnectionIo;
 use super::connections::{Connections, NoRoom};
-use super::head_problems;
+use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
 use crate::http::config::service::Config;
-use crate::http::config::store::SharedStore;
+use crate::http::config::store;
 use crate::http::config::validation::ConfigError;
 use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Peer;
 use crate::http::router::router;
-use crate::http::service::state::AppState;
-use crate::http::service::stored_writes;
+use crate::http::state::AppState;
 use crate::sessions::Clock;
 use axum::body::Body;
 use axum::{Extension, Router};
@@ -103,7 +102,7 @@ impl Application {
         let address = config.listen;
         let access = Access::load(&config.access, address)?;
         let listener = TcpListener::bind(address).await;
-        let store = SharedStore::connect(&config.store).await;
+        let store = store::connect(&config.store).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
             state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
@@ -160,10 +159,10 @@ impl Application {
                 () = &mut accepting => {}
                 how = shutdown => {
                     tracing::info!("shutting down");
-                    state.drain();
+                    state.service.drain();
                     tokio::spawn({
                         let state = state.clone();
-                        async move { stored_writes::flush(&state).await }
+                        async move { state.service.flush().await }
                     });
                     // New connections are still served: a load balancer asks for /readyz on them.
                     if how.into() == Shutdown::Gradual {
@@ -178,7 +177,7 @@ impl Application {
         // Each connection, and each stream that took one over, holds a receiver.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
-        stored_writes::flush(&state).await;
+        state.service.flush().await;
         ended.is_ok()
     }
 }
@@ -231,7 +230,7 @@ async fn accept(
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
         let activity = permit.activity.clone();
-        let io = ConnectionIo::new(stream, peer.ip(), activity.clone(), state.clone());
+        let io = ConnectionIo::new(stream, activity.clone(), limits);
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
         let service = service.clone().layer(Extension(Peer(peer)));
         let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
@@ -249,7 +248,7 @@ async fn accept(
 /// Tells a client that it has too many connections, as far as its system takes that at once.
 fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
     let problem = Problem::too_many_connections();
-    let answer = head_problems::answer_of(&problem, peer.ip(), &state.metrics);
+    let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
     if let Ok(mut stream) = stream.into_std() {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);
@@ -261,11 +260,15 @@ async fn sweep(state: AppState) {
     let mut ticks = interval((idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30)));
     loop {
         ticks.tick().await;
-        let expired = state.registry.sweep();
-        state.prune();
+        let expired = state.service.registry.sweep();
+        state.service.prune();
         state.metrics.upkeep();
         if expired > 0 {
-            tracing::info!(expired, live = state.registry.len(), "sessions expired");
+            tracing::info!(
+                expired,
+                live = state.service.registry.len(),
+                "sessions expired"
+            );
         }
     }
 }
