@@ -1,7 +1,7 @@
 //! Files that are part of the program, sent with gzip to clients that take it.
 //!
-//! Each is compressed once, when it is first asked for: Swagger's bundle takes some 50 ms. A tag tells whether a browser
-//! has the file already. It is a weak one, since both encodings have it.
+//! Each is compressed once, when it is first asked for, so that no request costs the processor time of another. A tag
+//! tells whether a browser has the file already. It is a weak one, since both encodings have it.
 
 use axum::body::Bytes;
 use axum::http::header::{

@@ -55,7 +55,7 @@ fn unread(name: &str) -> String {
         "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
         _ => "Convert it, or let the camera or the browser make JPEGs.",
     };
-    format!("The file is a {name} image, which is not read. Send JPEG, PNG or WebP. {cure}")
+    format!("The file has the format {name}, which is not read. Send JPEG, PNG or WebP. {cure}")
 }
 
 impl From<TrackerError> for Problem {
