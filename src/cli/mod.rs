@@ -3,6 +3,8 @@
 //! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1
 //! after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
+#[cfg(feature = "tls")]
+mod any_certificate;
 mod draw;
 mod eval;
 #[cfg(feature = "otel")]

@@ -5,7 +5,7 @@
 
 use super::log::{Log, LogFormat};
 use super::open_files;
-use super::signals::{self, Signals};
+use super::signals::{self, Reloaded, Signals};
 use bagtrack::http::{Application, Config, MemoryBound};
 use std::error::Error;
 
@@ -40,13 +40,14 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let application = Application::bind(config).await?;
-    let keys = application.api_keys();
+    let reloaded = Reloaded::of(&application);
     let mut signals = Signals::listen()?;
     let (mut first, again) = (signals.clone(), &mut signals);
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    tracing::info!("listening on http://{}", application.local_addr()?);
+    let (scheme, address) = (application.scheme(), application.local_addr()?);
+    tracing::info!("listening on {scheme}://{address}");
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -57,7 +58,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         mib(bound.total())
     );
     let reports = tokio::spawn(log.dropped().report_regularly());
-    let reloads = tokio::spawn(signals::reload_keys(keys));
+    let reloads = tokio::spawn(signals::reload(reloaded));
     let ended = tokio::select! {
         ended = application.serve(first.shutdown()) => ended,
         () = again.second_shutdown() => {

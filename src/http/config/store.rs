@@ -26,7 +26,7 @@ pub enum StoreMode {
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct StoreConfig {
     /// Where sessions are stored: `redis://[user:password@]host[:port][/database]`, `valkey` alike, or
-    /// `redis-cluster://host:port,host:port`. In builds with the feature `tls`, `rediss` and `valkeys` for TLS.
+    /// `redis-cluster://host:port,host:port`. `rediss` and `valkeys` for TLS.
     #[cfg_attr(
         feature = "cli",
         arg(

@@ -7,6 +7,7 @@
 //! - *hyper's own answers* to heads that it cannot read get a problem document.
 
 use super::activity::Activity;
+use super::handshake::Transport;
 use super::head_problems;
 use super::least_rate::LeastRate;
 use crate::http::service::state::AppState;
@@ -17,7 +18,6 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Time for a handler to read the body that has come.
@@ -26,7 +26,7 @@ const READING: Duration = Duration::from_millis(500);
 /// The stream of a connection.
 #[derive(Debug)]
 pub struct ConnectionIo {
-    stream: TcpStream,
+    stream: Transport,
     client: IpAddr,
     activity: Arc<Activity>,
     state: AppState,
@@ -43,7 +43,7 @@ pub struct ConnectionIo {
 impl ConnectionIo {
     /// For a stream to this client, whose service tells `activity` what it does.
     pub fn new(
-        stream: TcpStream,
+        stream: Transport,
         client: IpAddr,
         activity: Arc<Activity>,
         state: AppState,
@@ -93,6 +93,18 @@ impl ConnectionIo {
             }
         }
         written
+    }
+
+    /// What came of sending what TLS has encrypted: an error where the client is too slow.
+    fn timely(&mut self, cx: &mut Context<'_>, sent: Poll<io::Result<()>>) -> Poll<io::Result<()>> {
+        match sent {
+            Poll::Ready(_) => self.rate.pause(),
+            Poll::Pending => {
+                ready!(self.rate.poll_late(cx));
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
+        sent
     }
 
     fn poll_bytes(&mut self, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
@@ -176,11 +188,13 @@ impl AsyncWrite for ConnectionIo {
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         ready!(self.poll_document(cx))?;
-        Pin::new(&mut self.stream).poll_flush(cx)
+        let flushed = Pin::new(&mut self.stream).poll_flush(cx);
+        self.timely(cx, flushed)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         ready!(self.poll_document(cx))?;
-        Pin::new(&mut self.stream).poll_shutdown(cx)
+        let ended = Pin::new(&mut self.stream).poll_shutdown(cx);
+        self.timely(cx, ended)
     }
 }

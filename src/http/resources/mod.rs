@@ -11,6 +11,8 @@ pub mod create_request;
 pub mod cvat;
 pub mod frames;
 pub mod health;
+#[cfg(feature = "tls")]
+pub mod https_only;
 pub mod metrics;
 pub mod session;
 pub mod session_path;

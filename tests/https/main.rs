@@ -1,0 +1,12 @@
+//! The service over TLS: with certificates made here, and with those of openssl and curl as the client.
+
+#[path = "../pictures/mod.rs"]
+mod pictures;
+
+mod certificates;
+mod client;
+mod curl;
+mod hostile;
+mod program;
+mod service;
+mod session;
