@@ -33,18 +33,17 @@ mod quotas;
 mod resources;
 mod respond;
 mod router;
-mod service;
+mod state;
 mod stream;
 
 pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
 pub use config::access::{AccessConfig, Secret};
-#[cfg(feature = "cli")]
 pub use config::flag_values::{parse_duration, parse_listen};
 pub use config::limits::LimitsConfig;
 pub use config::memory_bound::MemoryBound;
 pub use config::service::Config;
-pub use config::store::{StoreConfig, StoreMode};
+pub use config::store::StoreConfig;
 #[cfg(feature = "tls")]
 pub use config::tls::TlsConfig;
 pub use config::validation::ConfigError;

@@ -15,13 +15,12 @@ use crate::http::middleware::security_headers::secure;
 use crate::http::middleware::single_host::one_host;
 use crate::http::openapi::routes;
 use crate::http::page::docs;
-#[cfg(feature = "eval")]
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
 #[cfg(feature = "tls")]
 use crate::http::resources::https_only::to_https;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::HeaderValue;
@@ -92,7 +91,6 @@ fn routes(state: &AppState) -> Router<AppState> {
     let pages = Router::new()
         .route("/", get(static_files::index))
         .route("/page/{*file}", get(static_files::asset));
-    #[cfg(feature = "eval")]
     let pages = pages
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));

@@ -2,8 +2,8 @@
 
 use super::new_session::NewSession;
 use super::opening::Opening;
-use super::queue_permit::Held;
 use super::registry::{Registry, TooManySessions};
+use super::scheduler::queue_permit::Held;
 use super::session::Session;
 use super::state::SessionState;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl Registry {
             request,
             estimates: state.latest(),
             expires: expires.map_or(0, |time| time.as_secs()),
-            birth: rand::random(),
+            incarnation: rand::random(),
         }
     }
 
@@ -88,7 +88,7 @@ impl Registry {
 
     /// Removes those sessions that were not used for longest, unless they are in use. They go on living in the store.
     fn evict(&self) {
-        let idle = |session: &&Arc<Session>| !session.is_busy() && session.is_stored();
+        let idle = |session: &&Arc<Session>| !session.is_busy() && session.version().is_some();
         let mut oldest: Vec<(Duration, Uuid)> = {
             let sessions = self.map();
             let idle = sessions.values().filter(idle);

@@ -3,10 +3,10 @@
 //! In: a [`SessionState`], which is a tracker for each target and the answers to the last request. Out: a [`Session`] in the
 //! [`Registry`], found by its id.
 //!
-//! A request for a session takes these steps: [`Registry::find`] finds it for its owner, [`Session::enter`] takes one of
-//! its few permits, [`ByteCharge::grow`] charges the bytes of its body as they arrive, [`Admission::enter`] takes a place
-//! in the queue before the workers, [`SessionPermit::lock`] waits for the session in order of arrival, and
-//! [`Admission::run`] works with its state on a worker thread.
+//! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
+//! its owner, [`Session::enter`] takes one of its few permits, [`ByteCharge::grow`] charges the bytes of its body as they
+//! arrive, [`Admission::enter`] takes a place in the queue before the workers, and [`SessionService::advance`] waits for
+//! the session in order of arrival, and works with a copy of its state on a worker thread.
 //!
 //! What can go wrong, and what is done about it:
 //! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
@@ -18,58 +18,60 @@
 //! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
 //!   is checked and bounded: see [`SnapshotError`].
 
-mod admission;
-mod byte_budget;
+mod acts;
 mod clock;
 mod compression;
-mod cpu_time;
 mod expired;
-mod fair_queue;
 mod insertion;
-mod lanes;
 mod lease;
 mod mac;
 mod new_session;
 mod opening;
 mod owner;
 mod per_target;
-mod queue_permit;
 mod registry;
 mod replay;
+mod scheduler;
 mod session;
 mod session_permit;
 mod short_id;
 mod snapshot;
 mod state;
 mod store;
+mod streams;
 mod targets;
-mod work_limit;
-mod workers;
 
-pub use admission::{Admission, QueueFull, WorkPanicked};
-pub use byte_budget::{ByteBudget, ByteCharge, BytesFull};
+pub use acts::{
+    ActError, CreationKey, FrameBatch, FrameFault, FramesError, GivenBox, IdempotencyStore,
+    OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits, ServiceParts, ServiceSettings,
+    SessionQuota, SessionService, Start, TrackError, TrackFrom, Tracked, TrackedAway,
+    TrackingMetrics, check_readable_pixels,
+};
 pub use clock::Clock;
-pub use fair_queue::Turn;
 pub use insertion::InsertError;
-pub use lanes::Lane;
 pub use lease::Lease;
 pub use mac::{MAC_BYTES, MacKeys};
 pub use new_session::NewSession;
 pub use opening::Opening;
 pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
-pub use queue_permit::{Held, OutsideQueue, QueuePermit};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
+pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
+pub use scheduler::byte_budget::{ByteBudget, ByteCharge, BytesFull};
+pub use scheduler::fair_queue::Turn;
+pub use scheduler::lanes::Lane;
+pub use scheduler::queue_permit::{Held, OutsideQueue, QueuePermit};
+pub use scheduler::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
 pub use session::Session;
 pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
 pub use short_id::short_id;
 pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
 pub use state::{SessionState, StepError};
 pub use store::{
-    AddressError, Record, Reply, SessionName, Store, StoreAddress, StoreAway, Version,
+    AddressError, Commit, Gone, Intent, Local, Outcome, Record, RedisStore, SessionName,
+    SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
+    reconcile,
 };
-pub use targets::{
-    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
-};
-pub use work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
+pub use streams::{OpenStreams, StreamPlace};
+pub use targets::{Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format};

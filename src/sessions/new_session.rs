@@ -2,7 +2,7 @@
 
 use super::opening::Opening;
 use super::owner::Owner;
-use super::queue_permit::Held;
+use super::scheduler::queue_permit::Held;
 use super::state::SessionState;
 use super::store::Version;
 use std::time::Duration;
@@ -19,7 +19,7 @@ pub struct NewSession {
     /// Which version of the record in the store this is, where there is one.
     pub version: Option<Version>,
     /// It expires after this time without a frame.
-    pub lives: Duration,
+    pub ttl: Duration,
     /// The trackers and the last answers.
     pub state: SessionState,
     /// What is kept until the session is freed.

@@ -13,5 +13,5 @@ pub struct Opening {
     /// When the session was to expire, in seconds since 1970.
     pub expires: u64,
     /// A random number, which tells apart sessions that had one id after the other.
-    pub birth: u64,
+    pub incarnation: u64,
 }

@@ -1,10 +1,10 @@
 //! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
 
-use super::byte_budget::ByteBudget;
 use super::clock::Clock;
 use super::expired::ExpiredIds;
 use super::lease::Lease;
 use super::owner::Owner;
+use super::scheduler::byte_budget::ByteBudget;
 use super::session::Session;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -26,6 +26,9 @@ pub enum NoSession {
     /// It was not used for too long.
     #[error("the session has expired")]
     Expired,
+    /// The store has no record of it, and its time was not over.
+    #[error("the store has lost the session")]
+    Lost,
 }
 
 /// The live sessions.
@@ -69,6 +72,11 @@ impl Registry {
     pub fn with_eviction(mut self) -> Self {
         self.evicts = true;
         self
+    }
+
+    /// There is no room for one more session.
+    pub(super) fn full(&self) -> TooManySessions {
+        TooManySessions(self.max_sessions)
     }
 
     /// Whether there is room for one more session, after the expired ones have gone.
@@ -200,7 +208,7 @@ mod tests {
     use crate::sessions::{
         Admission, Fingerprint, Lane, NewSession, PerTarget, SessionState, Turn,
     };
-    use crate::tracker::{Frame, Preset, Rect};
+    use bagtrack_tracker::{Frame, Preset, Rect};
     use std::sync::mpsc;
     use std::time::Duration;
 
@@ -227,7 +235,7 @@ mod tests {
             opening: registry.opening([0; 32], &state),
             owner: Owner::default(),
             version: None,
-            lives: registry.first_lease(),
+            ttl: registry.first_lease(),
             state,
             held: Box::new(()),
         };

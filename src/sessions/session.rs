@@ -5,12 +5,12 @@ use super::lease::Lease;
 use super::new_session::NewSession;
 use super::opening::Opening;
 use super::owner::Owner;
-use super::queue_permit::Held;
+use super::scheduler::queue_permit::Held;
 use super::short_id::short_id;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
 use super::targets::Estimates;
-use crate::tracker::Params;
+use bagtrack_tracker::Params;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -75,11 +75,11 @@ impl Session {
             opening,
             owner,
             version,
-            lives,
+            ttl,
             state,
             held,
         } = new;
-        let expires = clock.now() + lives;
+        let expires = clock.now() + ttl;
         Arc::new(Self {
             id,
             owner,
@@ -127,7 +127,7 @@ impl Session {
     pub fn name(&self) -> SessionName {
         SessionName {
             id: self.id,
-            birth: self.opening.birth,
+            incarnation: self.opening.incarnation,
         }
     }
 
@@ -166,10 +166,9 @@ impl Session {
         *self.version.lock().unwrap_or_else(PoisonError::into_inner) = version;
     }
 
-    /// Whether the store has the last answer's frame.
-    pub fn is_stored(&self) -> bool {
-        let version = self.version();
-        version.is_some_and(|version| version.frame >= self.latest_frame())
+    /// The last frame whose state is in the store, where there is one.
+    pub fn checkpoint(&self) -> Option<u64> {
+        self.version().map(|version| version.checkpoint)
     }
 
     /// When the session expires unless a frame comes, by its clock.
@@ -178,13 +177,13 @@ impl Session {
     }
 
     /// How long the session lives without a frame.
-    pub fn lives(&self) -> Duration {
+    pub fn ttl(&self) -> Duration {
         self.expires().saturating_sub(self.clock.now())
     }
 
     /// The session expires after this time without a frame.
-    pub fn set_lives(&self, lives: Duration) {
-        let expires = milliseconds(self.clock.now() + lives);
+    pub fn set_ttl(&self, ttl: Duration) {
+        let expires = milliseconds(self.clock.now() + ttl);
         self.expires_ms.store(expires, Ordering::Relaxed);
     }
 

@@ -32,7 +32,7 @@ impl Session {
     /// # Errors
     /// All permits are taken.
     pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
-        let mut permit = self.visit()?;
+        let mut permit = self.read_permit()?;
         permit.has_frames = true;
         permit.overlaps = self.frame_requests.fetch_add(1, Ordering::AcqRel) > 0;
         Ok(permit)
@@ -42,7 +42,7 @@ impl Session {
     ///
     /// # Errors
     /// All permits are taken.
-    pub fn visit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
+    pub fn read_permit(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
         let permit = self.permits.clone().try_acquire_owned();
         let permit = permit.map_err(|_| SessionBusy)?;
         Ok(SessionPermit {
@@ -70,7 +70,7 @@ impl SessionPermit {
     }
 
     /// The same place, to look at the session before its turn.
-    pub fn visitor(&self) -> Self {
+    pub fn share(&self) -> Self {
         Self {
             session: self.session.clone(),
             has_frames: false,

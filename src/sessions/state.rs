@@ -2,10 +2,10 @@
 
 use super::mac::MacKeys;
 use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, TargetAnswer};
+use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
-use super::work_limit::{Stopped, WorkMeter};
-use crate::tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
+use bagtrack_tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug, Clone)]
@@ -177,12 +177,13 @@ impl SessionState {
         self.recent.extend(answered);
     }
 
-    /// Tracks through `frames` in order: all of them, or none. In the first one the user may correct a target, which
+    /// Tracks through `frames` in order. In the first one the user may correct a target, which
     /// there must be. Between frames and targets `meter` says whether to go on. The answers are stored, and at least the
     /// last `kept`. `seen` becomes what the trackers saw in the last frame.
     ///
     /// # Errors
-    /// The tracker refused a frame or the box, or the work was stopped. The session is unchanged.
+    /// The tracker refused a frame or the box, or the work was stopped. Some frames may have been taken then, so callers
+    /// work on a copy.
     pub fn advance(
         &mut self,
         frames: &[(Fingerprint, Frame)],
@@ -191,24 +192,15 @@ impl SessionState {
         kept: usize,
         mut seen: Option<&mut Vec<Seen>>,
     ) -> Result<Vec<Estimates>, StepError> {
-        // A refused frame leaves a tracker unchanged; only an earlier frame of the same request, or the tracker of
-        // another target, can have moved.
-        let moves = frames.len() * self.target_count();
-        let before = (moves > 1).then(|| self.targets.clone());
         let mut answered = Vec::with_capacity(frames.len());
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {
             let correction = correction.filter(|_| index == 0);
             let seen = seen.as_deref_mut();
             let advanced = self.targets.advance(frame, correction, meter, seen);
-            if let Err(error) = advanced {
-                if let Some(before) = before {
-                    self.targets = before;
-                }
-                return Err(match error {
-                    TargetsError::Refused(error) => StepError::Refused { index, error },
-                    TargetsError::Stopped(stopped) => StepError::Stopped(stopped),
-                });
-            }
+            advanced.map_err(|error| match error {
+                TargetsError::Refused(error) => StepError::Refused { index, error },
+                TargetsError::Stopped(stopped) => StepError::Stopped(stopped),
+            })?;
             answered.push(self.answered(*fingerprint, correction));
         }
         let estimates = answered.iter().map(Answered::estimates).collect();

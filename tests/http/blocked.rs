@@ -4,7 +4,7 @@ use crate::application::{BOX, TestApplication, expect_problem};
 use crate::heavy;
 use crate::metrics::{metrics, value};
 use crate::pictures;
-use crate::provoke::{CVAT, Operation, cvat};
+use crate::provoke::Operation;
 use reqwest::{Response, StatusCode};
 use std::time::Duration;
 
@@ -81,11 +81,6 @@ impl Blocked {
             (_, path) if path.ends_with("/target") => &[("box", BOX), ("frame", "1")],
             _ => &[("box", BOX)],
         };
-        if path == CVAT {
-            let (query, body) = cvat(query, &pictures::png(0), None);
-            let request = self.app.request(operation.method.clone(), &path, &query);
-            return request.json(&body).send().await.unwrap();
-        }
         let mut request = self.app.request(operation.method.clone(), &path, query);
         if operation.takes_frames() {
             request = request.body(pictures::png(0));

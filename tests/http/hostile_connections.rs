@@ -133,39 +133,26 @@ async fn a_half_closed_connection_gets_its_answer() {
 }
 
 #[tokio::test]
-async fn a_head_that_is_not_http_gets_a_problem_document() {
+async fn a_head_that_is_not_http_gets_its_status_and_the_connection_ends() {
     let app = TestApplication::start().await;
     let long = "a".repeat(200_000);
-    for (head, status, slug) in [
-        ("NONSENSE\r\n\r\n".to_owned(), "400", "malformed-request"),
+    for (head, status) in [
+        ("NONSENSE\r\n\r\n".to_owned(), "400"),
         (
             "GET / HTTP/1.1\r\nHost: localhost\r\nbad header: x\r\n\r\n".to_owned(),
             "400",
-            "malformed-request",
         ),
         (
             format!("GET / HTTP/1.1\r\nHost: localhost\r\nx: {long}\r\n\r\n"),
             "431",
-            "head-too-large",
         ),
     ] {
         let mut client = RawConnection::open(app.address).await;
         // Part of a long head may be unread when the connection is closed.
         let _ = client.try_send(&head).await;
         let answer = client.read_to_end().await;
-        let (answer, body) = answer.split_once("\r\n\r\n").expect("an answer");
-        assert!(
-            answer.starts_with(&format!("HTTP/1.1 {status}")),
-            "{answer}"
-        );
-        assert!(
-            answer.contains("content-type: application/problem+json"),
-            "{answer}"
-        );
-        let problem: Value = serde_json::from_str(body).unwrap();
-        assert_eq!(problem["type"], format!("urn:bagtrack:problem:{slug}"));
-        let id = problem["request_id"].as_str().unwrap();
-        assert!(answer.contains(&format!("x-request-id: {id}")), "{answer}");
+        let is_right = answer.starts_with(&format!("HTTP/1.1 {status}"));
+        assert!(is_right, "{answer}");
     }
 }
 

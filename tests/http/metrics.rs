@@ -3,7 +3,7 @@
 use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
-use bagtrack::http::{Secret, StoreMode};
+use bagtrack::http::Secret;
 use reqwest::{Method, StatusCode};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -146,10 +146,10 @@ async fn services_in_one_process_count_for_themselves() {
 
 #[tokio::test]
 async fn the_dashboard_and_the_alerts_ask_for_metrics_that_there_are() {
-    let app = TestApplication::start_with(|config| {
-        // Nothing listens there, so sessions are in memory alone.
+    let app = TestApplication::start().await;
+    let with_store = TestApplication::start_with(|config| {
+        // Nothing listens there.
         config.store.store = Some(Secret::from("redis://127.0.0.1:1"));
-        config.store.store_mode = StoreMode::BestEffort;
         config.store.store_timeout = Duration::from_millis(20);
     })
     .await;
@@ -157,7 +157,7 @@ async fn the_dashboard_and_the_alerts_ask_for_metrics_that_there_are() {
     app.post_frame(&id, pictures::png(1)).await;
     app.post_frame(&id, vec![1]).await;
     metrics(&app).await;
-    let text = metrics(&app).await;
+    let text = metrics(&app).await + &metrics(&with_store).await;
     let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");
     let mut asked = BTreeSet::new();
     for file in ["grafana/bagtrack.json", "prometheus/alerts.yaml"] {

@@ -8,8 +8,6 @@ use std::collections::BTreeSet;
 
 /// A WebSocket handshake, which no plain request makes.
 const HANDSHAKE: &str = "openStream";
-/// What it takes is told by another program.
-const CVAT: &str = "trackForCvat";
 
 /// An operation of the document.
 struct Call<'a> {
@@ -130,11 +128,7 @@ async fn every_example_of_the_document_works_as_it_stands() {
         .iter()
         .filter(|call| !call.operation["requestBody"].is_null());
     for call in with_body {
-        let forms = match call.id() {
-            CVAT => vec!["application/json"],
-            _ => vec!["image/jpeg", "application/json"],
-        };
-        for form in forms {
+        for form in ["image/jpeg", "application/json"] {
             assert!(sent.contains(&format!("{} {form}", call.id())), "{sent:?}");
         }
     }
@@ -144,7 +138,6 @@ async fn every_example_of_the_document_works_as_it_stands() {
 async fn the_raw_file_is_the_first_form_of_a_frame_wherever_it_is_enough() {
     let text = bagtrack::http::openapi_document();
     let operations = text.split("\"operationId\"").skip(1);
-    let operations = operations.filter(|text| !text.contains(CVAT));
     let bodies = operations.filter_map(|operation| {
         let body = operation.split_once("\"requestBody\"")?.1;
         body.split("\"responses\"").next()

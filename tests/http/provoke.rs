@@ -6,19 +6,13 @@ use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
 use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
-use serde_json::{Value, json};
 use std::time::Duration;
 use tokio::task::JoinSet;
 
 /// The id of a session that there is not.
 const NEW_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
-
-/// Its body is JSON with a frame, shapes and states.
-pub const CVAT: &str = "/integrations/cvat";
 
 /// An operation of the OpenAPI document.
 #[derive(Clone)]
@@ -102,16 +96,9 @@ fn settings(slug: &str, config: &mut Config) {
 impl Attempt {
     /// A service and a request to this operation that meets this problem.
     pub async fn provoke(operation: &Operation, slug: &str) -> Self {
-        let costly_shape = slug == "request-too-costly" && operation.path == CVAT;
-        let app = TestApplication::start_with(|config| {
-            settings(slug, config);
-            if costly_shape {
-                config.limits.max_request_cpu = Duration::from_millis(1);
-            }
-        });
-        let app = app.await;
+        let app = TestApplication::start_with(|config| settings(slug, config)).await;
         // Nothing can be opened.
-        let (id, is_open) = match slug == "store-unavailable" || costly_shape {
+        let (id, is_open) = match slug == "store-unavailable" {
             true => (NEW_ID.to_owned(), false),
             false => (app.open().await, true),
         };
@@ -193,7 +180,7 @@ impl Attempt {
             "frame-damaged" => self.body.truncate(300),
             "frame-size-mismatch" => {
                 self.body = pictures::png_of(64, 48);
-                if matches!(template, "/track" | CVAT) {
+                if template == "/track" {
                     let id = self.id.as_ref().unwrap();
                     self.snapshot = Some(self.app.snapshot(id).await);
                     self.query.clear();
@@ -201,7 +188,7 @@ impl Attempt {
             }
             "invalid-box" => self.query = vec![("box", "1000,1000,10,10")],
             "invalid-parameter" => self.query.push(("parameters", r#"{"alpha": 7}"#)),
-            "invalid-snapshot" if matches!(template, "/track" | CVAT) => {
+            "invalid-snapshot" if template == "/track" => {
                 self.query.clear();
                 self.snapshot = Some(b"no snapshot".to_vec());
             }
@@ -210,7 +197,6 @@ impl Attempt {
                 self.media_type = Some(SNAPSHOT_MEDIA_TYPE);
             }
             "queue-full" => self._busy = Some(heavy::fill_queue(&self.app).await),
-            "request-too-costly" if template == CVAT => self.query = vec![("box", BOX); 100],
             "request-too-costly" => self.frames = 2,
             "quota-exceeded" if template.ends_with("/stream") => {
                 let id = self.id.as_ref().unwrap();
@@ -234,13 +220,9 @@ impl Attempt {
     }
 
     pub async fn send(&self) -> Response {
-        let mut query = self.query.clone();
-        let mut body = None;
-        if self.path == CVAT {
-            let (rest, json) = cvat(&query, &self.body, self.snapshot.as_deref());
-            (query, body) = (rest, Some(json));
-        }
-        let mut request = self.app.request(self.method.clone(), &self.path, &query);
+        let mut request = self
+            .app
+            .request(self.method.clone(), &self.path, &self.query);
         if self.path.ends_with("/stream") {
             // What opens a WebSocket; the key may be any 16 bytes.
             request = request
@@ -256,9 +238,6 @@ impl Attempt {
                 .send()
                 .await
                 .unwrap();
-        }
-        if let Some(body) = body {
-            return request.json(&body).send().await.unwrap();
         }
         if let Some(media_type) = self.media_type {
             request = request.header("content-type", media_type);
@@ -286,24 +265,4 @@ impl Attempt {
             None => None,
         }
     }
-}
-
-/// The query and the body for CVAT with this frame, and the box that is in the query.
-pub fn cvat<'a>(
-    query: &[(&'a str, &'a str)],
-    frame: &[u8],
-    snapshot: Option<&[u8]>,
-) -> (Vec<(&'a str, &'a str)>, Value) {
-    let (given, query): (Vec<_>, Vec<_>) = query.iter().partition(|(name, _)| *name == "box");
-    let shapes = given.iter().map(|(_, text)| {
-        let sides: Vec<f64> = text.split(',').map(|side| side.parse().unwrap()).collect();
-        [sides[0], sides[1], sides[0] + sides[2], sides[1] + sides[3]]
-    });
-    let states = snapshot.map(|bytes| STANDARD.encode(bytes));
-    let body = json!({
-        "image": STANDARD.encode(frame),
-        "shapes": shapes.collect::<Vec<_>>(),
-        "states": states.into_iter().collect::<Vec<_>>(),
-    });
-    (query, body)
 }

@@ -1,8 +1,5 @@
 //! The service over TLS: with certificates made here, and with those of openssl and curl as the client.
 
-#[path = "../pictures/mod.rs"]
-mod pictures;
-
 mod certificates;
 mod client;
 mod curl;

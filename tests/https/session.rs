@@ -2,8 +2,8 @@
 
 use crate::certificates::{Authority, kinds};
 use crate::client::{Client, trusting};
-use crate::pictures;
 use crate::service::Service;
+use bagtrack_testing::picture_files as pictures;
 use futures_util::{SinkExt, StreamExt};
 use image::{DynamicImage, ImageFormat};
 use serde_json::Value;

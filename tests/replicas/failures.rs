@@ -17,7 +17,6 @@ struct Session {
 struct Answered {
     status: StatusCode,
     checkpoint: Option<String>,
-    durable: Option<String>,
     retry_after: bool,
     body: Value,
 }
@@ -52,7 +51,6 @@ impl Session {
         Answered {
             status: answer.status(),
             checkpoint: header("checkpoint"),
-            durable: header("durable"),
             retry_after: header("retry-after").is_some(),
             body: answer.json().await.unwrap(),
         }
@@ -224,45 +222,4 @@ async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
         let answer = session.post(&replica, number).await;
         assert_eq!(answer.body, expected[number - 1], "frame {number}");
     }
-}
-
-#[tokio::test]
-#[ignore = "needs redis and haproxy"]
-async fn with_best_effort_tracking_goes_on_without_the_store_and_catches_up() {
-    let mut redis = Redis::start();
-    let flags = ["--store-timeout", "300ms", "--store-mode", "best-effort"];
-    let replica = Replica::with_store(&redis.url(), &flags);
-    let session = Session::open(&replica, 20).await;
-    let expected = session.expected().await;
-    for number in 1..=5 {
-        assert_eq!(session.post(&replica, number).await.durable, None);
-    }
-    redis.stop();
-    for number in 6..=9 {
-        let answer = session.post(&replica, number).await;
-        assert_eq!(answer.body, expected[number - 1], "frame {number}");
-        assert_eq!(answer.durable.as_deref(), Some("false"));
-        assert_eq!(answer.checkpoint.as_deref(), Some("5"));
-    }
-    assert_eq!(replica.readiness().await, StatusCode::OK);
-    redis.start_again();
-    let mut number = 10;
-    loop {
-        let answer = session.post(&replica, number).await;
-        assert_eq!(answer.body, expected[number - 1], "frame {number}");
-        if answer.durable.is_none() {
-            // A repeated answer writes nothing; the next frame is written with all before it.
-            number += 1;
-            let next = session.post(&replica, number).await;
-            assert_eq!(next.body, expected[number - 1], "frame {number}");
-            assert_eq!(next.durable, None);
-            assert_eq!(next.checkpoint, Some(number.to_string()));
-            break;
-        }
-        // Again the same frame, until the store is found: the answer is a repeated one.
-        number += usize::from(number < 15);
-    }
-    let other = Replica::with_store(&redis.url(), &flags);
-    let next = session.post(&other, number + 1).await;
-    assert_eq!(next.body, expected[number]);
 }

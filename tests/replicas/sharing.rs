@@ -16,7 +16,6 @@ async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
     for number in 1..20 {
         let answer = pair.post(number % 2, number).await;
         assert_eq!(answer.headers()["checkpoint"], number.to_string().as_str());
-        assert!(!answer.headers().contains_key("durable"));
         let answer = json(answer, StatusCode::OK).await;
         assert_eq!(answer, expected[number - 1]);
         // Sent again to the other one, which has not seen it.

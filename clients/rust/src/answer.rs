@@ -76,13 +76,6 @@ pub struct Answer {
     /// Whether the service is about to end. The session goes on elsewhere by itself, where there is another one.
     #[serde(skip)]
     pub draining: bool,
-    /// False where the service has a store that could not be reached, so that the frame would be lost with the service.
-    #[serde(skip, default = "yes")]
-    pub durable: bool,
-}
-
-fn yes() -> bool {
-    true
 }
 
 impl Answer {
@@ -93,6 +86,5 @@ impl Answer {
             .get("checkpoint")
             .and_then(|value| value.to_str().ok()?.parse().ok());
         self.draining = says("draining", "true");
-        self.durable = !says("durable", "false");
     }
 }

@@ -40,7 +40,7 @@ async fn what_fails_for_a_moment_is_sent_again_with_its_number() {
     let mut session = open(client(&script)).await;
     let answer = session.track("second").await.unwrap();
     assert_eq!((answer.frame, session.frame()), (1, 1));
-    assert!(answer.durable && !answer.draining && answer.checkpoint.is_none());
+    assert!(!answer.draining && answer.checkpoint.is_none());
     assert_eq!(session.resent(), 0, "it had no answer before");
     let requests = script.requests();
     let (first, rest) = requests.split_first().unwrap();
@@ -160,7 +160,7 @@ async fn frames_that_the_service_lost_are_sent_again_as_far_as_they_are_kept() {
         answer(1).with("Checkpoint: 0"),
         answer(2).with("Checkpoint: 2"),
         answer(3).with("Checkpoint: 2"),
-        answer(4).with("Checkpoint: 2").with("Durable: false"),
+        answer(4).with("Checkpoint: 2"),
         conflict(3),
         answer(3),
         answer(4),
@@ -173,7 +173,7 @@ async fn frames_that_the_service_lost_are_sent_again_as_far_as_they_are_kept() {
         assert_eq!(session.track(body).await.unwrap().frame, number);
     }
     let answer = session.track("d").await.unwrap();
-    assert_eq!((answer.checkpoint, answer.durable), (Some(2), false));
+    assert_eq!(answer.checkpoint, Some(2));
     assert_eq!(session.track("e").await.unwrap().frame, 5);
     assert_eq!(session.resent(), 2);
     let bodies = script.requests().into_iter().map(|request| request.body);

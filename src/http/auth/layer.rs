@@ -7,7 +7,7 @@ use super::caller::Caller;
 use super::token;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue};

@@ -6,7 +6,7 @@
 use super::hosts::AllowedHosts;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};

@@ -3,7 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::RequestPermit;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::http::header::CONTENT_LENGTH;
 use axum::http::request::Parts;
 
@@ -18,6 +18,6 @@ pub fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> 
     if length.is_some_and(|length| length > max as u64) {
         return Err(Problem::body_too_large(max));
     }
-    state.admission.check_place()?;
+    state.service.admission.check_place()?;
     state.clients.account(&Client::of(parts)).request()
 }

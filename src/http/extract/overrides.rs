@@ -2,7 +2,7 @@
 
 use super::settings::{WholeNumber, whole};
 use crate::http::problems::problem::Problem;
-use crate::tracker::{Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
@@ -11,7 +11,9 @@ use std::borrow::Cow;
 const SEED_END: u64 = 1 << 53;
 
 /// A named set of the tracker's parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, utoipa::ToSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize, utoipa::ToSchema,
+)]
 #[schema(as = Preset)]
 #[serde(rename_all = "snake_case")]
 pub enum PresetName {
@@ -31,7 +33,8 @@ impl From<PresetName> for Preset {
 }
 
 /// Single parameters by their names.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+#[serde(transparent)]
 pub struct ParamOverrides(Map<String, Value>);
 
 impl<'de> Deserialize<'de> for ParamOverrides {

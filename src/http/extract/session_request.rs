@@ -10,8 +10,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
 use crate::http::respond::response_format::AnswerForm;
-use crate::http::service::newest::renew_if_busy;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use crate::sessions::{QueuePermit, SessionPermit};
 use axum::extract::{FromRequest, FromRequestParts, Request};
 
@@ -52,7 +51,9 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
         let (upload, queue) = match read.await {
             Ok(read) => read,
             Err(problem) => {
-                renew_if_busy(state, permit.session(), &problem).await;
+                if problem.retry_seconds().is_some() {
+                    state.service.renew(permit.session(), true).await;
+                }
                 return Err(problem);
             }
         };

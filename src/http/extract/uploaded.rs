@@ -11,13 +11,12 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::RequestPermit;
 use crate::http::resources::snapshot::MEDIA_TYPE;
-use crate::http::service::state::AppState;
-use crate::http::service::work;
-use crate::ingest::video::{VideoFormat, video_format};
+use crate::http::state::AppState;
 use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
+use bagtrack_ingest::video::{VideoFormat, video_format};
 use std::sync::Arc;
 
 /// What curl calls a body, whatever it is.
@@ -104,13 +103,16 @@ impl<S: Settings> Upload<S> {
         }
         let (lane, permit) = (permit.lane(), Arc::new(permit));
         let held = Box::new((charge, permit.clone()));
-        let queue = state.admission.enter(lane, held)?;
+        let queue = state.service.admission.enter(lane, held)?;
         if let Some(bytes) = json {
             let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;
                 Ok(fields)
             };
-            fields = work::run(state, queue.clone(), parse).await?;
+            fields = state
+                .service
+                .run::<_, Problem, _>(queue.clone(), parse)
+                .await?;
         }
         let Fields {
             files,

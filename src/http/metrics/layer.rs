@@ -1,6 +1,6 @@
 //! Counts requests and their bytes.
 
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::body::{Body, HttpBody};
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::Method;

@@ -12,4 +12,3 @@
 pub mod layer;
 mod maker;
 pub mod registry;
-pub mod tracking;

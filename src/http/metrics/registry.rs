@@ -1,8 +1,8 @@
 //! All metrics, with their names, units and descriptions.
 
 use super::maker::{METADATA, Maker};
-use super::tracking::TrackingMetrics;
 use crate::http::problems::kind::Kind;
+use crate::sessions::TrackingMetrics;
 use metrics::{Counter, Gauge, Histogram, Key, Label, Recorder};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
@@ -88,7 +88,7 @@ impl Metrics {
                 "Idle connections that were closed to make room for others.",
                 &[],
             ),
-            tracking: TrackingMetrics::new(&make),
+            tracking: tracking(&make),
             gauges: Gauges::new(&make),
             recorder,
         }
@@ -176,11 +176,38 @@ impl Gauges {
     }
 }
 
+/// Metrics of decoding and tracking that stand at zero.
+fn tracking(make: &Maker) -> TrackingMetrics {
+    let frames = |status: &'static str| {
+        let labels = [Label::from_static_parts("status", status)];
+        make.counter(
+            "bagtrack_frames_total",
+            "Frames answered, by status; once for each target.",
+            &labels,
+        )
+    };
+    TrackingMetrics {
+        decode: make.seconds("bagtrack_frame_decode_seconds", "Time to decode a frame."),
+        step: make.seconds(
+            "bagtrack_frame_step_seconds",
+            "Processor time to track a target through a frame.",
+        ),
+        tracking: frames("tracking"),
+        uncertain: frames("uncertain"),
+        lost: frames("lost"),
+        losses: make.counter(
+            "bagtrack_targets_lost_total",
+            "Times that a target went out of sight.",
+            &[],
+        ),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::sessions::PerTarget;
-    use crate::tracker::{Estimate, Rect, Status};
+    use bagtrack_tracker::{Estimate, Rect, Status};
     use std::time::Duration;
 
     #[test]

@@ -4,7 +4,7 @@ use super::base_path::client_path;
 use super::request_id;
 use crate::http::problems::document::respond;
 use crate::http::problems::problem::Problem;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;

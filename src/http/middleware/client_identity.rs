@@ -4,7 +4,7 @@ use super::forwarded::address;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::{Client, Peer};
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;

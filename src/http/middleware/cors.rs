@@ -3,9 +3,9 @@
 use super::draining::DRAINING;
 use super::request_id::REQUEST_ID;
 use super::trace_context::TRACEPARENT;
+use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
 use crate::http::quotas::clients::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use crate::http::respond::annotated_image::ANSWER;
-use crate::http::service::idempotency::IDEMPOTENCY_KEY;
 use axum::http::header::{AUTHORIZATION, CONTENT_TYPE, LOCATION, RETRY_AFTER};
 use axum::http::{HeaderName, HeaderValue, Method};
 use std::time::Duration;
@@ -44,7 +44,6 @@ pub fn cors(origins: &[String]) -> CorsLayer {
             RATE_LIMIT_POLICY,
             name("replayed"),
             name("checkpoint"),
-            name("durable"),
             ANSWER,
         ])
         .max_age(MAX_AGE)

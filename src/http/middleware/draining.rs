@@ -1,7 +1,7 @@
 //! Marks the answers of a service that is about to end with `Draining: true`, so that clients take their sessions
 //! elsewhere in time.
 
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::{HeaderName, HeaderValue};
 use axum::middleware::Next;

@@ -5,7 +5,7 @@
 //! answer, within bounds: at most as many bytes as a body may have, until the deadline of the body. A client that waits
 //! for `100 Continue` has sent nothing, and nothing is read from it.
 
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::{Request, State};
 use axum::http::header::EXPECT;

@@ -8,7 +8,7 @@
 use super::client_identity::note_address;
 use super::request_id;
 use super::trace_context::{TRACEPARENT, TraceContext};
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use crate::sessions::short_id;
 use axum::extract::{Request, State};
 use axum::middleware::Next;

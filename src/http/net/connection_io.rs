@@ -4,15 +4,12 @@
 //! - *A client that has closed its side* may still wait for its answer, or have gone: TCP does not tell. It gets some
 //!   time for the answer to a whole request; then it counts as gone, and its request is dropped. Whether the request is
 //!   whole shows when its handler has read the body, for which there is a moment.
-//! - *hyper's own answers* to heads that it cannot read get a problem document.
 
 use super::activity::Activity;
 use super::handshake::Transport;
-use super::head_problems;
 use super::least_rate::LeastRate;
-use crate::http::service::state::AppState;
+use crate::http::config::limits::LimitsConfig;
 use std::io::{self, IoSlice};
-use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
@@ -27,54 +24,23 @@ const READING: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 pub struct ConnectionIo {
     stream: Transport,
-    client: IpAddr,
     activity: Arc<Activity>,
-    state: AppState,
     /// At which the client takes answers.
     rate: LeastRate,
     half_close_timeout: Duration,
     /// Set when the client has closed its side: since when, and what wakes the connection.
     half_closed: Option<(Instant, Pin<Box<Sleep>>)>,
-    /// What is written in place of an answer of hyper's own, and how much of it is written.
-    document: Vec<u8>,
-    written: usize,
 }
 
 impl ConnectionIo {
-    /// For a stream to this client, whose service tells `activity` what it does.
-    pub fn new(
-        stream: Transport,
-        client: IpAddr,
-        activity: Arc<Activity>,
-        state: AppState,
-    ) -> Self {
-        let limits = &state.config.limits;
+    /// For a stream whose service tells `activity` what it does.
+    pub fn new(stream: Transport, activity: Arc<Activity>, limits: &LimitsConfig) -> Self {
         Self {
             stream,
-            client,
             activity,
             rate: LeastRate::new(limits.write_timeout, limits.min_answer_rate),
             half_close_timeout: limits.half_close_timeout,
-            state,
             half_closed: None,
-            document: Vec::new(),
-            written: 0,
-        }
-    }
-
-    /// Whether `bytes` are an answer of hyper's own. Then its document is to be written.
-    fn takes_over(&mut self, bytes: &[u8]) -> bool {
-        if self.activity.idle_since().is_none() {
-            return false;
-        }
-        match head_problems::problem_of(bytes) {
-            Some(problem) => {
-                let metrics = &self.state.metrics;
-                self.document = head_problems::answer_of(&problem, self.client, metrics);
-                self.written = 0;
-                true
-            }
-            None => false,
         }
     }
 
@@ -105,24 +71,6 @@ impl ConnectionIo {
             }
         }
         sent
-    }
-
-    fn poll_bytes(&mut self, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
-        self.paced(cx, written)
-    }
-
-    fn poll_document(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        while self.written < self.document.len() {
-            let rest = &self.document[self.written..];
-            let written = Pin::new(&mut self.stream).poll_write(cx, rest);
-            let written = ready!(self.paced(cx, written))?;
-            if written == 0 {
-                return Poll::Ready(Err(io::ErrorKind::WriteZero.into()));
-            }
-            self.written += written;
-        }
-        Poll::Ready(Ok(()))
     }
 }
 
@@ -160,11 +108,8 @@ impl AsyncWrite for ConnectionIo {
         cx: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        ready!(self.poll_document(cx))?;
-        if self.takes_over(bytes) {
-            return Poll::Ready(Ok(bytes.len()));
-        }
-        self.poll_bytes(cx, bytes)
+        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        self.paced(cx, written)
     }
 
     fn poll_write_vectored(
@@ -172,12 +117,6 @@ impl AsyncWrite for ConnectionIo {
         cx: &mut Context<'_>,
         slices: &[IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        ready!(self.poll_document(cx))?;
-        if let [bytes] = slices
-            && self.takes_over(bytes)
-        {
-            return Poll::Ready(Ok(bytes.len()));
-        }
         let written = Pin::new(&mut self.stream).poll_write_vectored(cx, slices);
         self.paced(cx, written)
     }
@@ -187,13 +126,11 @@ impl AsyncWrite for ConnectionIo {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        ready!(self.poll_document(cx))?;
         let flushed = Pin::new(&mut self.stream).poll_flush(cx);
         self.timely(cx, flushed)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        ready!(self.poll_document(cx))?;
         let ended = Pin::new(&mut self.stream).poll_shutdown(cx);
         self.timely(cx, ended)
     }

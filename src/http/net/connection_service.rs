@@ -7,7 +7,7 @@ use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
 use crate::http::quotas::client::Peer;
 #[cfg(feature = "tls")]
 use crate::http::router::https_only;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
 use hyper::Request;
@@ -78,7 +78,7 @@ impl ConnectionService {
         hold: ConnectionHold,
     ) {
         let activity = hold.activity().clone();
-        let io = ConnectionIo::new(transport, peer.ip(), activity.clone(), self.state.clone());
+        let io = ConnectionIo::new(transport, activity.clone(), &self.state.config.limits);
         let service = routes.layer(Extension(Peer(peer)));
         let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
         let watched = service_fn(move |request: Request<Incoming>| {

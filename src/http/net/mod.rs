@@ -13,6 +13,6 @@ pub mod connection_io;
 pub mod connection_service;
 pub mod connections;
 pub mod handshake;
-pub mod head_problems;
 pub mod least_rate;
+pub mod refusal;
 pub mod server;

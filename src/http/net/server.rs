@@ -10,19 +10,18 @@ use super::connection_hold::ConnectionHold;
 use super::connection_service::ConnectionService;
 use super::connections::{Connections, NoRoom};
 use super::handshake::Security;
-use super::head_problems;
+use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::service::Config;
-use crate::http::config::store::SharedStore;
+use crate::http::config::store;
 use crate::http::config::validation::ConfigError;
 use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 #[cfg(fuzzing)]
 use crate::http::quotas::client::Peer;
 use crate::http::router::router;
-use crate::http::service::state::AppState;
-use crate::http::service::stored_writes;
+use crate::http::state::AppState;
 use crate::sessions::Clock;
 #[cfg(fuzzing)]
 use axum::Extension;
@@ -111,7 +110,7 @@ impl Application {
         #[cfg(not(feature = "tls"))]
         let security = Security::Plain;
         let listener = TcpListener::bind(address).await;
-        let store = SharedStore::connect(&config.store).await;
+        let store = store::connect(&config.store).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
             security,
@@ -185,10 +184,10 @@ impl Application {
                 () = &mut accepting => {}
                 how = shutdown => {
                     tracing::info!("shutting down");
-                    state.drain();
+                    state.service.drain();
                     tokio::spawn({
                         let state = state.clone();
-                        async move { stored_writes::flush(&state).await }
+                        async move { state.service.flush().await }
                     });
                     // New connections are still served: a load balancer asks for /readyz on them.
                     if how.into() == Shutdown::Gradual {
@@ -203,7 +202,7 @@ impl Application {
         // Each connection, and each stream that took one over, holds a receiver.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
-        stored_writes::flush(&state).await;
+        state.service.flush().await;
         ended.is_ok()
     }
 }
@@ -257,7 +256,7 @@ async fn accept(
 /// Tells a client that it has too many connections, as far as its system takes that at once.
 fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
     let problem = Problem::too_many_connections();
-    let answer = head_problems::answer_of(&problem, peer.ip(), &state.metrics);
+    let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
     if let Ok(mut stream) = stream.into_std() {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);
@@ -269,11 +268,15 @@ async fn sweep(state: AppState) {
     let mut ticks = interval((idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30)));
     loop {
         ticks.tick().await;
-        let expired = state.registry.sweep();
-        state.prune();
+        let expired = state.service.registry.sweep();
+        state.service.prune();
         state.metrics.upkeep();
         if expired > 0 {
-            tracing::info!(expired, live = state.registry.len(), "sessions expired");
+            tracing::info!(
+                expired,
+                live = state.service.registry.len(),
+                "sessions expired"
+            );
         }
     }
 }

@@ -3,11 +3,11 @@
 use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::ingest::IngestError;
 use crate::sessions::{
-    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreAway, TooManySessions,
+    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreUnavailable, TooManySessions,
 };
-use crate::tracker::TrackerError;
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
 use std::collections::BTreeMap;
 use utoipa::openapi::{
     ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder,
@@ -129,8 +129,6 @@ fn example(kind: Kind) -> Problem {
             expected: 4,
         }),
         Kind::BodyTooLarge => Problem::body_too_large(33_554_432),
-        Kind::UriTooLong => Problem::uri_too_long(),
-        Kind::HeadTooLarge => Problem::head_too_large(),
         Kind::RequestTooCostly => Problem::too_many_pixels(500_000_000, 160_000_000),
         Kind::FrameTooLarge => {
             let limit = "a side of 9000 px is over the limit of 8192 px".to_owned();
@@ -160,6 +158,6 @@ fn example(kind: Kind) -> Problem {
         Kind::TooManySessions => TooManySessions(1024).into(),
         Kind::WorkTimeout => Problem::work_timeout(),
         Kind::NotReady => Problem::not_ready(),
-        Kind::StoreUnavailable => StoreAway::default().into(),
+        Kind::StoreUnavailable => StoreUnavailable::default().into(),
     }
 }

@@ -5,7 +5,6 @@ use crate::http::resources::bag_picture;
 use crate::http::resources::correction;
 use crate::http::resources::create;
 use crate::http::resources::create_named;
-use crate::http::resources::cvat;
 use crate::http::resources::frames;
 use crate::http::resources::health;
 use crate::http::resources::metrics;
@@ -13,7 +12,7 @@ use crate::http::resources::session;
 use crate::http::resources::snapshot;
 use crate::http::resources::token;
 use crate::http::resources::track;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use crate::http::stream::handshake;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
@@ -39,7 +38,6 @@ use utoipa_axum::routes;
     servers((url = "/", description = "The service that this document comes from")),
     tags(
         (name = "sessions", description = "Open a session, send frames, end it"),
-        (name = "integrations", description = "The calls of annotation tools"),
         (name = "service", description = "The service itself")
     ),
     components(schemas(ProblemDocument)),
@@ -72,7 +70,6 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(bag_picture::get))
         .routes(routes!(token::create))
         .routes(routes!(track::post))
-        .routes(routes!(cvat::post))
         .routes(routes!(handshake::open))
 }
 

@@ -2,12 +2,13 @@
 
 use super::kind::Kind;
 use super::problem::Problem;
-use crate::ingest::IngestError;
 use crate::sessions::{
-    BytesFull, InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed,
-    SnapshotError, StartError, Stopped, StoreAway, TooManySessions, WorkPanicked,
+    ActError, BytesFull, FrameFault, FramesError, NoSession, OpenError, QueueFull, QuotaExhausted,
+    ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
+    TooManySessions, TrackError, WorkPanicked,
 };
-use crate::tracker::TrackerError;
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
 use std::sync::Arc;
 
 impl From<ReplayError> for Problem {
@@ -110,15 +111,6 @@ impl From<TooManySessions> for Problem {
     }
 }
 
-impl From<InsertError> for Problem {
-    fn from(error: InsertError) -> Self {
-        match error {
-            InsertError::Full(full) => full.into(),
-            InsertError::Taken => Self::session_exists(),
-        }
-    }
-}
-
 impl From<Stopped> for Problem {
     fn from(stopped: Stopped) -> Self {
         match stopped {
@@ -147,26 +139,98 @@ impl From<NoSession> for Problem {
         match error {
             NoSession::Unknown => Self::session_not_found(),
             NoSession::Expired => Self::session_expired(),
+            NoSession::Lost => Self::session_lost(),
         }
     }
 }
 
-impl From<StoreAway> for Problem {
-    fn from(away: StoreAway) -> Self {
+impl From<StoreUnavailable> for Problem {
+    fn from(away: StoreUnavailable) -> Self {
         let detail = "Send the request again after the time in `Retry-After`. A frame is not counted; sent with its number \
             (`?frame=N`) it is never tracked twice.";
         Self::new(Kind::StoreUnavailable, detail).caused_by(Arc::new(away))
     }
 }
 
-impl From<SessionClosed> for Problem {
-    fn from(_: SessionClosed) -> Self {
-        Self::session_not_found()
-    }
-}
-
 impl From<WorkPanicked> for Problem {
     fn from(error: WorkPanicked) -> Self {
         Self::internal(Arc::new(error))
+    }
+}
+
+impl From<QuotaExhausted> for Problem {
+    fn from(QuotaExhausted { limit }: QuotaExhausted) -> Self {
+        Self::quota_exceeded("sessions", limit)
+    }
+}
+
+impl From<ActError> for Problem {
+    fn from(error: ActError) -> Self {
+        match error {
+            ActError::NoSession(error) => error.into(),
+            ActError::Busy(error) => error.into(),
+            ActError::QueueFull(error) => error.into(),
+            ActError::Store(error) => error.into(),
+            ActError::Stopped(error) => error.into(),
+            ActError::Panicked(error) => error.into(),
+            ActError::TooManySessions(error) => error.into(),
+            ActError::StoredState(error) => Self::internal(Arc::new(error)),
+        }
+    }
+}
+
+impl From<FrameFault> for Problem {
+    fn from(fault: FrameFault) -> Self {
+        match fault {
+            FrameFault::Ingest(error) => error.into(),
+            FrameFault::Tracker(error) => error.into(),
+        }
+    }
+}
+
+impl From<FramesError> for Problem {
+    fn from(error: FramesError) -> Self {
+        match error {
+            FramesError::Act(error) => error.into(),
+            FramesError::Replay(error) => error.into(),
+            FramesError::NotInOrder => Self::not_in_order(),
+            FramesError::StreamReplaced => Self::work_timeout(),
+            FramesError::NoSuchTarget { count } => Self::which_target(count),
+            FramesError::Frame {
+                index,
+                count,
+                fault,
+            } => Self::from(fault).of_frame(index, count),
+            FramesError::TooManyPixels { pixels, limit } => Self::too_many_pixels(pixels, limit),
+        }
+    }
+}
+
+impl From<OpenError> for Problem {
+    fn from(error: OpenError) -> Self {
+        match error {
+            OpenError::Act(error) => error.into(),
+            OpenError::Frame(error) => error.into(),
+            OpenError::Start { error, listed } => match (&error, listed) {
+                (&StartError::Refused { target, .. }, Some(count)) => {
+                    Self::from(error).of_target(target, count)
+                }
+                _ => error.into(),
+            },
+            OpenError::Snapshot(error) => error.into(),
+            OpenError::Draining => Self::not_ready(),
+            OpenError::Quota(error) => error.into(),
+            OpenError::Exists => Self::session_exists(),
+            OpenError::KeyReused => Self::idempotency_key_reused(),
+        }
+    }
+}
+
+impl From<TrackError> for Problem {
+    fn from(error: TrackError) -> Self {
+        match error {
+            TrackError::Frames(error) => error.into(),
+            TrackError::Open(error) => error.into(),
+        }
     }
 }

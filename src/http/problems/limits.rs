@@ -4,16 +4,6 @@ use super::kind::Kind;
 use super::problem::Problem;
 
 impl Problem {
-    /// The path and query have more bytes than they may.
-    pub fn uri_too_long() -> Self {
-        Self::new(Kind::UriTooLong, "Send settings in the body.")
-    }
-
-    /// The head has more bytes or lines than it may.
-    pub fn head_too_large() -> Self {
-        Self::new(Kind::HeadTooLarge, "Send fewer or shorter headers.")
-    }
-
     /// The address has as many connections as it may, and all of them are busy.
     pub fn too_many_connections() -> Self {
         let detail = "This address has as many connections as one may, all of them busy. Use them again, or try again \

@@ -152,16 +152,11 @@ impl Problem {
         Self::new(Kind::WorkTimeout, detail)
     }
 
-    /// The store has lost the session, and it is not known whether the state in memory, at this frame, is the newest.
-    pub fn record_lost(latest: u64) -> Self {
-        let next = latest + 1;
-        Self::new(
-            Kind::StoreUnavailable,
-            format!(
-                "The store has lost the session. Its state here is that of frame {latest}; another replica may have a later \
-                one. Send the next frame with its number: `?frame={next}`, if no later one than {latest} was answered."
-            ),
-        )
+    /// The store has no record of a session whose time is not over.
+    pub fn session_lost() -> Self {
+        let detail = "The store has lost this session. Open a new one with POST /sessions, from your last snapshot, or from \
+            a frame and a box.";
+        Self::new(Kind::SessionNotFound, detail)
     }
 
     /// The service is about to end.

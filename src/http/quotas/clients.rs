@@ -6,7 +6,7 @@
 use super::client::Client;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{ByteBudget, Held, Lane};
+use crate::sessions::{ByteBudget, Held, Lane, QuotaExhausted, SessionQuota};
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
@@ -200,31 +200,25 @@ impl Account {
     pub fn bytes(&self) -> &ByteBudget {
         &self.bytes
     }
+}
 
-    /// Whether the client may have one more session.
-    ///
-    /// # Errors
-    /// It has as many as it may.
-    pub fn check_session(&self) -> Result<(), Problem> {
-        match self.sessions.available_permits() {
-            0 => Err(self.too_many_sessions()),
+/// The sessions of a client: as many places as sessions with one target would take.
+#[derive(Debug)]
+pub struct ClientSessions(pub Arc<Account>);
+
+impl SessionQuota for ClientSessions {
+    fn check(&self) -> Result<(), QuotaExhausted> {
+        match self.0.sessions.available_permits() {
+            0 => Err(self.0.too_many_sessions()),
             _ => Ok(()),
         }
     }
 
-    /// Takes the places of a session with so many targets: as many as sessions with one target would.
-    ///
-    /// # Errors
-    /// The client has as many as it may.
-    pub fn sessions(self: &Arc<Self>, targets: usize) -> Result<Held, Problem> {
+    fn reserve(&self, targets: usize) -> Result<Held, QuotaExhausted> {
         let places = u32::try_from(targets).unwrap_or(u32::MAX);
-        let permit = self.sessions.clone().try_acquire_many_owned(places);
-        let permit = permit.map_err(|_| self.too_many_sessions())?;
-        Ok(Box::new((self.clone(), permit)))
-    }
-
-    fn too_many_sessions(&self) -> Problem {
-        Problem::quota_exceeded("sessions", self.quotas.sessions)
+        let permit = self.0.sessions.clone().try_acquire_many_owned(places);
+        let permit = permit.map_err(|_| self.0.too_many_sessions())?;
+        Ok(Box::new((self.0.clone(), permit)))
     }
 }
 
@@ -249,6 +243,12 @@ impl RequestPermit {
 }
 
 impl Account {
+    fn too_many_sessions(&self) -> QuotaExhausted {
+        QuotaExhausted {
+            limit: self.quotas.sessions,
+        }
+    }
+
     fn note_frames_left(&self, left: u32) {
         // Nothing panics while it is held.
         let mut noted = self

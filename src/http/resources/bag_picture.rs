@@ -7,15 +7,14 @@ use crate::http::openapi::request_bodies::BinaryBody;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::sessions::{ByteCharge, LockedSession};
-use crate::tracker::{BagEntry, VectorView};
+use crate::http::state::AppState;
+use crate::sessions::{ByteCharge, SessionState};
 use axum::Extension;
 use axum::extract::{Query, State};
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::{BagEntry, VectorView};
 use image::{ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 use std::sync::Arc;
@@ -73,13 +72,15 @@ pub async fn get(
         .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
     let session = path.find(&state).await?;
     let (target, count) = (settings.target.unwrap_or(0), session.target_count());
-    state.admission.check_place()?;
+    state.service.admission.check_place()?;
     let request = state.clients.account(&client).request()?;
     let mut charge = ByteCharge::new(&state.uploads, request.bytes());
-    let queue = state.admission.enter(request.lane(), Box::new(request))?;
-    let permit = session.visit()?;
-    let draw = move |locked: &mut LockedSession| {
-        let bag = locked.state().bag(target);
+    let queue = state
+        .service
+        .admission
+        .enter(request.lane(), Box::new(request))?;
+    let draw = move |state: &SessionState| {
+        let bag = state.bag(target);
         let bytes = draw(
             &bag.ok_or_else(|| Problem::which_target(count))?,
             &mut charge,
@@ -87,7 +88,10 @@ pub async fn get(
         charge.shrink(bytes.len());
         Ok((bytes, charge))
     };
-    let (bytes, charge) = newest::look(&state, permit, queue, &client, draw).await?;
+    let (bytes, charge) = state
+        .service
+        .read::<_, Problem, _>(session.read_permit()?, queue, draw)
+        .await?;
     // The bytes stay in memory until the client has taken them.
     Ok(([(CONTENT_TYPE, "image/png")], charged(bytes, charge)).into_response())
 }

@@ -8,12 +8,11 @@ use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, replayed_header};
+use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json::Json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::service::advance::{Answered, GivenBox, NextFrames};
-use crate::http::service::advance_session::advance_session;
-use crate::http::service::frame_order::wait_for_turn;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
+use crate::sessions::{FrameBatch, GivenBox, Tracked};
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -95,7 +94,6 @@ operation_problems!(
             headers(
                 ("Replayed" = bool, description = "`true` where this answer was given before"),
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
-                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -110,18 +108,27 @@ pub async fn put(
     let to = settings.r#box.ok_or_else(Problem::missing_box)?;
     let target = settings.target.map(|number| number.as_index());
     let number = settings.frame.map(|number| number.0);
-    let next = NextFrames::posted(number, request.upload.files, Some(GivenBox { target, to }));
+    let next = FrameBatch::posted(
+        number,
+        request.upload.files,
+        Some(GivenBox {
+            target,
+            to: to.into(),
+        }),
+    );
     let targets = request.permit.session().target_count();
     let queue = request.queue.for_frames(targets);
-    let (permit, client) = (request.permit, request.client);
-    let queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
-    let Answered {
+    let permit = request.permit;
+    let queue = state.service.wait_for_turn(&permit, queue, number).await?;
+    let Tracked {
         estimates,
         replayed,
-        durability,
+        checkpoint,
         ..
-    } = advance_session(&state, permit, queue, &client, next).await?;
+    } = state.service.advance(permit, queue, next).await?;
     let answer = Json(Answer::from(&estimates[0])).into_response();
-    let frame = estimates[0].first().frame;
-    Ok(durability.write(frame, replayed_header(replayed, answer)))
+    Ok(with_checkpoint(
+        checkpoint,
+        replayed_header(replayed, answer),
+    ))
 }

@@ -7,9 +7,8 @@ use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::BinaryBody;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::service::open_once::open_once;
-use crate::http::service::opening::CreatedSession;
-use crate::http::service::state::AppState;
+use crate::http::respond::created_session::{CreatedSession, created};
+use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
 
@@ -74,5 +73,7 @@ pub async fn put(
     State(state): State<AppState>,
     request: CreateRequest,
 ) -> Result<Response, Problem> {
-    open_once(&state, request).await
+    let is_verbose = request.is_verbose();
+    let opened = state.service.open(request.into_act()?).await?;
+    Ok(created(&opened, is_verbose))
 }

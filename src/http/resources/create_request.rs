@@ -2,7 +2,8 @@
 
 use crate::http::auth::caller::Caller;
 use crate::http::extract::admit::admit;
-use crate::http::extract::overrides::{ParamOverrides, PresetName};
+use crate::http::extract::idempotency_key;
+use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
 use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use crate::http::extract::switch::Switch;
 use crate::http::extract::texts::Texts;
@@ -10,17 +11,20 @@ use crate::http::extract::uploaded::Upload;
 use crate::http::openapi::params_schema::ParametersText;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::quotas::clients::Account;
+use crate::http::quotas::clients::{Account, ClientSessions};
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes};
-use crate::http::service::idempotency::{self, OpeningName};
-use crate::http::service::state::AppState;
-use crate::sessions::{Fingerprint, QueuePermit};
+use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::state::AppState;
+use crate::sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use serde::Deserialize;
+use serde_json::json;
 use std::sync::Arc;
 use uuid::Uuid;
+
+/// The format of the digest of a request.
+const DIGEST_FORMAT: u8 = 1;
 
 /// The settings of a new session.
 #[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
@@ -66,10 +70,8 @@ impl Settings for CreateSettings {
 pub struct CreateRequest {
     /// Who opens it.
     pub caller: Caller,
-    /// Where it comes from.
-    pub client: Client,
     /// What the client calls the session, where it gives it a name.
-    pub name: Option<OpeningName>,
+    pub key: Option<CreationKey>,
     /// What the client has in use.
     pub account: Arc<Account>,
     /// The place in the queue.
@@ -86,32 +88,31 @@ impl FromRequest<AppState> for CreateRequest {
         let (mut parts, body) = request.into_parts();
         let caller = Caller::from_request_parts(&mut parts, state).await?;
         caller.require_key()?;
-        let key = idempotency::key_of(&parts.headers)?;
-        let name = match (id_of_path(&mut parts).await?, key) {
+        let header = idempotency_key::key_of(&parts.headers)?;
+        let key = match (id_of_path(&mut parts).await?, header) {
             (Some(_), Some(_)) => {
                 let detail = "The id in the path stands for the `Idempotency-Key`; leave that out.";
                 return Err(Problem::malformed(detail));
             }
-            (Some(id), None) => Some(OpeningName::Id(id)),
+            (Some(id), None) => Some(CreationKey::Id(id)),
             (None, Some(key)) => {
                 let key = scoped(key, state, &Client::of(&parts));
-                Some(OpeningName::Key(caller.owner().clone(), key))
+                Some(CreationKey::Key(caller.owner().clone(), key))
             }
             (None, None) => None,
         };
-        let client = Client::of(&parts);
-        let account = state.clients.account(&client);
+        let account = state.clients.account(&Client::of(&parts));
         // A request that comes again may have its answer already.
-        if name.is_none() {
-            check_room(state, &account)?;
+        if key.is_none() {
+            let quota = ClientSessions(account.clone());
+            state.service.check_room(&quota)?;
         }
         let admitted = admit(state, &parts)?;
         let request = Request::from_parts(parts, body);
         let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
         Ok(Self {
             caller,
-            client,
-            name,
+            key,
             account,
             queue,
             upload,
@@ -120,10 +121,53 @@ impl FromRequest<AppState> for CreateRequest {
 }
 
 impl CreateRequest {
-    /// A digest of the frame and the settings, whichever form they came in. It is compared with others of this version
-    /// only.
-    pub fn digest(&self) -> [u8; 32] {
-        let (file, upload) = (Fingerprint::of(&self.upload.files[0]), &self.upload);
+    /// Whether the answer names the tracker's parameters.
+    pub fn is_verbose(&self) -> bool {
+        self.upload.settings.verbose.0
+    }
+
+    /// What is asked for.
+    ///
+    /// # Errors
+    /// There is no box, a parameter is unknown, or settings stand beside a snapshot.
+    pub fn into_act(self) -> Result<OpenRequest, Problem> {
+        let digest = self.digest();
+        let (upload, mut files) = (self.upload.settings, self.upload.files);
+        let file = files.swap_remove(0);
+        let start = if self.upload.is_snapshot || file.starts_with(SNAPSHOT_MAGIC) {
+            let allowed = CreateSettings {
+                verbose: upload.verbose,
+                ..CreateSettings::default()
+            };
+            if upload != allowed {
+                let detail = "A snapshot holds the box and the parameters; leave out all settings.";
+                return Err(Problem::malformed(detail));
+            }
+            Start::Snapshot(file)
+        } else {
+            Start::Frame {
+                file,
+                boxes: boxes_of(upload.r#box, upload.boxes.as_ref())?,
+                params: Box::new(overrides::resolve(
+                    upload.preset,
+                    upload.seed,
+                    upload.params,
+                )?),
+            }
+        };
+        Ok(OpenRequest {
+            key: self.key,
+            owner: self.caller.owner().clone(),
+            digest,
+            start,
+            quota: Arc::new(ClientSessions(self.account)),
+            queue: self.queue,
+        })
+    }
+
+    /// A digest of the frame and the settings, whichever form they came in: of their JSON, with a format number. It is
+    /// compared with those of other replicas.
+    fn digest(&self) -> [u8; 32] {
         let CreateSettings {
             r#box,
             boxes,
@@ -132,23 +176,22 @@ impl CreateRequest {
             params,
             // Another request for the same session.
             verbose: _,
-        } = &upload.settings;
-        let settings = (r#box, boxes, preset, seed, params);
-        let text = format!("{file:?} {settings:?} {}", upload.is_snapshot);
-        *blake3::hash(text.as_bytes()).as_bytes()
+        } = &self.upload.settings;
+        let frame = blake3::hash(&self.upload.files[0]).to_hex();
+        let seed = seed.map(|seed| seed.0);
+        let is_snapshot = self.upload.is_snapshot;
+        let canonical = json!([
+            DIGEST_FORMAT,
+            frame.as_str(),
+            r#box,
+            boxes,
+            preset,
+            seed,
+            params,
+            is_snapshot
+        ]);
+        *blake3::hash(canonical.to_string().as_bytes()).as_bytes()
     }
-}
-
-/// Refuses new sessions where there is no room for them, or when the service is about to end.
-///
-/// # Errors
-/// `too-many-sessions`, `quota-exceeded` and `not-ready`.
-pub fn check_room(state: &AppState, account: &Account) -> Result<(), Problem> {
-    if state.is_draining() {
-        return Err(Problem::not_ready());
-    }
-    state.registry.check_room()?;
-    account.check_session()
 }
 
 /// An idempotency key as it is kept. Each client has keys of its own: where there are no API keys, which tell clients

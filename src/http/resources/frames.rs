@@ -4,6 +4,8 @@ use super::snapshot::charged;
 use crate::http::extract::session_request::SessionRequest;
 use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use crate::http::extract::switch::Switch;
+use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::VideoPlace;
 use crate::http::openapi::example_frames;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
@@ -11,16 +13,12 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes, replayed_header};
+use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json;
 use crate::http::respond::ndjson::{FrameSource, LineWork};
 use crate::http::respond::response_format::AnswerForm;
-use crate::http::service::advance::NextFrames;
-use crate::http::service::advance_session::advance_session;
-use crate::http::service::frame_order::wait_for_turn;
-use crate::http::service::state::AppState;
-use crate::http::service::video_frames::VideoFrames;
-use crate::http::service::video_place::VideoPlace;
-use crate::sessions::ByteCharge;
+use crate::http::state::AppState;
+use crate::sessions::{ByteCharge, FrameBatch};
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -109,7 +107,6 @@ operation_problems!(
                 ("Replayed" = bool, description = "`true` where these answers were given before"),
                 ("Answer" = String, description = "With a picture: the answer as JSON"),
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
-                ("Durable" = bool, description = "`false` where the store could not be reached and has not this frame"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
         ),
@@ -134,7 +131,7 @@ pub async fn post(
         true => AnswerForm::Picture,
         false => form,
     };
-    let mut queue = wait_for_turn(&state, &permit, &client, queue, number).await?;
+    let mut queue = state.service.wait_for_turn(&permit, queue, number).await?;
     let (mut files, targets) = (upload.files, permit.session().target_count());
     let frames = match (upload.video, form) {
         (Some(_), AnswerForm::Picture) => {
@@ -149,7 +146,7 @@ pub async fn post(
         }
         (None, AnswerForm::Lines) => FrameSource::of_files(&state, queue.clone(), files).await?,
         (None, AnswerForm::Picture) => {
-            let next = NextFrames::posted(number, files, None);
+            let next = FrameBatch::posted(number, files, None);
             let queue = queue.for_frames(targets);
             return answer_drawn(&state, permit, queue, &client, next).await;
         }
@@ -159,17 +156,15 @@ pub async fn post(
             // Before the frames are tracked: what cannot be answered must not count.
             let mut charge = ByteCharge::new(&state.uploads, account.bytes());
             charge.grow(answer_bytes(files.len(), targets))?;
-            let next = NextFrames::posted(number, files, None);
-            let answered = advance_session(&state, permit, queue, &client, next).await?;
+            let next = FrameBatch::posted(number, files, None);
+            let answered = state.service.advance(permit, queue, next).await?;
             let answers = json::line(&FrameAnswers::from(&answered.estimates[..]));
             let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
             charge.shrink(answers.len());
             let headers = [(CONTENT_TYPE, "application/json")];
             let answers = (headers, charged(answers, charge)).into_response();
             let response = replayed_header(answered.replayed, answers);
-            let last = answered.estimates.last();
-            let last = last.map_or(0, |last| last.first().frame);
-            return Ok(answered.durability.write(last, response));
+            return Ok(with_checkpoint(answered.checkpoint, response));
         }
     };
     let work = LineWork {

@@ -4,8 +4,8 @@ use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
-use crate::http::service::state::AppState;
-use crate::sessions::StoreAway;
+use crate::http::state::AppState;
+use crate::sessions::StoreUnavailable;
 use axum::extract::State;
 use serde::Serialize;
 
@@ -47,13 +47,12 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     if state.is_draining() {
         return Err(Problem::not_ready());
     }
-    if let Some(store) = &state.store
-        && !store.best_effort
-        && !store.calls.is_ready()
+    if let Some(store) = &state.service.store
+        && !store.is_ready()
     {
-        return Err(Problem::from(StoreAway::default()).with_kind(Kind::NotReady));
+        return Err(Problem::from(StoreUnavailable::default()).with_kind(Kind::NotReady));
     }
-    let (places, bytes) = (state.admission.queue_places(), state.uploads.left());
+    let (places, bytes) = (state.service.admission.queue_places(), state.uploads.left());
     let queue = state.queue_saturation.update(places, state.config.queue);
     let uploads = state
         .upload_saturation

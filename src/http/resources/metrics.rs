@@ -5,7 +5,7 @@ use crate::http::extract::texts::refuse_query;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
@@ -41,8 +41,12 @@ pub async fn get(
 ) -> Result<impl IntoResponse, Problem> {
     refuse_query(&uri)?;
     caller.require_key()?;
-    let (gauges, config, admission) = (&state.metrics.gauges, &state.config, &state.admission);
-    gauges.sessions.set(state.registry.len() as f64);
+    let (gauges, config, admission) = (
+        &state.metrics.gauges,
+        &state.config,
+        &state.service.admission,
+    );
+    gauges.sessions.set(state.service.registry.len() as f64);
     gauges.max_sessions.set(config.max_sessions as f64);
     gauges
         .queued
@@ -55,9 +59,8 @@ pub async fn get(
     gauges
         .draining
         .set(if state.is_draining() { 1.0 } else { 0.0 });
-    if let Some(store) = &state.store {
-        let calls = &store.calls;
-        state.metrics.store(calls.is_ready(), calls.failures());
+    if let Some(store) = &state.service.store {
+        state.metrics.store(store.is_ready(), store.failures());
     }
     if let Some(memory) = memory_stats::memory_stats() {
         gauges.resident_memory.set(memory.physical_mem as f64);

@@ -8,12 +8,12 @@ pub mod correction;
 pub mod create;
 pub mod create_named;
 pub mod create_request;
-pub mod cvat;
 pub mod frames;
 pub mod health;
 #[cfg(feature = "tls")]
 pub mod https_only;
 pub mod metrics;
+pub mod saturation;
 pub mod session;
 pub mod session_path;
 pub mod snapshot;

@@ -8,11 +8,10 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, ImageSize};
 use crate::http::respond::json::Json;
-use crate::http::service::state::AppState;
-use crate::http::service::stored;
-use crate::tracker::Params;
+use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::{StatusCode, Uri};
+use bagtrack_tracker::Params;
 use serde::Serialize;
 use uuid::Uuid;
 
@@ -84,13 +83,6 @@ pub async fn delete(
     uri: Uri,
 ) -> Result<StatusCode, Problem> {
     refuse_query(&uri)?;
-    // What is in memory may be a session that had the id before.
-    for _ in 0..2 {
-        let session = path.find(&state).await?;
-        if stored::end(&state, &session).await? {
-            tracing::info!(session = session.short_id(), "deleted");
-            return Ok(StatusCode::NO_CONTENT);
-        }
-    }
-    Err(Problem::session_not_found())
+    path.end(&state).await?;
+    Ok(StatusCode::NO_CONTENT)
 }

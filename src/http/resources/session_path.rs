@@ -3,13 +3,12 @@
 use crate::http::auth::caller::Caller;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::http::service::stored;
+use crate::http::state::AppState;
 use crate::sessions::Session;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
 use std::sync::Arc;
+use uuid::Uuid;
 
 /// The id as it stands in the path, and who asks for it. It is looked up by [`SessionPath::find`], after the rest of the
 /// request head has been checked.
@@ -35,18 +34,27 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
 impl SessionPath {
     /// The caller's live session of this id. Text that is not an id is the id of no session.
     pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
-        match self.id.parse() {
-            Ok(id) if self.caller.may_use(id) => {
-                stored::find(state, id, self.caller.owner(), &self.client).await
-            }
-            _ => Err(Problem::session_not_found()),
-        }
+        let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
+        Ok(state.service.find(self.id()?, owner, flow).await?)
     }
 
     /// The same, with its last answer up to the store's.
     pub async fn find_newest(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
         let session = self.find(state).await?;
-        newest::refresh(state, &session, &self.client).await?;
+        let flow = state.flow(&self.client);
+        state.service.refresh(&session, None, flow).await?;
         Ok(session)
+    }
+
+    /// Ends the session.
+    pub async fn end(&self, state: &AppState) -> Result<(), Problem> {
+        let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
+        Ok(state.service.end(self.id()?, owner, flow).await?)
+    }
+
+    fn id(&self) -> Result<Uuid, Problem> {
+        let id = self.id.parse().ok();
+        let id = id.filter(|id| self.caller.may_use(*id));
+        id.ok_or_else(Problem::session_not_found)
     }
 }

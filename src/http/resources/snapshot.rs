@@ -7,9 +7,8 @@ use crate::http::openapi::request_bodies::BinaryBody;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::sessions::{ByteCharge, LockedSession};
+use crate::http::state::AppState;
+use crate::sessions::ByteCharge;
 use axum::Extension;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::State;
@@ -64,15 +63,17 @@ pub async fn get(
 ) -> Result<Response, Problem> {
     refuse_query(&uri)?;
     let session = path.find(&state).await?;
-    state.admission.check_place()?;
-    let asks = client;
-    let client = state.clients.account(&asks).request()?;
+    state.service.admission.check_place()?;
+    let client = state.clients.account(&client).request()?;
     let mut charge = ByteCharge::new(&state.uploads, client.bytes());
-    let queue = state.admission.enter(client.lane(), Box::new(client))?;
-    let permit = session.visit()?;
-    let keys = state.access.snapshots.clone();
-    let take = move |locked: &mut LockedSession| Ok(locked.state().snapshot(&keys));
-    let bytes = newest::look(&state, permit, queue, &asks, take).await?;
+    let queue = state
+        .service
+        .admission
+        .enter(client.lane(), Box::new(client))?;
+    let bytes = state
+        .service
+        .snapshot(session.read_permit()?, queue)
+        .await?;
     // The bytes stay in memory until the client has taken them.
     charge.grow(bytes.len())?;
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], charged(bytes, charge)).into_response())

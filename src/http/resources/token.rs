@@ -7,7 +7,7 @@ use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
-use crate::http::service::state::AppState;
+use crate::http::state::AppState;
 use axum::extract::{Query, State};
 use axum::http::Uri;
 use serde::{Deserialize, Serialize};

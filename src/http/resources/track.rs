@@ -3,7 +3,7 @@
 use super::snapshot::charged;
 use crate::http::auth::caller::Caller;
 use crate::http::extract::admit::admit;
-use crate::http::extract::overrides::{ParamOverrides, PresetName};
+use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
 use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
@@ -17,11 +17,9 @@ use crate::http::respond::answer::{FrameAnswers, answer_bytes};
 use crate::http::respond::json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
-use crate::http::service::advance::{self, GivenBox, NextFrames};
-use crate::http::service::first_frame::FirstFrame;
-use crate::http::service::state::AppState;
-use crate::http::service::work;
-use crate::sessions::{ByteCharge, SessionState, WorkMeter};
+use crate::http::state::AppState;
+use crate::sessions::{ByteCharge, GivenBox, TrackFrom, TrackedAway};
+use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -137,82 +135,64 @@ pub async fn post(State(state): State<AppState>, request: Request) -> Result<Res
     let mut charge = ByteCharge::new(&state.uploads, admitted.bytes());
     let request = Request::from_parts(parts, body);
     let (upload, queue) = Upload::read(&state, admitted, texts, request).await?;
-    let queue = queue.for_frames(upload.files.len());
-    let worker = state.clone();
-    let track = move |meter: &mut WorkMeter| {
-        let body = track(&worker, upload, meter, &mut charge)?;
+    let (from, files) = asked(upload)?;
+    let answer = move |tracked: TrackedAway| {
+        let body = answer_body(&tracked, &mut charge)?;
         Ok((body, charge))
     };
-    let (body, charge) = work::run(&state, queue, track).await?;
+    let answered = state
+        .service
+        .track::<_, Problem, _>(queue, from, files, answer);
+    let (body, charge) = answered.await?;
     Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
 }
 
-/// The body of the answer, whose memory is charged before it is taken.
-fn track(
-    state: &AppState,
-    upload: Upload<TrackSettings>,
-    meter: &mut WorkMeter,
-    charge: &mut ByteCharge,
-) -> Result<Vec<u8>, Problem> {
-    let keys = &state.access.snapshots;
-    let (mut estimates, mut files) = (Vec::new(), upload.files);
-    let (mut track, correction) = match &upload.snapshot {
-        Some(snapshot) => {
-            let allowed = TrackSettings {
-                r#box: upload.settings.r#box,
-                target: upload.settings.target,
-                ..TrackSettings::default()
-            };
-            if upload.settings != allowed {
-                let detail = "A snapshot holds the parameters; leave out all settings but `box` and `target`.";
-                return Err(Problem::malformed(detail));
-            }
-            if files.len() > 1 && allowed.r#box.is_some() {
-                let detail = "A box corrects one frame; send the others in another request.";
-                return Err(Problem::malformed(detail));
-            }
-            let track = SessionState::restore(snapshot, keys, state.config.max_frames)?;
-            let target = allowed.target.map(|number| number.as_index());
-            let correction = allowed.r#box.map(|to| GivenBox { target, to });
-            (track, correction)
+/// Where the track stands, and the frames.
+fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Problem> {
+    let (settings, files) = (upload.settings, upload.files);
+    let Some(snapshot) = upload.snapshot else {
+        if settings.target.is_some() {
+            let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
+            return Err(Problem::malformed(detail));
         }
-        None => {
-            advance::check_pixels(&files, &state.config.request_limits())?;
-            let first = files.remove(0);
-            let track = begin(upload.settings)?.begin(state, &first, meter)?;
-            estimates.push(track.latest());
-            (track, None)
-        }
+        let params = overrides::resolve(settings.preset, settings.seed, settings.params)?;
+        let boxes = boxes_of(settings.r#box, settings.boxes.as_ref())?;
+        return Ok((TrackFrom::Start(boxes, Box::new(params)), files));
     };
-    if !files.is_empty() {
-        let next = NextFrames::posted(None, files, correction);
-        let limits = state.config.request_limits();
-        let answered = next.advance_state(&mut track, &limits, meter, &state.metrics.tracking)?;
-        estimates.extend(answered.estimates);
+    let allowed = TrackSettings {
+        r#box: settings.r#box,
+        target: settings.target,
+        ..TrackSettings::default()
+    };
+    if settings != allowed {
+        let detail =
+            "A snapshot holds the parameters; leave out all settings but `box` and `target`.";
+        return Err(Problem::malformed(detail));
     }
-    let snapshot = track.snapshot(keys);
+    if files.len() > 1 && allowed.r#box.is_some() {
+        let detail = "A box corrects one frame; send the others in another request.";
+        return Err(Problem::malformed(detail));
+    }
+    let target = allowed.target.map(|number| number.as_index());
+    let correction = allowed.r#box.map(|to| GivenBox {
+        target,
+        to: to.into(),
+    });
+    Ok((TrackFrom::Snapshot(snapshot, correction), files))
+}
+
+/// The body of the answer, whose memory is charged before it is taken.
+fn answer_body(tracked: &TrackedAway, charge: &mut ByteCharge) -> Result<Vec<u8>, Problem> {
+    let (estimates, snapshot) = (&tracked.estimates[..], &tracked.snapshot);
     // It is there as base64, and once more in the body.
     let text = snapshot.len().div_ceil(3) * 4;
-    charge.grow(2 * text + answer_bytes(estimates.len(), track.target_count()))?;
+    let targets = estimates.first().map_or(1, |first| first.as_slice().len());
+    charge.grow(2 * text + answer_bytes(estimates.len(), targets))?;
     let tracked = Tracked {
-        answers: FrameAnswers::from(&estimates[..]),
+        answers: FrameAnswers::from(estimates),
         snapshot: STANDARD.encode(snapshot),
     };
     let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;
     charge.shrink(body.len());
     Ok(body)
-}
-
-/// What a new track begins with.
-fn begin(settings: TrackSettings) -> Result<FirstFrame, Problem> {
-    if settings.target.is_some() {
-        let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
-        return Err(Problem::malformed(detail));
-    }
-    Ok(FirstFrame {
-        boxes: boxes_of(settings.r#box, settings.boxes.as_ref())?,
-        preset: settings.preset,
-        seed: settings.seed,
-        params: settings.params,
-    })
 }

@@ -1,19 +1,19 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
 use super::answer::{Answer, replayed_header};
+use super::checkpoint::with_checkpoint;
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::snapshot::charged;
-use crate::http::service::advance::NextFrames;
-use crate::http::service::advance_session::advance_session;
-use crate::http::service::state::AppState;
-use crate::http::service::work;
-use crate::sessions::{ByteCharge, Estimates, PerTarget, QueuePermit, SessionPermit, WorkMeter};
-use crate::tracker::Seen;
+use crate::http::state::AppState;
+use crate::sessions::{
+    ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
+};
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::Seen;
 use std::sync::Arc;
 
 /// The header that has the answer as JSON.
@@ -30,39 +30,41 @@ pub async fn answer_drawn(
     permit: SessionPermit,
     queue: QueuePermit,
     client: &Client,
-    mut next: NextFrames,
+    mut next: FrameBatch,
 ) -> Result<Response, Problem> {
     let [file] = &next.files[..] else {
         let detail = "A drawn answer is one picture; send one frame in a request.";
         return Err(Problem::malformed(detail));
     };
     next.check_sizes(
-        &state.config.request_limits(),
+        &state.service.request_limits(),
         permit.session().source_size(),
     )?;
     // Before the frame is tracked: what cannot be drawn must not count.
     let (file, limits) = (file.clone(), state.config.frame_limits());
     let decode = move |_: &mut WorkMeter| Ok(Picture::decode(&file, &limits, MAX_SIDE)?);
-    let picture = work::run(state, queue.clone(), decode).await?;
+    let picture = state
+        .service
+        .run::<_, Problem, _>(queue.clone(), decode)
+        .await?;
     let account = state.clients.account(client);
     let mut charge = ByteCharge::new(&state.uploads, account.bytes());
     // The pixels, and a file that is no larger but for a little.
     charge.grow(2 * picture.bytes())?;
-    next.sees = true;
-    let mut answered = advance_session(state, permit, queue.clone(), client, next).await?;
-    let (estimates, seen) = (answered.estimates.swap_remove(0), answered.seen);
+    next.with_diagnostics = true;
+    let mut answered = state.service.advance(permit, queue.clone(), next).await?;
+    let (estimates, seen) = (answered.estimates.swap_remove(0), answered.diagnostics);
     let answer = serde_json::to_string(&Answer::from(&estimates));
     let answer = answer.map_err(|error| Problem::internal(Arc::new(error)))?;
-    let frame = estimates.first().frame;
     let draw = move |_: &mut WorkMeter| draw(picture, &estimates, &seen);
-    let bytes = work::run(state, queue, draw).await?;
+    let bytes = state.service.run::<_, Problem, _>(queue, draw).await?;
     let headers = [(CONTENT_TYPE, HeaderValue::from_static("image/png"))];
     let mut response = (headers, charged(bytes, charge)).into_response();
     if let Ok(answer) = HeaderValue::from_str(&answer) {
         response.headers_mut().insert(ANSWER, answer);
     }
     let response = replayed_header(answered.replayed, response);
-    Ok(answered.durability.write(frame, response))
+    Ok(with_checkpoint(answered.checkpoint, response))
 }
 
 /// The picture as a file. What was answered before has no particles.

@@ -2,8 +2,8 @@
 
 use super::target_box::TargetBox;
 use crate::sessions::{Estimates, PerTarget};
-use crate::tracker::{Estimate, Status};
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::{Estimate, Status};
 use serde::Serialize;
 
 /// Bytes of a target in an answer: the value, and its JSON with six numbers.
@@ -66,13 +66,6 @@ impl From<&Estimate> for TargetView {
             score: rounded(estimate.score),
             status: estimate.status.into(),
         }
-    }
-}
-
-impl Answer {
-    /// Which frame it answers.
-    pub fn frame(&self) -> u64 {
-        self.frame
     }
 }
 

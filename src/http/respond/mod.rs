@@ -5,7 +5,8 @@
 
 pub mod annotated_image;
 pub mod answer;
-pub mod durability;
+pub mod checkpoint;
+pub mod created_session;
 pub mod json;
 pub mod ndjson;
 pub mod response_format;

@@ -6,20 +6,18 @@
 //! together: pixels, processor time, and the time until the last is tracked. A video has the processor time of as many
 //! requests as its frames would be posted in, and no end but that of its frames.
 
-use super::durability::Durability;
 use super::json;
 use super::response_format;
+use crate::http::extract::video_frames::VideoFrames;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::service::advance::{NextFrames, check_readable_pixels};
-use crate::http::service::advance_session::advance_session;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::http::service::video_frames::VideoFrames;
-use crate::http::service::work;
+use crate::http::state::AppState;
 use crate::http::stream::message::StreamAnswer;
-use crate::sessions::{Fingerprint, LockedSession, QueuePermit, SessionPermit, WorkMeter};
+use crate::sessions::{
+    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
+    check_readable_pixels,
+};
 use axum::body::{Body, Bytes, HttpBody};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
@@ -55,12 +53,12 @@ impl FrameSource {
         files: Vec<Bytes>,
     ) -> Result<Self, Problem> {
         let deadline = Instant::now() + state.config.work_timeout;
-        let limits = state.config.request_limits();
+        let limits = state.service.request_limits();
         let check = move |_: &mut WorkMeter| {
             check_readable_pixels(&files, &limits)?;
             Ok(files)
         };
-        let files = work::run(state, queue, check).await?;
+        let files = state.service.run::<_, Problem, _>(queue, check).await?;
         Ok(Self::Files(files.into_iter(), deadline))
     }
 }
@@ -94,7 +92,9 @@ impl LineWork {
     pub async fn answer(mut self) -> Result<Response, Problem> {
         if self.number.is_some() {
             // What is compared with the number must be the newest.
-            newest::refresh(&self.state, self.permit.session(), &self.client).await?;
+            let flow = self.queue.lane();
+            let session = self.permit.session();
+            self.state.service.refresh(session, None, flow).await?;
         }
         let first = match self.next().await {
             Some(answered) => line(&answered?)?,
@@ -125,33 +125,32 @@ impl LineWork {
 
     async fn track(&mut self, file: Bytes) -> Result<StreamAnswer, Problem> {
         let state = &self.state;
-        let (permit, queue) = (self.permit.visitor(), self.queue.clone());
+        let (permit, queue) = (self.permit.share(), self.queue.clone());
         let session = permit.session().clone();
         if let Some(number) = self.number
             && number <= session.latest_frame()
         {
             // It was answered before.
             let print = Fingerprint::of(&file);
-            let look = move |locked: &mut LockedSession| {
-                Ok(locked.state().stored_answer(number, print)?)
-            };
-            let estimates = newest::look(state, permit, queue, &self.client, look).await?;
+            let read = move |state: &SessionState| Ok(state.stored_answer(number, print)?);
+            let read = state.service.read::<_, Problem, _>(permit, queue, read);
+            let estimates = read.await?;
             self.number = Some(number + 1);
             let answer = StreamAnswer::new(&estimates, 0, true, state.is_draining());
-            return Ok(answer.with_durability(Durability::of(&session, state.store.is_some())));
+            return Ok(answer.with_checkpoint(session.checkpoint()));
         }
         if matches!(self.frames, FrameSource::Video(_)) {
             self.count_frame().await?;
         }
-        let mut next = NextFrames::posted(self.number, vec![file], None);
+        let mut next = FrameBatch::posted(self.number, vec![file], None);
         // So that the request can be sent again when its line breaks.
-        next.kept = state.config.max_frames;
-        let answered = advance_session(state, permit, queue, &self.client, next).await?;
+        next.min_answers = state.config.max_frames;
+        let answered = state.service.advance(permit, queue, next).await?;
         let estimates = &answered.estimates[0];
         // No other request may come between two frames of this one.
         self.number = Some(estimates.first().frame + 1);
         let answer = StreamAnswer::new(estimates, 0, answered.replayed, state.is_draining());
-        Ok(answer.with_durability(answered.durability))
+        Ok(answer.with_checkpoint(answered.checkpoint))
     }
 
     /// Waits for a place in the quota of frames.

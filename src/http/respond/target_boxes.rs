@@ -3,7 +3,7 @@
 use super::target_box::{BoxInput, NUMBER, TargetBox, box_forms};
 use crate::http::problems::problem::Problem;
 use crate::sessions::{Boxes, MAX_TARGETS, PerTarget};
-use crate::tracker::Rect;
+use bagtrack_tracker::Rect;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;
 use std::borrow::Cow;
@@ -13,7 +13,8 @@ use utoipa::openapi::{RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
 /// The boxes of the targets, 1 to [`MAX_TARGETS`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[serde(transparent)]
 pub struct TargetBoxes(Vec<TargetBox>);
 
 /// The text is no list of boxes.

@@ -1,20 +1,16 @@
 //! One frame of a stream: it gets its permits, then its answer.
 
-use super::open_streams::StreamPlace;
 use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::auth::caller::Caller;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Account;
-use crate::http::respond::durability::Durability;
-use crate::http::service::advance::{Answered, NextFrames};
-use crate::http::service::advance_session::advance_session;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::http::service::stored;
-use crate::sessions::{Estimates, QueuePermit, Session, SessionPermit};
-use crate::tracker::Seen;
+use crate::http::state::AppState;
+use crate::sessions::{
+    ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
+    Tracked,
+};
+use bagtrack_tracker::Seen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -34,8 +30,6 @@ pub struct FrameWork {
     pub state: AppState,
     /// Who sends them.
     pub caller: Caller,
-    /// Where they come from.
-    pub client: Client,
     /// The quotas that they are counted by.
     pub account: Arc<Account>,
     /// The session.
@@ -57,8 +51,8 @@ pub struct Given {
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
     pub seen: Option<Seen>,
-    /// What the store has.
-    pub durability: Durability,
+    /// The last frame whose state is in the store.
+    pub checkpoint: Option<u64>,
 }
 
 /// What became of a frame.
@@ -114,6 +108,7 @@ impl FrameWork {
         let session = self.find().await?.enter()?;
         let request = Arc::new(self.account.request()?);
         let queue = state
+            .service
             .admission
             .enter(request.lane(), Box::new(request.clone()))?;
         request.count_frames(1)?;
@@ -129,7 +124,11 @@ impl FrameWork {
         if caller.has_ended(state.now()) || !has_key {
             return Err(Problem::unauthorized());
         }
-        stored::find(state, self.session, caller.owner(), &self.client).await
+        let flow = self.account.lane();
+        Ok(state
+            .service
+            .find(self.session, caller.owner(), flow)
+            .await?)
     }
 
     /// Whether the caller may still use the session, which is there, and whether the stream has its place. Asks the
@@ -139,7 +138,8 @@ impl FrameWork {
     /// The token has ended, or the key; or the session.
     pub async fn check_newest(&self) -> Result<(), Problem> {
         let session = self.find().await?;
-        newest::refresh(&self.state, &session, &self.client).await?;
+        let flow = self.account.lane();
+        self.state.service.refresh(&session, None, flow).await?;
         self.place.has_ended(&session);
         Ok(())
     }
@@ -169,25 +169,25 @@ impl FrameWork {
             return Err(Problem::which_target(session.session().target_count()));
         }
         loop {
-            let next = NextFrames {
+            let next = FrameBatch {
                 number,
                 files: vec![file.clone()],
                 correction: header.correction(),
-                kept: MAX_KEPT.min(config.max_frames),
-                sees: header.see,
+                min_answers: MAX_KEPT.min(config.max_frames),
+                with_diagnostics: header.see,
                 stream: Some(self.place.clone()),
-                _charge: Some(charge.clone()),
+                charge: Some(charge.clone()),
             };
             let at = session.session().clone();
-            match advance_session(&self.state, session, queue, &self.client, next).await {
+            match self.state.service.advance(session, queue, next).await {
                 Ok(answered) => return Ok(Given::of(answered, shown)),
-                Err(problem) if is_store_away(&problem) && Instant::now() < deadline => {
+                Err(FramesError::Act(ActError::Store(_))) if Instant::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
                     number = number.or(Some(at.latest_frame() + 1));
                     sleep(STORE_RETRY).await;
                     (session, queue) = self.permits().await?;
                 }
-                Err(problem) => return Err(problem),
+                Err(error) => return Err(error.into()),
             }
         }
     }
@@ -195,19 +195,16 @@ impl FrameWork {
 
 impl Given {
     /// The answer to one frame, with what the tracker of this target saw.
-    fn of(mut answered: Answered, target: usize) -> Self {
-        let seen = (target < answered.seen.len()).then(|| answered.seen.swap_remove(target));
+    fn of(mut answered: Tracked, target: usize) -> Self {
+        let seen =
+            (target < answered.diagnostics.len()).then(|| answered.diagnostics.swap_remove(target));
         Self {
             estimates: answered.estimates.swap_remove(0),
             replayed: answered.replayed,
             seen,
-            durability: answered.durability,
+            checkpoint: answered.checkpoint,
         }
     }
-}
-
-fn is_store_away(problem: &Problem) -> bool {
-    problem.kind() == Kind::StoreUnavailable
 }
 
 /// Whether a frame waits where there is such a problem, and is tried again.

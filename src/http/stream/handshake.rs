@@ -1,7 +1,6 @@
 //! Opens a stream.
 
 use super::frame_work::FrameWork;
-use super::open_streams::StreamPlace;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::Upgrade;
 use super::waiting::Waiting;
@@ -15,17 +14,14 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
-use crate::http::respond::durability::Durability;
-use crate::http::service::newest;
-use crate::http::service::state::AppState;
-use crate::sessions::{ReplayError, Session};
+use crate::http::state::AppState;
+use crate::sessions::{Lane, ReplayError, Session, StreamPlace};
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
 use axum::response::Response;
 use serde::Deserialize;
 use std::io;
 use std::sync::{Arc, Mutex};
-use tokio::time::timeout;
 use tracing::Instrument;
 
 /// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
@@ -72,7 +68,7 @@ operation_problems!(
 /// `?from=N`, N being the first frame without an answer: the stored answers come again, with `"replayed": true`, and
 /// frames go on with the number `next`. With `drop=true` a frame that waits is skipped for a newer one; `"skipped"` in
 /// an answer counts the frames before it that were. With a store, `"checkpoint": N` in an answer names the last frame
-/// whose state is in it, and `"durable": false` says that the store could not be reached and has not this frame.
+/// whose state is in it.
 ///
 /// A page sends its session token as a protocol: `new WebSocket(url, ["bagtrack", token])`. The service closes with
 /// 4000 and the status of a problem (410: the session has expired), 4409 when a newer stream of the session has taken
@@ -102,8 +98,8 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let account = state.clients.account(&client);
     let permit = account.stream()?;
     // The stream before this one tracks no further frame.
-    let place = Arc::new(state.streams.take(session.id()));
-    let stand = stand(&state, &session, &client, &place, settings.from).await?;
+    let place = Arc::new(state.service.streams.take(session.id()));
+    let stand = stand(&state, &session, account.lane(), &place, settings.from).await?;
     let newest_wins = settings.drop.0;
     let max_bytes = max_message_bytes(&state, &session);
     let budgets = [state.uploads.clone(), account.bytes().clone()];
@@ -113,7 +109,6 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
         work: Arc::new(FrameWork {
             state,
             caller,
-            client,
             account,
             session: session.id(),
             place,
@@ -152,13 +147,12 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
 async fn stand(
     state: &AppState,
     session: &Arc<Session>,
-    client: &Client,
+    flow: Lane,
     place: &StreamPlace,
     from: Option<u64>,
 ) -> Result<Stand, Problem> {
-    let waiting = newest::lock_fenced(state, session.visit()?, client, from);
-    let waiting = timeout(state.config.work_timeout, waiting);
-    let mut locked = waiting.await.map_err(|_| Problem::work_timeout())??;
+    let fenced = state.service.fence(session.read_permit()?, flow);
+    let mut locked = fenced.await?;
     place.begin(session);
     let next = locked.state().latest_frame() + 1;
     let from = from.unwrap_or(next);
@@ -170,6 +164,6 @@ async fn stand(
     Ok(Stand {
         next,
         stored,
-        durability: Durability::of(session, state.store.is_some()),
+        checkpoint: session.checkpoint(),
     })
 }

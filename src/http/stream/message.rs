@@ -2,11 +2,9 @@
 
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
-use crate::http::respond::durability::Durability;
 use crate::http::respond::target_box::TargetBox;
-use crate::http::service::advance::GivenBox;
-use crate::sessions::Estimates;
-use crate::tracker::Seen;
+use crate::sessions::{Estimates, GivenBox};
+use bagtrack_tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
 
@@ -47,7 +45,10 @@ impl FrameHeader {
     /// The correction, where there is one.
     pub fn correction(&self) -> Option<GivenBox> {
         let target = self.target;
-        self.r#box.map(|to| GivenBox { target, to })
+        self.r#box.map(|to| GivenBox {
+            target,
+            to: to.into(),
+        })
     }
 
     /// Reads a text message.
@@ -90,9 +91,6 @@ pub struct StreamAnswer {
     /// With a store: the last frame whose state is in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<u64>,
-    /// `false` where the store could not be reached and has not this frame.
-    #[serde(skip_serializing_if = "is_true")]
-    durable: bool,
     /// Whether the service is about to end.
     #[serde(skip_serializing_if = "is_false")]
     draining: bool,
@@ -138,16 +136,14 @@ impl StreamAnswer {
             skipped,
             replayed,
             checkpoint: None,
-            durable: true,
             draining,
             seen: None,
         }
     }
 
-    /// With what the store has.
-    pub fn with_durability(mut self, durability: Durability) -> Self {
-        self.checkpoint = durability.checkpoint();
-        self.durable = !durability.lacks(self.answer.frame());
+    /// With the last frame whose state is in the store.
+    pub fn with_checkpoint(mut self, checkpoint: Option<u64>) -> Self {
+        self.checkpoint = checkpoint;
         self
     }
 
@@ -160,10 +156,6 @@ impl StreamAnswer {
 
 fn is_zero(number: &u64) -> bool {
     *number == 0
-}
-
-fn is_true(flag: &bool) -> bool {
-    *flag
 }
 
 fn is_false(flag: &bool) -> bool {

@@ -10,7 +10,7 @@
 //!
 //! What can go wrong: the line breaks while frames are on their way, so the last answers of a session are kept, and the
 //! client asks for them. The old line may not know yet that it is broken, so a new stream ends the old one
-//! ([`open_streams`]). A client says nothing for long: it is pinged. A client reads no answers: the connection ends by
+//! ([`OpenStreams`](crate::sessions::OpenStreams)). A client says nothing for long: it is pinged. A client reads no answers: the connection ends by
 //! its time limit for writing. A client sends a part of a message and no more, over many streams: memory is charged as
 //! messages arrive ([`fragments`]).
 
@@ -19,7 +19,6 @@ pub mod fragments;
 pub mod frame_work;
 pub mod handshake;
 pub mod message;
-pub mod open_streams;
 pub mod session_stream;
 pub mod upgrade;
 pub mod waiting;

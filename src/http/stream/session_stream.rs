@@ -10,7 +10,6 @@ use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::durability::Durability;
 use crate::sessions::{ByteCharge, BytesFull, Estimates};
 use axum::body::Bytes;
 use futures_util::stream::FusedStream;
@@ -34,8 +33,8 @@ pub struct Stand {
     pub next: u64,
     /// The stored answers that the client asked for.
     pub stored: Vec<Estimates>,
-    /// What the store has.
-    pub durability: Durability,
+    /// The last frame whose state is in the store.
+    pub checkpoint: Option<u64>,
 }
 
 /// An open stream.
@@ -99,7 +98,7 @@ impl SessionStream {
         self.send(socket, &Hello { next }).await?;
         for estimates in std::mem::take(&mut self.stand.stored) {
             let answer = self.answer(&estimates, 0, true);
-            let answer = answer.with_durability(self.stand.durability);
+            let answer = answer.with_checkpoint(self.stand.checkpoint);
             self.send(socket, &answer).await?;
         }
         let work = self.work.clone();
@@ -146,10 +145,10 @@ impl SessionStream {
                     }
                     counts.skipped += skipped;
                     match answer {
-                        Ok(Given { estimates, replayed, seen, durability }) => {
+                        Ok(Given { estimates, replayed, seen, checkpoint }) => {
                             counts.answered += 1;
                             let answer = self.answer(&estimates, skipped, replayed);
-                            let answer = answer.with_seen(seen).with_durability(durability);
+                            let answer = answer.with_seen(seen).with_checkpoint(checkpoint);
                             self.send(socket, &answer).await?;
                         }
                         Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),

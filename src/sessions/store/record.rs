@@ -6,13 +6,16 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use uuid::Uuid;
 
+/// The format of [`Record::head`]. Another one is not read; see [`UnreadableRecord`].
+const HEAD_FORMAT: u8 = 2;
+
 /// Names a session. The id alone may be another session's later.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SessionName {
     /// Its id.
     pub id: Uuid,
     /// The random number that it was opened with.
-    pub birth: u64,
+    pub incarnation: u64,
 }
 
 /// Which state of a record a replica has.
@@ -46,11 +49,11 @@ impl Version {
         }
     }
 
-    /// After the state of this frame was written.
-    pub fn written(self, frame: u64) -> Self {
+    /// After this frame was committed, with its state or without.
+    pub fn committed(self, frame: u64, with_state: bool) -> Self {
         Self {
             frame,
-            checkpoint: frame,
+            checkpoint: if with_state { frame } else { self.checkpoint },
             ..self
         }
     }
@@ -68,7 +71,7 @@ pub struct Record {
     /// The state at the checkpoint, as bytes.
     pub state: Vec<u8>,
     /// After this time without a frame the record is gone.
-    pub lives: Duration,
+    pub ttl: Duration,
 }
 
 /// The part of a record that never changes.
@@ -78,34 +81,81 @@ struct Head {
     opening: Opening,
 }
 
-/// A record's fields as the scripts tell them: generation, checkpoint, head, state.
-pub(super) type Fields = (u64, u64, Vec<u8>, Vec<u8>);
+/// A record that this version of the program cannot read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum UnreadableRecord {
+    /// Another version wrote it: replicas of that version, which run meanwhile, can read it.
+    #[error("the record has format {0}, and this service reads {HEAD_FORMAT}")]
+    Format(u8),
+    /// It is damaged.
+    #[error("the record is damaged")]
+    Damaged,
+}
 
 impl Record {
-    /// The head as bytes.
-    pub(super) fn head(owner: &Owner, opening: &Opening) -> Vec<u8> {
+    /// The part that never changes, as bytes: a format number, then the content in postcard's encoding.
+    pub fn head(&self) -> Vec<u8> {
         let head = Head {
-            owner: owner.name().map(str::to_owned),
-            opening: opening.clone(),
+            owner: self.owner.name().map(str::to_owned),
+            opening: self.opening.clone(),
         };
-        postcard::to_stdvec(&head).expect("plain data is always encodable")
+        postcard::to_extend(&head, vec![HEAD_FORMAT]).expect("plain data is always encodable")
     }
 
-    /// The record of these fields; none if another version of the program wrote the head.
-    pub(super) fn read(fields: Fields, lives: Duration) -> Option<Self> {
-        let (generation, checkpoint, head, state) = fields;
-        let Head { owner, opening } = postcard::from_bytes(&head).ok()?;
-        Some(Self {
+    /// The record at its checkpoint. Frames after it are not in the state, so whoever goes on from here has to take the
+    /// record over.
+    ///
+    /// # Errors
+    /// See [`UnreadableRecord`].
+    pub fn at_checkpoint(
+        generation: u64,
+        checkpoint: u64,
+        head: &[u8],
+        state: Vec<u8>,
+        ttl: Duration,
+    ) -> Result<Self, UnreadableRecord> {
+        let Head { owner, opening } = match head.split_first() {
+            Some((&HEAD_FORMAT, content)) => {
+                postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)?
+            }
+            Some((&other, _)) => return Err(UnreadableRecord::Format(other)),
+            None => return Err(UnreadableRecord::Damaged),
+        };
+        Ok(Self {
             version: Version {
                 generation,
-                // Frames after it are not in the state: whoever goes on from here has to take the record over.
                 frame: checkpoint,
                 checkpoint,
             },
             owner: owner.map_or_else(Owner::default, |name| Owner::named(&name)),
             opening,
             state,
-            lives,
+            ttl,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sessions::store::tests::record;
+
+    #[test]
+    fn a_record_is_read_again_and_one_of_another_format_says_so() {
+        let written = record(11, 0);
+        let version = written.version;
+        let read = |head: &[u8]| {
+            let (state, ttl) = (written.state.clone(), written.ttl);
+            Record::at_checkpoint(version.generation, version.checkpoint, head, state, ttl)
+        };
+        let head = written.head();
+        assert_eq!(read(&head), Ok(written.clone()));
+        // Before records had a format they began with whether there is an owner.
+        assert_eq!(read(&head[1..]), Err(UnreadableRecord::Format(1)));
+        let newer = [&[HEAD_FORMAT + 1], &head[1..]].concat();
+        assert_eq!(read(&newer), Err(UnreadableRecord::Format(HEAD_FORMAT + 1)));
+        let cut = &head[..head.len() - 3];
+        assert_eq!(read(cut), Err(UnreadableRecord::Damaged));
+        assert_eq!(read(&[]), Err(UnreadableRecord::Damaged));
     }
 }

@@ -1,0 +1,45 @@
+//! Places for the processes that decode videos: a client has one at a time, so that another client gets the next.
+
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::state::AppState;
+use crate::sessions::{QueueFull, QueuePermit};
+use tokio::sync::OwnedSemaphorePermit;
+use tokio::time::{Instant, timeout_at};
+
+/// A place for a process that decodes a video, given back when this is dropped.
+#[derive(Debug)]
+pub struct VideoPlace {
+    _of_client: OwnedSemaphorePermit,
+    _of_all: OwnedSemaphorePermit,
+}
+
+impl VideoPlace {
+    /// Waits for a place, as long as a request may. Meanwhile another request may have the place in the queue. A video may
+    /// take the processor time of as many requests as its frames would be posted in.
+    ///
+    /// # Errors
+    /// The client's other video, or those of others, take longer; or the queue is full after the wait.
+    pub async fn take(
+        state: &AppState,
+        client: &Client,
+        queue: QueuePermit,
+    ) -> Result<(Self, QueuePermit), Problem> {
+        let config = &state.config;
+        let deadline = Instant::now() + config.work_timeout;
+        let request = queue.leave();
+        let own = state.clients.account(client).videos().acquire_owned();
+        let own = timeout_at(deadline, own).await.ok().and_then(Result::ok);
+        let own = own.ok_or_else(|| Problem::quota_exceeded("videos at a time", 1))?;
+        let all = timeout_at(deadline, state.videos.clone().acquire_owned()).await;
+        let all = all.ok().and_then(Result::ok).ok_or(QueueFull)?;
+        let requests = config.limits.max_video_frames.div_ceil(config.max_frames);
+        let requests = u32::try_from(requests).unwrap_or(u32::MAX);
+        let queue = state.service.admission.enter_again(request)?;
+        let place = Self {
+            _of_client: own,
+            _of_all: all,
+        };
+        Ok((place, queue.with_cpu_of(requests)))
+    }
+}

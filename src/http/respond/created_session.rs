@@ -1,0 +1,74 @@
+//! The answer to a request that opens a session.
+
+use super::answer::{ImageSize, replayed_header};
+use super::checkpoint::with_checkpoint;
+use super::json::Json;
+use super::target_box::TargetBox;
+use crate::http::extract::overrides::ParamOverrides;
+use crate::sessions::{Opened, PerTarget, Session};
+use axum::http::StatusCode;
+use axum::http::header::LOCATION;
+use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::Params;
+use serde::Serialize;
+use std::time::{Duration, SystemTime};
+use uuid::Uuid;
+
+/// A new session.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct CreatedSession {
+    /// The session's id.
+    id: Uuid,
+    /// The frame that the session stands at: 0 for a new one, the snapshot's for a restored one.
+    #[schema(example = 0)]
+    frame: u64,
+    /// The box of that frame; of several targets the first one's.
+    r#box: TargetBox,
+    /// In a session that was opened with `boxes`: its boxes of that frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, min_items = 1, max_items = 16)]
+    boxes: Option<Vec<TargetBox>>,
+    /// The size that all frames of the session have.
+    image: ImageSize,
+    /// With `verbose`: the tracker's parameters, with the seed that was drawn when none was given.
+    #[serde(rename = "parameters", skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = ParamOverrides, nullable = false, required = false)]
+    params: Option<Params>,
+    /// When the session ends if no frame comes (RFC 3339); every frame moves this on.
+    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
+    expires_at: String,
+}
+
+impl CreatedSession {
+    fn of(session: &Session, is_verbose: bool) -> Self {
+        let opening = session.opening();
+        let expires = SystemTime::UNIX_EPOCH + Duration::from_secs(opening.expires);
+        let boxes = opening
+            .estimates
+            .map(|estimate| TargetBox::answered(estimate.target));
+        Self {
+            id: session.id(),
+            frame: opening.estimates.first().frame,
+            r#box: TargetBox::answered(opening.estimates.first().target),
+            boxes: match boxes {
+                PerTarget::One(_) => None,
+                PerTarget::List(list) => Some(list),
+            },
+            image: session.source_size().into(),
+            params: is_verbose.then(|| session.params().clone()),
+            expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
+        }
+    }
+}
+
+/// The answer to the request that opened a session.
+pub fn created(opened: &Opened, is_verbose: bool) -> Response {
+    let session = &opened.session;
+    let location = [(LOCATION, format!("/sessions/{}", session.id()))];
+    let body = Json(CreatedSession::of(session, is_verbose));
+    let response = (StatusCode::CREATED, location, body).into_response();
+    with_checkpoint(
+        session.checkpoint(),
+        replayed_header(opened.replayed, response),
+    )
+}

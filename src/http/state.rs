@@ -1,0 +1,138 @@
+//! What all handlers share.
+
+use crate::http::auth::access::Access;
+use crate::http::config::service::Config;
+use crate::http::metrics::registry::Metrics;
+use crate::http::quotas::client::Client;
+use crate::http::quotas::clients::Clients;
+use crate::http::resources::saturation::Saturation;
+use crate::sessions::{
+    Admission, ByteBudget, Clock, IdempotencyStore, Lane, Lease, OpenStreams, Registry,
+    ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
+};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::SystemTime;
+use tokio::sync::Semaphore;
+
+/// What all handlers share; clones are the same state.
+#[derive(Debug, Clone)]
+pub struct AppState(Arc<Shared>);
+
+/// The fields of [`AppState`].
+#[derive(Debug)]
+pub struct Shared {
+    /// The settings, validated.
+    pub config: Config,
+    /// The one door to sessions.
+    pub service: SessionService,
+    /// The memory of all uploads together.
+    pub uploads: ByteBudget,
+    /// What each client has in use.
+    pub clients: Clients,
+    /// Keys and secrets.
+    pub access: Access,
+    /// What is counted and measured.
+    pub metrics: Metrics,
+    /// Places for the processes that decode videos.
+    pub videos: Arc<Semaphore>,
+    /// Whether `/readyz` has found the queue full.
+    pub queue_saturation: Saturation,
+    /// Whether `/readyz` has found the memory of uploads used up.
+    pub upload_saturation: Saturation,
+    clock: Clock,
+}
+
+impl std::ops::Deref for AppState {
+    type Target = Shared;
+    fn deref(&self) -> &Shared {
+        &self.0
+    }
+}
+
+impl AppState {
+    /// The state of a service with these settings, keys and this clock.
+    ///
+    /// # Errors
+    /// The system gives no threads for the workers.
+    pub fn new(
+        config: Config,
+        access: Access,
+        clock: Clock,
+        store: Option<Arc<dyn SessionStore>>,
+    ) -> io::Result<Self> {
+        let metrics = Metrics::new();
+        let service = SessionService::new(ServiceParts {
+            settings: settings(&config),
+            registry: registry(&config, &clock, store.is_some()),
+            store,
+            admission: Admission::new(config.queue, config.worker_count())?,
+            streams: OpenStreams::default(),
+            opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
+            keys: access.snapshots.clone(),
+            tracking: metrics.tracking.clone(),
+            queue_wait: metrics.queue_wait.clone(),
+            draining: AtomicBool::new(false),
+        });
+        Ok(Self(Arc::new(Shared {
+            service,
+            uploads: ByteBudget::new(config.max_upload_bytes),
+            clients: Clients::new(&config),
+            access,
+            metrics,
+            // A client has one at a time, and no client all of them.
+            videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
+            queue_saturation: Saturation::default(),
+            upload_saturation: Saturation::default(),
+            clock,
+            config,
+        })))
+    }
+
+    /// Whether the service was asked to end.
+    pub fn is_draining(&self) -> bool {
+        self.service.is_draining()
+    }
+
+    /// The time.
+    pub fn now(&self) -> SystemTime {
+        self.clock.wall(self.clock.now())
+    }
+
+    /// In whose turn the work of a client is done.
+    pub fn flow(&self, client: &Client) -> Lane {
+        self.clients.account(client).lane()
+    }
+
+    /// When the session expires, in RFC 3339.
+    pub fn expires_at(&self, session: &Session) -> String {
+        let moment = self.service.registry.expires_at(session);
+        humantime::format_rfc3339_seconds(moment).to_string()
+    }
+}
+
+fn settings(config: &Config) -> ServiceSettings {
+    ServiceSettings {
+        work_timeout: config.work_timeout,
+        max_request_cpu: config.limits.max_request_cpu,
+        frame: config.frame_limits(),
+        max_request_pixels: config.limits.max_request_pixels,
+        max_frames: config.max_frames,
+        store_every: config.store.store_every,
+    }
+}
+
+fn registry(config: &Config, clock: &Clock, has_store: bool) -> Registry {
+    let lease = Lease {
+        first: config.session_first,
+        idle: config.session_idle,
+    };
+    let (most, requests) = (config.max_sessions, config.session_queue);
+    let registry = Registry::new(most, requests, lease, clock.clone());
+    let registry = registry.with_memory(config.session_bytes());
+    match has_store {
+        true => registry.with_eviction(),
+        false => registry,
+    }
+}

@@ -1,0 +1,128 @@
+//! The scripts that Redis runs, each as a whole.
+//!
+//! KEYS: the record's, and the one that is there after its session was ended. In a cluster both are at one node.
+//!
+//! They answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}` where
+//! the record has another version, and `{3}` where the session was ended.
+
+use redis::Script;
+
+/// Says that there is no record, and whether its session was ended.
+const ABSENT: &str = r"
+local function absent()
+  if redis.call('EXISTS', KEYS[2]) == 1 then return {3} end
+  return {0}
+end
+";
+
+/// Tells the record. `takes_over` says whether the replica that asks goes on from the checkpoint.
+const TELL: &str = r"
+local function tell(key, takes_over)
+  local frame, checkpoint = unpack(redis.call('HMGET', key, 'frame', 'checkpoint'))
+  if takes_over and frame ~= checkpoint then
+    redis.call('HINCRBY', key, 'generation', 1)
+    redis.call('HSET', key, 'frame', checkpoint, 'token', '')
+  end
+  local fields = redis.call('HMGET', key, 'generation', 'checkpoint', 'head', 'state')
+  return {2, redis.call('PTTL', key), fields}
+end
+";
+
+/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live.
+const CREATE: &str = r"
+local key = KEYS[1]
+local token = redis.call('HGET', key, 'token')
+if token == ARGV[3] then return {1, 0} end
+if token then return tell(key, false) end
+if redis.call('EXISTS', KEYS[2]) == 1 then return {3} end
+redis.call('HSET', key, 'generation', ARGV[1], 'frame', ARGV[2], 'checkpoint', ARGV[2],
+  'token', ARGV[3], 'incarnation', ARGV[4], 'head', ARGV[5], 'state', ARGV[6])
+redis.call('PEXPIRE', key, ARGV[7])
+return {1, ARGV[7]}
+";
+
+/// ARGV: incarnation, milliseconds for which the session is known to have ended. Answers 0 where it had ended before. What is
+/// deleted first makes room, so this works where the memory is used up.
+const END: &str = r"
+local key, ended = KEYS[1], KEYS[2]
+local incarnation = redis.call('HGET', key, 'incarnation')
+local is_here = incarnation == ARGV[1] or (not incarnation and redis.call('EXISTS', ended) == 0)
+if incarnation == ARGV[1] then redis.call('DEL', key) end
+redis.call('SET', ended, '', 'PX', ARGV[2])
+return is_here and 1 or 0
+";
+
+/// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the record
+/// where it has another version ('1' or ''), and the state where it is written.
+const COMMIT: &str = r"
+local key = KEYS[1]
+local generation, frame, token = unpack(redis.call('HMGET', key, 'generation', 'frame', 'token'))
+if not generation then return absent() end
+if token == ARGV[4] then return {1, 0} end
+if generation ~= ARGV[1] or frame ~= ARGV[2] then return tell(key, ARGV[6] == '1') end
+redis.call('HSET', key, 'frame', ARGV[3], 'token', ARGV[4])
+if ARGV[7] then redis.call('HSET', key, 'checkpoint', ARGV[3], 'state', ARGV[7]) end
+redis.call('PEXPIRE', key, ARGV[5])
+return {1, ARGV[5]}
+";
+
+/// ARGV: generation, frame, whether the replica goes on from the record ('1' or ''), and milliseconds to live where the
+/// record is to live on.
+const CHECK: &str = r"
+local key = KEYS[1]
+local generation, frame = unpack(redis.call('HMGET', key, 'generation', 'frame'))
+if not generation then return absent() end
+if ARGV[4] then redis.call('PEXPIRE', key, ARGV[4]) end
+if generation ~= ARGV[1] or frame ~= ARGV[2] then return tell(key, ARGV[3] == '1') end
+return {1, redis.call('PTTL', key)}
+";
+
+/// ARGV: generation, frame. The next generation begins where they are the newest.
+const FENCE: &str = r"
+local key = KEYS[1]
+local generation, frame = unpack(redis.call('HMGET', key, 'generation', 'frame'))
+if not generation then return absent() end
+if generation ~= ARGV[1] or frame ~= ARGV[2] then return tell(key, true) end
+redis.call('HINCRBY', key, 'generation', 1)
+return {1, redis.call('PTTL', key)}
+";
+
+/// ARGV: an id, milliseconds to live. Answers the id that came first under this key.
+const CLAIM: &str = r"
+local id = redis.call('GET', KEYS[1])
+if id then return id end
+redis.call('SET', KEYS[1], ARGV[1], 'PX', ARGV[2])
+return ARGV[1]
+";
+
+/// Whether the store takes writes.
+const PROBE: &str = r"
+redis.call('HSET', KEYS[1], 'token', '')
+redis.call('PEXPIRE', KEYS[1], 1000)
+return 1
+";
+
+pub(super) struct Scripts {
+    pub(super) create: Script,
+    pub(super) commit: Script,
+    pub(super) check: Script,
+    pub(super) fence: Script,
+    pub(super) claim: Script,
+    pub(super) end: Script,
+    pub(super) probe: Script,
+}
+
+impl Scripts {
+    pub(super) fn new() -> Self {
+        let telling = |body: &str| Script::new(&format!("{ABSENT}{TELL}{body}"));
+        Self {
+            create: telling(CREATE),
+            commit: telling(COMMIT),
+            check: telling(CHECK),
+            fence: telling(FENCE),
+            claim: Script::new(CLAIM),
+            end: Script::new(END),
+            probe: Script::new(PROBE),
+        }
+    }
+}
