@@ -4,7 +4,7 @@ use crate::certificates::{Authority, Files, kinds};
 use crate::client::{Client, PATIENCE, trusting};
 use crate::service::Service;
 use std::time::{Duration, Instant};
-use tokio::io::AsyncWriteExt;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
@@ -78,6 +78,26 @@ async fn handshakes_count_as_connections_and_make_room_for_others() {
         .lines()
         .find(|line| line.contains("shed") && !line.starts_with('#'));
     assert!(shed.is_some_and(|line| line.ends_with(" 3")), "{shed:?}");
+    assert!(service.end().await);
+}
+
+#[tokio::test]
+async fn a_connection_over_its_share_is_closed_without_a_word() {
+    let (authority, files) = issued();
+    let service = Service::start(Some(&files), |config| {
+        config.limits.client_connections = Some(1);
+    });
+    let service = service.await;
+    let connector = trusting(&authority.root, &[]);
+    let mut busy = Client::open(&connector, service.address).await;
+    let head = "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\nExpect: 100-continue\r\n\r\n";
+    busy.0.write_all(head.as_bytes()).await.unwrap();
+    let mut asked = [0; 25];
+    busy.0.read_exact(&mut asked).await.unwrap();
+    assert!(asked.starts_with(b"HTTP/1.1 100"));
+    let mut second = Client(TcpStream::connect(service.address).await.unwrap());
+    assert_eq!(second.ends().await, b"");
+    drop(busy);
     assert!(service.end().await);
 }
 

@@ -53,6 +53,11 @@ impl ConnectionService {
         }
     }
 
+    /// Whether connections begin with a TLS handshake.
+    pub fn has_tls(&self) -> bool {
+        self.security.has_tls()
+    }
+
     /// Serves one connection until it ends, or a stream has taken it over.
     pub async fn serve(&self, stream: TcpStream, peer: SocketAddr, mut hold: ConnectionHold) {
         if let Err(error) = stream.set_nodelay(true) {

@@ -57,6 +57,11 @@ impl Security {
         }
     }
 
+    /// Whether connections begin with a TLS handshake.
+    pub fn has_tls(&self) -> bool {
+        !matches!(self, Self::Plain)
+    }
+
     /// Waits for the first bytes of a client, where the service has TLS, and makes the handshake.
     ///
     /// # Errors

@@ -244,7 +244,7 @@ async fn accept(
             }
         };
         let Ok(permit) = permit else {
-            refuse(stream, peer, state);
+            refuse(stream, peer, state, service.has_tls());
             continue;
         };
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
@@ -253,11 +253,14 @@ async fn accept(
     }
 }
 
-/// Tells a client that it has too many connections, as far as its system takes that at once.
-fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
+/// Tells a client that it has too many connections, as far as its system takes that at once. With TLS the connection is
+/// closed without a word: what is said before the handshake looks like a fault of the service.
+fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) {
     let problem = Problem::too_many_connections();
     let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
-    if let Ok(mut stream) = stream.into_std() {
+    if let Ok(mut stream) = stream.into_std()
+        && !has_tls
+    {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);
     }
