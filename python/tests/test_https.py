@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import socket
+import ssl
 import subprocess
 import sys
 import time
@@ -80,7 +81,8 @@ def behind_caddy(
     authority = tmp_path / "data/caddy/pki/authorities/local/root.crt"
     try:
         deadline = time.monotonic() + PATIENCE
-        while not (authority.is_file() and is_open(port)):
+        # It listens before it has a certificate.
+        while not (authority.is_file() and speaks_tls(port, authority)):
             assert process.poll() is None and time.monotonic() < deadline, (tmp_path / "caddy.log").read_text()
         monkeypatch.setenv("SSL_CERT_FILE", str(authority))
         yield f"https://localhost:{port}"
@@ -89,10 +91,14 @@ def behind_caddy(
         process.wait()
 
 
-def is_open(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(1)
-        return probe.connect_ex(("127.0.0.1", port)) == 0
+def speaks_tls(port: int, authority: Path) -> bool:
+    try:
+        context = ssl.create_default_context(cafile=str(authority))
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as probe:
+            context.wrap_socket(probe, server_hostname="localhost").close()
+        return True
+    except OSError:
+        return False
 
 
 def follow(clip: Clip, url: str, key: str | None) -> None:
