@@ -1,5 +1,6 @@
 // A session: frames go in, boxes come back.
 
+import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
 
@@ -25,11 +26,13 @@ import { FrameStream } from "./stream.js";
  * @property {string} expires_at
  *
  * @typedef {import("./client.js").Frame} Frame
- * @typedef {{number: number, count: number, make: (number: number) => Promise<Response>}} Sent
+ *
+ * @typedef {object} Sent A request with the next frames.
+ * @property {Frame[]} frames
+ * @property {Box} [box] Where the user corrects it.
+ * @property {(number: number) => Promise<Response>} make
  */
 
-/** Most requests that are kept until the store has their frames. */
-const MOST_KEPT = 256;
 /** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
 const TRIES_TO_MOVE = 1000;
 
@@ -45,8 +48,9 @@ export class Session {
    * @param {number} frame The number of its last frame.
    * @param {Box} box The box of that frame.
    * @param {Headers} headers Of the answer that told so.
+   * @param {import("./kept.js").Origin} [origin] What opens it again.
    */
-  constructor(client, id, frame, box, headers) {
+  constructor(client, id, frame, box, headers, origin) {
     this.client = client;
     this.id = id;
     this.frame = frame;
@@ -55,13 +59,13 @@ export class Session {
     this.isDraining = false;
     /** When that was tried last. */
     this.triedToMove = 0;
-    /** @type {Sent[]} What a service with a store may ask for again. */
-    this.kept = [];
+    /** What the service may ask for again. */
+    this.kept = new Kept(origin);
     /** @type {Promise<unknown>} The requests before. */
     this.before = Promise.resolve();
     /** @type {FrameStream | undefined} */
     this.open = undefined;
-    this.note(headers);
+    this.isDraining = headers.get("draining") === "true";
   }
 
   /**
@@ -71,7 +75,8 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   track(frame, signal) {
-    return this.next(1, (number) => this.post("POST", "frames", { frame: number }, frame, signal));
+    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, frame, signal);
+    return this.next({ frames: [frame], make });
   }
 
   /**
@@ -85,7 +90,7 @@ export class Session {
     const body = new FormData();
     for (const frame of frames) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
     const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, body, signal);
-    const answer = await this.next(frames.length, make);
+    const answer = await this.next({ frames: [...frames], make });
     return answer.answers ?? [answer];
   }
 
@@ -97,8 +102,8 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   correct(frame, box, signal) {
-    const text = boxText(box);
-    return this.next(1, (number) => this.post("PUT", "target", { frame: number, box: text }, frame, signal));
+    const make = (/** @type {number} */ number) => this.put(number, frame, box, signal);
+    return this.next({ frames: [frame], box, make });
   }
 
   /** The session's state; the service does not count this as a frame.
@@ -110,7 +115,9 @@ export class Session {
   /** The whole session as bytes, for `client.restore`.
    * @returns {Promise<Uint8Array<ArrayBuffer>>} */
   async snapshot() {
-    return new Uint8Array(await (await this.call("GET", "/snapshot")).arrayBuffer());
+    const take = () => this.call("GET", "/snapshot");
+    const taken = await take().catch((error) => this.goOn(error, this.frame + 1, take));
+    return new Uint8Array(await taken.arrayBuffer());
   }
 
   /** A picture (PNG) of what the tracker keeps of the target.
@@ -141,6 +148,7 @@ export class Session {
 
   /** Ends the session. */
   async end() {
+    this.kept = new Kept();
     try {
       await this.call("DELETE", "");
     } catch (error) {
@@ -172,60 +180,134 @@ export class Session {
   }
 
   /**
-   * Makes a request with the next frames after those before.
-   * @param {number} count
-   * @param {Sent["make"]} make
+   * @param {number} number
+   * @param {Frame} frame
+   * @param {Box} box
+   * @param {AbortSignal} [signal]
    */
-  next(count, make) {
+  put(number, frame, box, signal) {
+    return this.post("PUT", "target", { frame: number, box: boxText(box) }, frame, signal);
+  }
+
+  /**
+   * Makes a request with the next frames after those before.
+   * @param {Sent} sent
+   */
+  next(sent) {
     if (this.open) return Promise.reject(new Error("The session has a stream: send the frames there, or close it."));
-    const made = this.before.then(() => this.send(count, make));
+    const made = this.before.then(() => this.send(sent));
     this.before = made.catch(() => undefined);
     return made;
   }
 
-  /**
-   * @param {number} count
-   * @param {Sent["make"]} make
-   */
-  async send(count, make) {
-    const sent = { number: this.frame + 1, count, make };
-    const response = await make(sent.number).catch((error) => this.resend(error, sent));
+  /** @param {Sent} sent */
+  async send({ frames, box, make }) {
+    const number = this.frame + 1;
+    const response = await make(number).catch((error) => this.goOn(error, number, () => make(number)));
     const answer = await response.json();
+    frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
     this.frame = answer.frame;
     this.box = answer.box;
-    this.kept.push(sent);
-    this.note(response.headers);
-    // With a store, any replica has the session.
-    const isAlone = this.isDraining && !response.headers.has("checkpoint");
-    if (isAlone && Date.now() - this.triedToMove >= TRIES_TO_MOVE) await this.moveOn();
+    this.isDraining ||= response.headers.get("draining") === "true";
+    await this.lookAfter(response.headers.get("checkpoint"));
     return answer;
+  }
+
+  /** Makes sure, after an answer, that the session can go on elsewhere.
+   * @param {string | null} checkpoint */
+  async lookAfter(checkpoint) {
+    // With a store, any replica has the session up to there.
+    if (checkpoint !== null) this.kept.forgetUntil(Number(checkpoint));
+    else if (this.isDraining && Date.now() - this.triedToMove >= TRIES_TO_MOVE) await this.moveOn();
+    else if (this.isSnapshotDue) await this.renewOrigin();
+    else if (!this.kept.origin) this.kept.forgetUntil(this.frame);
+  }
+
+  get isSnapshotDue() {
+    const { origin } = this.kept;
+    return origin !== undefined && this.frame - origin.frame >= this.client.snapshotEvery;
+  }
+
+  /** A snapshot of now or later; nothing where there is none for the moment.
+   * @returns {Promise<import("./kept.js").Origin | undefined>} */
+  async takeOrigin() {
+    const { transport } = this.client;
+    const { id, frame } = this;
+    try {
+      const taken = await transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {});
+      return { frame, request: restoring(await taken.arrayBuffer()) };
+    } catch {
+      return undefined;
+    }
+  }
+
+  /** Takes a snapshot; without it the older one and more frames are kept. */
+  async renewOrigin() {
+    const origin = await this.takeOrigin();
+    if (origin) this.kept.renew(origin);
+    return origin;
   }
 
   /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
   async moveOn() {
     this.triedToMove = Date.now();
-    const moved = await this.snapshot().then((bytes) => this.client.restore(bytes, undefined, 0)).catch(() => undefined);
+    const origin = await this.renewOrigin();
+    if (!origin) return;
+    const moved = await this.client.create({ ...origin.request, patience: 0 }).catch(() => undefined);
     if (moved) [this.id, this.isDraining] = [moved.id, moved.isDraining];
   }
 
   /**
-   * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
-   * @param {unknown} error
-   * @param {Sent} sent
+   * Makes a call after the service has lost frames, or the whole session: they are sent again before it.
+   * @param {unknown} error What the call failed with.
+   * @param {number} number The first frame that the call does not need.
+   * @param {() => Promise<Response>} call
    */
-  async resend(error, sent) {
-    const expected = error instanceof Problem ? error.expectedFrame : undefined;
-    const first = this.kept.findIndex(({ number }) => number === expected);
-    if (first < 0) throw error;
-    for (const { number, make } of this.kept.slice(first)) await make(number);
-    return sent.make(sent.number);
+  async goOn(error, number, call) {
+    const late = Date.now() + this.client.transport.patience;
+    for (;;) {
+      const lost = this.kept.after(await this.standing(error, number), number - 1);
+      if (!lost) throw error;
+      try {
+        for (const { number, frame, box } of lost) {
+          if (box) await this.put(number, frame, box);
+          else await this.post("POST", "frames", { frame: number }, frame);
+        }
+        return await call();
+      } catch (again) {
+        if (Date.now() > late) throw again;
+        error = again;
+      }
+    }
   }
 
-  /** @param {Headers} headers */
-  note(headers) {
-    this.isDraining ||= headers.get("draining") === "true";
-    // Without a store there is nothing to go on with.
-    const checkpoint = Number(headers.get("checkpoint") ?? Infinity);
-    this.kept = this.kept.filter(({ number, count }) => number + count - 1 > checkpoint).slice(-MOST_KEPT);
+  /**
+   * The last frame that the service has, after a failure that tells so.
+   * @param {unknown} error
+   * @param {number} number The frame that was sent.
+   */
+  async standing(error, number) {
+    if (!(error instanceof Problem)) throw error;
+    if (error.isGone) return this.openAgain(error);
+    if (error.expectedFrame === undefined || error.expectedFrame >= number) throw error;
+    return error.expectedFrame - 1;
+  }
+
+  /**
+   * Opens the session again after the service has lost it, under another id.
+   * @param {unknown} lost What told so.
+   * @returns {Promise<number>} The last frame that it has then.
+   */
+  async openAgain(lost) {
+    const { origin } = this.kept;
+    if (!origin) throw lost;
+    try {
+      const opened = await this.client.create(origin.request);
+      [this.id, this.isDraining] = [opened.id, opened.isDraining];
+      return opened.frame;
+    } catch (error) {
+      // Such as a service with other keys, which does not take the snapshot.
+      throw error instanceof Problem && !error.isTemporary ? lost : error;
+    }
   }
 }

@@ -1,3 +1,4 @@
+import { Kept } from "./kept.js";
 import { FrameStream } from "./stream.js";
 export type Box = {
     x: number;
@@ -30,8 +31,11 @@ export type View = {
 };
 export type Frame = import("./client.js").Frame;
 export type Sent = {
-    number: number;
-    count: number;
+    frames: Frame[];
+    /**
+     * Where the user corrects it.
+     */
+    box?: Box;
     make: (number: number) => Promise<Response>;
 };
 /** @param {Box} box */
@@ -45,8 +49,8 @@ export declare class Session {
     isDraining: boolean;
     /** When that was tried last. */
     triedToMove: number;
-    /** @type {Sent[]} What a service with a store may ask for again. */
-    kept: Sent[];
+    /** What the service may ask for again. */
+    kept: Kept;
     /** @type {Promise<unknown>} The requests before. */
     before: Promise<unknown>;
     /** @type {FrameStream | undefined} */
@@ -57,8 +61,9 @@ export declare class Session {
      * @param {number} frame The number of its last frame.
      * @param {Box} box The box of that frame.
      * @param {Headers} headers Of the answer that told so.
+     * @param {import("./kept.js").Origin} [origin] What opens it again.
      */
-    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers);
+    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers, origin?: import("./kept.js").Origin);
     /**
      * Sends the next frame. Calls are made one after the other, in the order of `track`.
      * @param {Frame} frame
@@ -117,24 +122,47 @@ export declare class Session {
      */
     post(method: string, path: string, query: Record<string, string | number>, body: BodyInit, signal?: AbortSignal): Promise<Response>;
     /**
-     * Makes a request with the next frames after those before.
-     * @param {number} count
-     * @param {Sent["make"]} make
+     * @param {number} number
+     * @param {Frame} frame
+     * @param {Box} box
+     * @param {AbortSignal} [signal]
      */
-    next(count: number, make: Sent["make"]): Promise<any>;
+    put(number: number, frame: Frame, box: Box, signal?: AbortSignal): Promise<Response>;
     /**
-     * @param {number} count
-     * @param {Sent["make"]} make
+     * Makes a request with the next frames after those before.
+     * @param {Sent} sent
      */
-    send(count: number, make: Sent["make"]): Promise<any>;
+    next(sent: Sent): Promise<any>;
+    /** @param {Sent} sent */
+    send({ frames, box, make }: Sent): Promise<any>;
+    /** Makes sure, after an answer, that the session can go on elsewhere.
+     * @param {string | null} checkpoint */
+    lookAfter(checkpoint: string | null): Promise<void>;
+    get isSnapshotDue(): boolean;
+    /** A snapshot of now or later; nothing where there is none for the moment.
+     * @returns {Promise<import("./kept.js").Origin | undefined>} */
+    takeOrigin(): Promise<import("./kept.js").Origin | undefined>;
+    /** Takes a snapshot; without it the older one and more frames are kept. */
+    renewOrigin(): Promise<import("./kept.js").Origin | undefined>;
     /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
     moveOn(): Promise<void>;
     /**
-     * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
-     * @param {unknown} error
-     * @param {Sent} sent
+     * Makes a call after the service has lost frames, or the whole session: they are sent again before it.
+     * @param {unknown} error What the call failed with.
+     * @param {number} number The first frame that the call does not need.
+     * @param {() => Promise<Response>} call
      */
-    resend(error: unknown, sent: Sent): Promise<Response>;
-    /** @param {Headers} headers */
-    note(headers: Headers): void;
+    goOn(error: unknown, number: number, call: () => Promise<Response>): Promise<Response>;
+    /**
+     * The last frame that the service has, after a failure that tells so.
+     * @param {unknown} error
+     * @param {number} number The frame that was sent.
+     */
+    standing(error: unknown, number: number): Promise<number>;
+    /**
+     * Opens the session again after the service has lost it, under another id.
+     * @param {unknown} lost What told so.
+     * @returns {Promise<number>} The last frame that it has then.
+     */
+    openAgain(lost: unknown): Promise<number>;
 }
