@@ -43,7 +43,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 16] = [
+const FILES: [File; 18] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
@@ -54,8 +54,10 @@ const FILES: [File; 16] = [
     file!("save.js", SCRIPT),
     file!("stage.js", SCRIPT),
     file!("video.js", SCRIPT),
+    client_file!("js/backoff.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
+    client_file!("js/kept.js"),
     client_file!("js/problem.js"),
     client_file!("js/session.js"),
     client_file!("js/stream.js"),
