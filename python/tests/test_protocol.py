@@ -57,3 +57,23 @@ def test_exchanges(service: ScriptedService, scenario: dict, is_async: bool) -> 
         service.check()
         assert given == step.get("gives"), step["call"]
     loop.close()
+
+
+def test_a_client_that_could_not_move_goes_on_at_the_address_that_it_came_from(service: ScriptedService) -> None:
+    other = ScriptedService()
+    client = bagtrack.Client([service.url, other.url])
+    answer = {"status": 200, "answer": 1, "headers": {"Draining": "true"}}
+    service.expect(
+        [
+            {"request": "PUT /sessions/{1}", "frame": "a", "reply": {"status": 201, "created": 0}},
+            {"request": "POST /sessions/{1}/frames?frame=1", "frame": "b", "reply": answer},
+            {"request": "GET /sessions/{1}/snapshot", "reply": {"status": 200, "snapshot": "S1"}},
+            {"request": "POST /sessions/{1}/frames?frame=2", "frame": "c", "reply": {"status": 200, "answer": 2}},
+        ]
+    )
+    other.expect([{"request": "PUT /sessions/{2}", "snapshot": "S1", "reply": {"status": 503, "text": ""}}])
+    client.init(b"a", TABLE["box"])
+    assert [client.update(frame)[1][0] for frame in (b"b", b"c")] == [1, 2]
+    service.check()
+    other.check()
+    other.close()
