@@ -90,7 +90,7 @@ export class FrameStream {
     });
   }
 
-  /** Ends the stream; the session goes on. Frames without an answer are given up. */
+  /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
   close() {
     this.end(undefined);
   }
@@ -315,6 +315,10 @@ export class FrameStream {
     this.socket?.close();
     this.session.hold(undefined);
     const left = this.waiting.splice(0);
+    // The service may have these: they count, so a post or the next stream sends them again before its own.
+    const { kept, frame: last } = this.session;
+    const sent = this.live || this.outOfOrder ? [] : left.slice(0, this.sent);
+    sent.forEach(({ frame, header }, index) => kept.put({ number: last + 1 + index, frame, box: header.box }));
     left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
     this.resolveEnded(problem);
   }

@@ -87,7 +87,7 @@ export declare class FrameStream {
         box?: import("./session.js").Box;
         see?: boolean;
     }): Promise<StreamAnswer | undefined>;
-    /** Ends the stream; the session goes on. Frames without an answer are given up. */
+    /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
     transmit(): void;
     /** @param {any} message */
