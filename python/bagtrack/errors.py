@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 TEMPORARY = (408, 429, 502, 503, 504)
@@ -21,7 +22,7 @@ class ServiceError(Exception):
     @property
     def kind(self) -> str:
         """The kind of problem, like `invalid-box`; empty where the answer was no problem document."""
-        return str(self.problem.get("type", "")).rpartition(":")[2]
+        return re.split("[#:]", str(self.problem.get("type", "")))[-1]
 
     @property
     def is_temporary(self) -> bool:

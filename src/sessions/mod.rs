@@ -43,9 +43,9 @@ mod targets;
 
 pub use acts::{
     ActError, CreationKey, FrameBatch, FrameFault, FramesError, GivenBox, IdempotencyStore,
-    OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits, ServiceParts, ServiceSettings,
-    SessionQuota, SessionService, Start, TrackError, TrackFrom, Tracked, TrackedAway,
-    TrackingMetrics, check_readable_pixels,
+    ImplausibleBox, OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits, ServiceParts,
+    ServiceSettings, SessionQuota, SessionService, Start, TrackError, TrackFrom, Tracked,
+    TrackedAway, TrackingMetrics, box_warnings, check_readable_pixels,
 };
 pub use clock::Clock;
 pub use insertion::InsertError;
@@ -74,4 +74,7 @@ pub use store::{
     reconcile,
 };
 pub use streams::{OpenStreams, StreamPlace};
-pub use targets::{Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format};
+pub use targets::{
+    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+    target_seed,
+};
