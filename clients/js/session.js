@@ -290,7 +290,7 @@ export class Session {
         while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1);
         return await call(number);
       } catch (error) {
-        if (!this.canRecover(error)) throw error;
+        if (!this.canRecover(error, number)) throw error;
         // Where every replica loses the session again, this ends with the time for retries.
         const pausing = tries === 0 ? 0 : backoff.next();
         if (pausing === undefined) throw error;
@@ -311,15 +311,18 @@ export class Session {
   }
 
   /**
-   * Whether the service has lost the session, or frames that are kept.
+   * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
    * @param {unknown} error
+   * @param {number} number The first frame that the call does not need.
    * @returns {error is Problem}
    */
-  canRecover(error) {
+  canRecover(error, number) {
     if (!(error instanceof Problem)) return false;
     const { expectedFrame, isGone } = error;
     if (isGone || expectedFrame === undefined) return isGone;
-    return expectedFrame <= this.lastAcknowledged && this.kept.find(expectedFrame) !== undefined;
+    const sent = this.lastAcknowledged + 1;
+    if (expectedFrame < sent) return this.kept.find(expectedFrame) !== undefined;
+    return sent < expectedFrame && expectedFrame <= number;
   }
 
   /**

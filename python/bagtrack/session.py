@@ -120,7 +120,7 @@ class Session:
                 continue
             problem = ServiceError(reply.status, reply.document)
             expected = reply.document.get("expected_frame", number)
-            if reply.status not in GONE and expected >= number:
+            if reply.status not in GONE and not self._has_from(expected, number, until):
                 raise problem
             if not is_first:
                 # Where every replica loses the session again, this ends with the time for retries.
@@ -132,7 +132,14 @@ class Session:
             if reply.status in GONE:
                 yield from self.restore(problem)
             else:
-                self.resend_from(expected, problem)
+                self.last_acknowledged = expected - 1
+
+    def _has_from(self, expected: int, number: int, until: int) -> bool:
+        """Whether the client can go on with the frame that the service expects in place of `number`."""
+        if expected < number:
+            return expected in self._uploads
+        # The service has frames already that were sent again.
+        return number < expected <= until
 
     def resend_from(self, number: int, problem: ServiceError) -> None:
         """The service has no frames from this one on; it is sent next. Raises the problem where it is not kept."""

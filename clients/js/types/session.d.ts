@@ -163,11 +163,12 @@ export declare class Session {
     /** @param {number} number A frame that the service does not have. */
     resend(number: number): Promise<void>;
     /**
-     * Whether the service has lost the session, or frames that are kept.
+     * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
      * @param {unknown} error
+     * @param {number} number The first frame that the call does not need.
      * @returns {error is Problem}
      */
-    canRecover(error: unknown): error is Problem;
+    canRecover(error: unknown, number: number): error is Problem;
     /**
      * Opens the session again after the service has lost it, under another id.
      * @param {Problem} lost What told so.

@@ -156,9 +156,14 @@ impl Remote {
                 }
                 Err(problem) => problem,
             };
-            let expected = problem.expected_frame.filter(|&expected| expected < next);
-            let resends = expected.is_some_and(|expected| self.kept.from(expected).is_some());
-            if !(is_gone(&problem) || resends) {
+            let expected = problem
+                .expected_frame
+                .filter(|&expected| match expected < next {
+                    true => self.kept.from(expected).is_some(),
+                    // It has frames already that were sent again.
+                    false => next < expected && expected <= number,
+                });
+            if !is_gone(&problem) && expected.is_none() {
                 return Err(problem.into());
             }
             // Where every replica loses the session again, this ends with the time for retries.
