@@ -88,6 +88,6 @@ export class Client {
     const { id, frame, box } = await response.json();
     const { query, body, type } = request;
     const origin = this.snapshotEvery > 0 ? { frame, request: { query, body, type } } : undefined;
-    return new Session(this, id, frame, box, response.headers, origin);
+    return new Session(this, id, frame, box, response.headers, origin, true);
   }
 }

@@ -5,7 +5,7 @@
  * @property {number} frame
  * @property {import("./transport.js").Request} request
  *
- * @typedef {object} KeptFrame A frame that was answered.
+ * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
  * @property {import("./client.js").Frame} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
@@ -31,6 +31,16 @@ export class Kept {
     this.frames = [];
   }
 
+  /** The number of the newest frame. */
+  get last() {
+    return this.frames.at(-1)?.number;
+  }
+
+  /** @param {number} number */
+  find(number) {
+    return this.frames.find((kept) => kept.number === number);
+  }
+
   /** Keeps the next frame. The oldest goes where there are too many.
    * @param {KeptFrame} kept */
   put(kept) {
@@ -54,18 +64,15 @@ export class Kept {
     if (this.origin && this.origin.frame < number) this.origin = undefined;
   }
 
-  /** Forgets the frames after this one, which the service has no more.
+  /** Forgets the frames after this one, which the service does not have.
    * @param {number} number */
   forgetAfter(number) {
     this.frames = this.frames.filter((kept) => kept.number <= number);
   }
 
   /** The frames after this one.
-   * @param {number} number
-   * @param {number} last The number of the last frame that was answered.
-   * @returns {KeptFrame[] | undefined} Nothing where one of them is missing. */
-  after(number, last) {
-    const found = this.frames.filter((kept) => kept.number > number);
-    return found.length === Math.max(last - number, 0) ? found : undefined;
+   * @param {number} number */
+  after(number) {
+    return this.frames.filter((kept) => kept.number > number);
   }
 }

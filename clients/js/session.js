@@ -1,8 +1,10 @@
 // A session: frames go in, boxes come back.
 
+import { Backoff } from "./backoff.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
+import { pause } from "./transport.js";
 
 /**
  * @typedef {object} Box In pixels of the uploaded frame; it may reach over the edge.
@@ -31,10 +33,11 @@ import { FrameStream } from "./stream.js";
  * @property {Frame[]} frames
  * @property {Box} [box] Where the user corrects it.
  * @property {(number: number) => Promise<Response>} make
+ * @property {AbortSignal} [signal]
  */
 
 /** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
-const TRIES_TO_MOVE = 1000;
+const MOVE_EVERY = 1000;
 
 /** @param {Box} box */
 export function boxText({ x, y, width, height }) {
@@ -49,12 +52,16 @@ export class Session {
    * @param {Box} box The box of that frame.
    * @param {Headers} headers Of the answer that told so.
    * @param {import("./kept.js").Origin} [origin] What opens it again.
+   * @param {boolean} [isOwn] Whether this client has opened it.
    */
-  constructor(client, id, frame, box, headers, origin) {
+  constructor(client, id, frame, box, headers, origin, isOwn = false) {
     this.client = client;
     this.id = id;
     this.frame = frame;
     this.box = box;
+    this.isOwn = isOwn;
+    /** The last frame that the service has, as far as is known. */
+    this.lastAcknowledged = frame;
     /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     this.isDraining = false;
     /** When that was tried last. */
@@ -69,14 +76,15 @@ export class Session {
   }
 
   /**
-   * Sends the next frame. Calls are made one after the other, in the order of `track`.
+   * Sends the next frame. Calls are made one after the other, in the order of `track`. A frame that got no answer, or
+   * whose call was aborted, is kept: the next call sends it before its own.
    * @param {Frame} frame
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer>}
    */
   track(frame, signal) {
     const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, frame, signal);
-    return this.next({ frames: [frame], make });
+    return this.next({ frames: [frame], make, signal });
   }
 
   /**
@@ -90,7 +98,7 @@ export class Session {
     const body = new FormData();
     for (const frame of frames) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
     const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, body, signal);
-    const answer = await this.next({ frames: [...frames], make });
+    const answer = await this.next({ frames: [...frames], make, signal });
     return answer.answers ?? [answer];
   }
 
@@ -103,7 +111,7 @@ export class Session {
    */
   correct(frame, box, signal) {
     const make = (/** @type {number} */ number) => this.put(number, frame, box, signal);
-    return this.next({ frames: [frame], box, make });
+    return this.next({ frames: [frame], box, make, signal });
   }
 
   /** The session's state; the service does not count this as a frame.
@@ -115,8 +123,7 @@ export class Session {
   /** The whole session as bytes, for `client.restore`.
    * @returns {Promise<Uint8Array<ArrayBuffer>>} */
   async snapshot() {
-    const take = () => this.call("GET", "/snapshot");
-    const taken = await take().catch((error) => this.goOn(error, this.frame + 1, take));
+    const taken = await this.deliver(this.frame + 1, () => this.call("GET", "/snapshot"));
     return new Uint8Array(await taken.arrayBuffer());
   }
 
@@ -144,6 +151,7 @@ export class Session {
   hold(stream) {
     if (stream && this.open) throw new Error("The session has a stream; close it first.");
     this.open = stream;
+    this.lastAcknowledged = this.frame;
   }
 
   /** Ends the session. */
@@ -201,31 +209,44 @@ export class Session {
   }
 
   /** @param {Sent} sent */
-  async send({ frames, box, make }) {
-    const number = this.frame + 1;
-    const response = await make(number).catch((error) => this.goOn(error, number, () => make(number)));
-    const answer = await response.json();
+  async send({ frames, box, make, signal }) {
+    signal?.throwIfAborted();
+    const number = (this.kept.last ?? this.frame) + 1;
+    // From here on they count: without an answer they are sent again before the next ones.
     frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
-    this.frame = answer.frame;
-    this.box = answer.box;
-    this.isDraining ||= response.headers.get("draining") === "true";
-    await this.lookAfter(response.headers.get("checkpoint"));
-    return answer;
+    try {
+      const response = await this.deliver(number, make);
+      const answer = await response.json();
+      this.frame = answer.frame;
+      this.box = answer.box;
+      this.lastAcknowledged = Math.max(this.lastAcknowledged, this.frame);
+      this.isDraining ||= response.headers.get("draining") === "true";
+      await this.checkpoint(response.headers.get("checkpoint"));
+      return answer;
+    } catch (error) {
+      const isRefused = error instanceof Problem && !error.isTemporary;
+      if (isRefused) this.kept.forgetAfter(Math.max(this.lastAcknowledged, this.frame));
+      throw error;
+    }
   }
 
   /** Makes sure, after an answer, that the session can go on elsewhere.
-   * @param {string | null} checkpoint */
-  async lookAfter(checkpoint) {
+   * @param {string | null} stored The last frame that a store has. */
+  async checkpoint(stored) {
     // With a store, any replica has the session up to there.
-    if (checkpoint !== null) this.kept.forgetUntil(Number(checkpoint));
-    else if (this.isDraining && Date.now() - this.triedToMove >= TRIES_TO_MOVE) await this.moveOn();
+    if (stored !== null) this.kept.forgetUntil(Number(stored));
+    else if (this.isDraining && Date.now() - this.triedToMove >= MOVE_EVERY) await this.move();
     else if (this.isSnapshotDue) await this.renewOrigin();
-    else if (!this.kept.origin) this.kept.forgetUntil(this.frame);
+    else if (!this.takesSnapshots) this.kept.forgetUntil(this.frame);
+  }
+
+  get takesSnapshots() {
+    return this.isOwn && this.client.snapshotEvery > 0;
   }
 
   get isSnapshotDue() {
     const { origin } = this.kept;
-    return origin !== undefined && this.frame - origin.frame >= this.client.snapshotEvery;
+    return this.takesSnapshots && (!origin || this.frame - origin.frame >= this.client.snapshotEvery);
   }
 
   /** A snapshot of now or later; nothing where there is none for the moment.
@@ -249,56 +270,67 @@ export class Session {
   }
 
   /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
-  async moveOn() {
+  async move() {
     this.triedToMove = Date.now();
     const origin = await this.renewOrigin();
     if (!origin) return;
     const moved = await this.client.create({ ...origin.request, patience: 0 }).catch(() => undefined);
-    if (moved) [this.id, this.isDraining] = [moved.id, moved.isDraining];
+    if (moved) [this.id, this.lastAcknowledged, this.isDraining] = [moved.id, moved.frame, moved.isDraining];
   }
 
   /**
-   * Makes a call after the service has lost frames, or the whole session: they are sent again before it.
-   * @param {unknown} error What the call failed with.
+   * Makes a call for which the service must have the frames before one, and sends those that it does not have.
    * @param {number} number The first frame that the call does not need.
-   * @param {() => Promise<Response>} call
+   * @param {(number: number) => Promise<Response>} call
    */
-  async goOn(error, number, call) {
-    const late = Date.now() + this.client.transport.patience;
-    for (;;) {
-      const lost = this.kept.after(await this.standing(error, number), number - 1);
-      if (!lost) throw error;
+  async deliver(number, call) {
+    const backoff = new Backoff(this.client.transport.patience);
+    for (let tries = 0; ; tries += 1) {
       try {
-        for (const { number, frame, box } of lost) {
-          if (box) await this.put(number, frame, box);
-          else await this.post("POST", "frames", { frame: number }, frame);
-        }
-        return await call();
-      } catch (again) {
-        if (Date.now() > late) throw again;
-        error = again;
+        while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1);
+        return await call(number);
+      } catch (error) {
+        if (!this.canRecover(error, number)) throw error;
+        // Where every replica loses the session again, this ends with the time for retries.
+        const pausing = tries === 0 ? 0 : backoff.next();
+        if (pausing === undefined) throw error;
+        if (pausing > 0) await pause(pausing);
+        if (error.isGone) this.lastAcknowledged = await this.reopen(error);
+        else this.lastAcknowledged = Number(error.expectedFrame) - 1;
       }
     }
   }
 
+  /** @param {number} number A frame that the service does not have. */
+  async resend(number) {
+    const kept = this.kept.find(number);
+    if (!kept) throw new Error(`The service needs frame ${number} again, which is not kept any more.`);
+    if (kept.box) await this.put(number, kept.frame, kept.box);
+    else await this.post("POST", "frames", { frame: number }, kept.frame);
+    this.lastAcknowledged = number;
+  }
+
   /**
-   * The last frame that the service has, after a failure that tells so.
+   * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
    * @param {unknown} error
-   * @param {number} number The frame that was sent.
+   * @param {number} number The first frame that the call does not need.
+   * @returns {error is Problem}
    */
-  async standing(error, number) {
-    if (!(error instanceof Problem)) throw error;
-    if (error.isGone) return this.openAgain(error);
-    if (error.expectedFrame === undefined || error.expectedFrame >= number) throw error;
-    return error.expectedFrame - 1;
+  canRecover(error, number) {
+    if (!(error instanceof Problem)) return false;
+    const { expectedFrame, isGone } = error;
+    if (isGone || expectedFrame === undefined) return isGone;
+    const sent = this.lastAcknowledged + 1;
+    if (expectedFrame < sent) return this.kept.find(expectedFrame) !== undefined;
+    return sent < expectedFrame && expectedFrame <= number;
   }
 
   /**
    * Opens the session again after the service has lost it, under another id.
-   * @param {unknown} lost What told so.
+   * @param {Problem} lost What told so.
    * @returns {Promise<number>} The last frame that it has then.
    */
-  async openAgain(lost) {
+  async reopen(lost) {
     const { origin } = this.kept;
     if (!origin) throw lost;
     try {
@@ -307,7 +339,9 @@ export class Session {
       return opened.frame;
     } catch (error) {
       // Such as a service with other keys, which does not take the snapshot.
-      throw error instanceof Problem && !error.isTemporary ? lost : error;
+      if (!(error instanceof Problem) || error.isTemporary) throw error;
+      lost.cause = error;
+      throw lost;
     }
   }
 }

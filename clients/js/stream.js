@@ -47,7 +47,7 @@ export class FrameStream {
     /** How many of those that wait are on their way. */
     this.sent = 0;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
-    this.misnumbered = 0;
+    this.outOfOrder = 0;
     /** @type {WebSocket | undefined} */
     this.socket = undefined;
     this.isUp = false;
@@ -63,10 +63,11 @@ export class FrameStream {
     this.newer = undefined;
     this.isRenewing = false;
     /** @type {(problem: Error | undefined) => void} */
-    this.tellEnd = () => undefined;
+    this.resolveEnded = () => undefined;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
-    this.ended = new Promise((resolve) => (this.tellEnd = resolve));
+    this.ended = new Promise((resolve) => (this.resolveEnded = resolve));
     session.hold(this);
+    this.resendFrom(session.frame + 1);
     this.connect();
   }
 
@@ -84,18 +85,18 @@ export class FrameStream {
       // Of live frames that cannot be sent yet, the newest is kept.
       if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
       this.waiting.push({ frame, header: { box, see }, resolve, reject });
-      if (this.lost) this.openAgain(this.lost);
+      if (this.lost) this.reopen(this.lost);
       else this.transmit();
     });
   }
 
-  /** Ends the stream; the session goes on. Frames without an answer are given up. */
+  /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
   close() {
     this.end(undefined);
   }
 
   transmit() {
-    while (this.isUp && !this.misnumbered && this.sent < Math.min(this.waiting.length, this.window)) {
+    while (this.isUp && !this.outOfOrder && this.sent < Math.min(this.waiting.length, this.window)) {
       const { frame, header } = this.waiting[this.sent];
       const number = this.live ? undefined : this.session.frame + 1 + this.sent;
       this.sent += 1;
@@ -108,27 +109,27 @@ export class FrameStream {
   receive(message) {
     if (message.next !== undefined) return this.resume(message.next);
     if (message.type) return this.refused(new Problem(message));
-    for (let count = message.skipped ?? 0; count > 0; count -= 1) this.take()?.resolve(undefined);
+    for (let count = message.skipped ?? 0; count > 0; count -= 1) this.acknowledge()?.resolve(undefined);
     this.session.frame = message.frame;
     this.session.box = message.box;
     this.session.isDraining ||= message.draining === true;
-    const answered = this.take();
+    const answered = this.acknowledge();
     if (answered) this.session.kept.put({ number: message.frame, frame: answered.frame, box: answered.header.box });
-    this.lookAfter(message.checkpoint);
+    this.checkpoint(message.checkpoint);
     answered?.resolve(message);
     this.transmit();
   }
 
   /** Makes sure, after an answer, that the session can be opened again.
-   * @param {number | undefined} checkpoint */
-  async lookAfter(checkpoint) {
+   * @param {number | undefined} stored The last frame that a store has. */
+  async checkpoint(stored) {
     const { session } = this;
-    if (checkpoint !== undefined) return session.kept.forgetUntil(checkpoint);
+    if (stored !== undefined) return session.kept.forgetUntil(stored);
     if (this.newer && session.frame >= this.newer.until) {
       session.kept.renew(this.newer.origin);
       this.newer = undefined;
     }
-    if (!session.kept.origin) return session.kept.forgetUntil(session.frame);
+    if (!session.takesSnapshots) return session.kept.forgetUntil(session.frame);
     if (!session.isSnapshotDue || this.newer || this.isRenewing) return;
     this.isRenewing = true;
     const { id } = session;
@@ -138,8 +139,8 @@ export class FrameStream {
     if (origin && session.id === id) this.newer = { origin, until: session.frame + this.sent };
   }
 
-  /** The oldest frame on its way. */
-  take() {
+  /** Takes the oldest frame on its way, which has an answer. */
+  acknowledge() {
     if (this.sent === 0) return undefined;
     this.sent -= 1;
     return this.waiting.shift();
@@ -149,13 +150,13 @@ export class FrameStream {
   refused(problem) {
     this.lastProblem = problem;
     if (problem.isGone) return this.gone(problem);
-    if (this.misnumbered > 0) {
-      this.misnumbered -= 1;
+    if (this.outOfOrder > 0) {
+      this.outOfOrder -= 1;
       // All have come back: they are sent again with the numbers that they have now.
-      if (this.misnumbered === 0) this.sent = 0;
+      if (this.outOfOrder === 0) this.sent = 0;
     } else {
-      this.take()?.reject(problem);
-      if (!this.live) this.misnumbered = this.sent;
+      this.acknowledge()?.reject(problem);
+      if (!this.live) this.outOfOrder = this.sent;
     }
     this.transmit();
   }
@@ -171,7 +172,7 @@ export class FrameStream {
     // Which of several live frames were skipped is not known, and newer ones come.
     if (this.live) this.waiting.splice(0, this.sent - known).forEach((skipped) => skipped.resolve(undefined));
     this.sent = known;
-    this.misnumbered = 0;
+    this.outOfOrder = 0;
     this.isUp = true;
     this.wait = FIRST_PAUSE;
     this.onLine(true);
@@ -180,15 +181,18 @@ export class FrameStream {
 
   /** The service has no frames from `next` on any more: they are sent again before those that wait.
    * @param {number} next */
-  goBack(next) {
+  resendFrom(next) {
     const { kept, frame } = this.session;
-    if (next > frame) return;
-    const lost = (this.live ? [] : kept.after(next - 1, frame)) ?? [];
+    if (next <= frame && !this.live && !kept.find(next)) {
+      const detail = `The service needs frame ${next} again, which is not kept any more.`;
+      return this.end(new Problem({ type: "frame-out-of-order", status: 409, detail, expected_frame: next }));
+    }
+    const again = this.live ? [] : kept.after(next - 1);
     const nobody = () => undefined;
-    this.waiting.unshift(...lost.map(({ frame, box }) => ({ frame, header: { box }, resolve: nobody, reject: nobody })));
+    this.waiting.unshift(...again.map(({ frame, box }) => ({ frame, header: { box }, resolve: nobody, reject: nobody })));
     kept.forgetAfter(next - 1);
-    this.session.frame = next - 1;
-    this.sent = 0;
+    this.session.frame = Math.min(frame, next - 1);
+    if (next <= frame) this.sent = 0;
   }
 
   /** The service has lost the session.
@@ -202,20 +206,20 @@ export class FrameStream {
     this.newer = undefined;
     this.lost = problem;
     // Without a frame that waits it need not be held at the service.
-    if (this.waiting.length > 0) return this.openAgain(problem);
+    if (this.waiting.length > 0) return this.reopen(problem);
     this.onLine(true);
   }
 
   /** Opens the session again, and the stream with it.
    * @param {Problem} problem What told that the service has lost it. */
-  async openAgain(problem) {
+  async reopen(problem) {
     this.lost = undefined;
     try {
-      const at = await this.session.openAgain(problem);
+      const at = await this.session.reopen(problem);
       if (this.isEnded) return;
       this.sent = 0;
-      this.misnumbered = 0;
-      this.goBack(at + 1);
+      this.outOfOrder = 0;
+      this.resendFrom(at + 1);
       await this.connect();
     } catch (error) {
       if (error instanceof Problem && error.isTemporary) return this.closed(ABNORMAL);
@@ -278,7 +282,7 @@ export class FrameStream {
       const isTemporary = seen instanceof Problem && seen.isTemporary;
       return isTemporary && !isLate ? this.closed(code) : this.refusedFor(seen);
     }
-    this.goBack(seen.frames);
+    this.resendFrom(seen.frames);
     await this.connect();
   }
 
@@ -311,7 +315,11 @@ export class FrameStream {
     this.socket?.close();
     this.session.hold(undefined);
     const left = this.waiting.splice(0);
+    // The service may have these: they count, so a post or the next stream sends them again before its own.
+    const { kept, frame: last } = this.session;
+    const sent = this.live || this.outOfOrder ? [] : left.slice(0, this.sent);
+    sent.forEach(({ frame, header }, index) => kept.put({ number: last + 1 + index, frame, box: header.box }));
     left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
-    this.tellEnd(problem);
+    this.resolveEnded(problem);
   }
 }

@@ -15,7 +15,7 @@ export type KeptFrame = {
  * @property {number} frame
  * @property {import("./transport.js").Request} request
  *
- * @typedef {object} KeptFrame A frame that was answered.
+ * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
  * @property {import("./client.js").Frame} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
@@ -33,6 +33,10 @@ export declare class Kept {
     frames: KeptFrame[];
     /** @param {Origin} [origin] */
     constructor(origin?: Origin);
+    /** The number of the newest frame. */
+    get last(): number | undefined;
+    /** @param {number} number */
+    find(number: number): KeptFrame | undefined;
     /** Keeps the next frame. The oldest goes where there are too many.
      * @param {KeptFrame} kept */
     put(kept: KeptFrame): void;
@@ -42,12 +46,10 @@ export declare class Kept {
     /** Forgets the frames up to this one, which the service does not ask for again.
      * @param {number} number */
     forgetUntil(number: number): void;
-    /** Forgets the frames after this one, which the service has no more.
+    /** Forgets the frames after this one, which the service does not have.
      * @param {number} number */
     forgetAfter(number: number): void;
     /** The frames after this one.
-     * @param {number} number
-     * @param {number} last The number of the last frame that was answered.
-     * @returns {KeptFrame[] | undefined} Nothing where one of them is missing. */
-    after(number: number, last: number): KeptFrame[] | undefined;
+     * @param {number} number */
+    after(number: number): KeptFrame[];
 }

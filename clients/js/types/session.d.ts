@@ -1,4 +1,5 @@
 import { Kept } from "./kept.js";
+import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
 export type Box = {
     x: number;
@@ -37,6 +38,7 @@ export type Sent = {
      */
     box?: Box;
     make: (number: number) => Promise<Response>;
+    signal?: AbortSignal;
 };
 /** @param {Box} box */
 export declare function boxText({ x, y, width, height }: Box): string;
@@ -45,6 +47,9 @@ export declare class Session {
     id: string;
     frame: number;
     box: Box;
+    isOwn: boolean;
+    /** The last frame that the service has, as far as is known. */
+    lastAcknowledged: number;
     /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     isDraining: boolean;
     /** When that was tried last. */
@@ -62,10 +67,12 @@ export declare class Session {
      * @param {Box} box The box of that frame.
      * @param {Headers} headers Of the answer that told so.
      * @param {import("./kept.js").Origin} [origin] What opens it again.
+     * @param {boolean} [isOwn] Whether this client has opened it.
      */
-    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers, origin?: import("./kept.js").Origin);
+    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers, origin?: import("./kept.js").Origin, isOwn?: boolean);
     /**
-     * Sends the next frame. Calls are made one after the other, in the order of `track`.
+     * Sends the next frame. Calls are made one after the other, in the order of `track`. A frame that got no answer, or
+     * whose call was aborted, is kept: the next call sends it before its own.
      * @param {Frame} frame
      * @param {AbortSignal} [signal]
      * @returns {Promise<Answer>}
@@ -134,10 +141,11 @@ export declare class Session {
      */
     next(sent: Sent): Promise<any>;
     /** @param {Sent} sent */
-    send({ frames, box, make }: Sent): Promise<any>;
+    send({ frames, box, make, signal }: Sent): Promise<any>;
     /** Makes sure, after an answer, that the session can go on elsewhere.
-     * @param {string | null} checkpoint */
-    lookAfter(checkpoint: string | null): Promise<void>;
+     * @param {string | null} stored The last frame that a store has. */
+    checkpoint(stored: string | null): Promise<void>;
+    get takesSnapshots(): boolean;
     get isSnapshotDue(): boolean;
     /** A snapshot of now or later; nothing where there is none for the moment.
      * @returns {Promise<import("./kept.js").Origin | undefined>} */
@@ -145,24 +153,26 @@ export declare class Session {
     /** Takes a snapshot; without it the older one and more frames are kept. */
     renewOrigin(): Promise<import("./kept.js").Origin | undefined>;
     /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
-    moveOn(): Promise<void>;
+    move(): Promise<void>;
     /**
-     * Makes a call after the service has lost frames, or the whole session: they are sent again before it.
-     * @param {unknown} error What the call failed with.
+     * Makes a call for which the service must have the frames before one, and sends those that it does not have.
      * @param {number} number The first frame that the call does not need.
-     * @param {() => Promise<Response>} call
+     * @param {(number: number) => Promise<Response>} call
      */
-    goOn(error: unknown, number: number, call: () => Promise<Response>): Promise<Response>;
+    deliver(number: number, call: (number: number) => Promise<Response>): Promise<Response>;
+    /** @param {number} number A frame that the service does not have. */
+    resend(number: number): Promise<void>;
     /**
-     * The last frame that the service has, after a failure that tells so.
+     * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
      * @param {unknown} error
-     * @param {number} number The frame that was sent.
+     * @param {number} number The first frame that the call does not need.
+     * @returns {error is Problem}
      */
-    standing(error: unknown, number: number): Promise<number>;
+    canRecover(error: unknown, number: number): error is Problem;
     /**
      * Opens the session again after the service has lost it, under another id.
-     * @param {unknown} lost What told so.
+     * @param {Problem} lost What told so.
      * @returns {Promise<number>} The last frame that it has then.
      */
-    openAgain(lost: unknown): Promise<number>;
+    reopen(lost: Problem): Promise<number>;
 }

@@ -48,7 +48,7 @@ export declare class FrameStream {
     /** How many of those that wait are on their way. */
     sent: number;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
-    misnumbered: number;
+    outOfOrder: number;
     /** @type {WebSocket | undefined} */
     socket: WebSocket | undefined;
     isUp: boolean;
@@ -67,7 +67,7 @@ export declare class FrameStream {
     } | undefined;
     isRenewing: boolean;
     /** @type {(problem: Error | undefined) => void} */
-    tellEnd: (problem: Error | undefined) => void;
+    resolveEnded: (problem: Error | undefined) => void;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
     ended: Promise<Error | undefined>;
     /**
@@ -87,16 +87,16 @@ export declare class FrameStream {
         box?: import("./session.js").Box;
         see?: boolean;
     }): Promise<StreamAnswer | undefined>;
-    /** Ends the stream; the session goes on. Frames without an answer are given up. */
+    /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
     transmit(): void;
     /** @param {any} message */
     receive(message: any): void | Promise<void>;
     /** Makes sure, after an answer, that the session can be opened again.
-     * @param {number | undefined} checkpoint */
-    lookAfter(checkpoint: number | undefined): Promise<void>;
-    /** The oldest frame on its way. */
-    take(): Waiting | undefined;
+     * @param {number | undefined} stored The last frame that a store has. */
+    checkpoint(stored: number | undefined): Promise<void>;
+    /** Takes the oldest frame on its way, which has an answer. */
+    acknowledge(): Waiting | undefined;
     /** @param {Problem} problem */
     refused(problem: Problem): void | Promise<void>;
     /** The service expects frame `next`: it has those before it, and sends their answers.
@@ -104,13 +104,13 @@ export declare class FrameStream {
     resume(next: number): void;
     /** The service has no frames from `next` on any more: they are sent again before those that wait.
      * @param {number} next */
-    goBack(next: number): void;
+    resendFrom(next: number): void;
     /** The service has lost the session.
      * @param {Problem} problem */
     gone(problem: Problem): void | Promise<void>;
     /** Opens the session again, and the stream with it.
      * @param {Problem} problem What told that the service has lost it. */
-    openAgain(problem: Problem): Promise<void>;
+    reopen(problem: Problem): Promise<void>;
     connect(): Promise<void>;
     /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
     token(): Promise<string>;

@@ -45,7 +45,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 21] = [
+const FILES: [File; 22] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
@@ -60,6 +60,7 @@ const FILES: [File; 21] = [
     file!("save.js", SCRIPT),
     file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
+    client_file!("js/backoff.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
     client_file!("js/kept.js"),
