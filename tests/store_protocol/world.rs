@@ -1,190 +1,240 @@
-//! The replicas, the store, and the calls and replies between them.
+//! Two replicas with one store, a client, and its rival that sends other frames under the same numbers.
 
-use crate::replica::{Answer, Job, Replica, Request};
-use crate::store::{Call, Reply, Script, Store};
-use crate::{FIRST_BIRTH, SESSION, STREAM, State};
-use std::collections::BTreeSet;
+use crate::hostile::HostileStore;
+use crate::pictures::{FIRST, params, picture};
+use bagtrack::sessions::{
+    ActError, Admission, Boxes, Clock, CreationKey, Estimates, FrameBatch, FramesError, Held,
+    IdempotencyStore, Lane, Lease, MacKeys, OpenRequest, OpenStreams, Owner, QuotaExhausted,
+    Registry, ReplayError, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
+    Start, StreamPlace, TrackingMetrics,
+};
+use metrics::{Counter, Histogram};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::task::JoinHandle;
+use uuid::Uuid;
 
-pub struct World {
-    pub every: usize,
-    pub has_rival: bool,
-    pub store: Store,
-    pub replicas: [Replica; 2],
-    /// Calls on their way to the store: who called, the number of the job, and the call.
-    pub calls: Vec<(usize, u64, Call)>,
-    pub replies: Vec<(usize, u64, Reply)>,
-    /// The number of the frame that the client sends next.
-    pub next: [usize; 2],
-    /// The client's session; none after it has ended one.
-    pub birth: Option<u8>,
-    /// The births of the sessions that the client has ended.
-    pub ended: BTreeSet<u8>,
-    /// The longest state up to a checkpoint that an answer has told.
-    pub promised: State,
-    /// Whether the record was lost since the session was opened.
-    pub was_lost: bool,
-    pub jobs: u64,
+const LONG: Duration = Duration::from_secs(3600);
+const LANE: Lane = Lane(0);
+pub const ID: Uuid = Uuid::from_u128(1);
+
+/// What is asked of a replica.
+#[derive(Debug, Clone)]
+pub enum Asked {
+    /// This frame, as the client (0) or its rival (1) sends it.
+    Frame(u8, u64),
+    /// The client's next frame, over the replica's stream.
+    Streamed(Arc<StreamPlace>),
+    OpenStream,
+    /// A session with this seed.
+    Open(u64),
+    End,
 }
 
-impl World {
-    pub fn new(every: usize, has_rival: bool) -> Self {
-        let mut world = Self {
-            every,
-            has_rival,
-            store: Store::default(),
-            replicas: Default::default(),
-            calls: Vec::new(),
-            replies: Vec::new(),
-            next: [1, 1],
-            birth: None,
-            ended: BTreeSet::new(),
-            promised: Vec::new(),
-            was_lost: false,
-            jobs: 1,
-        };
-        world.open_session(0);
-        world.settle();
-        world
+/// A request, with what its client knew when it was sent.
+#[derive(Debug, Clone)]
+pub struct Request {
+    pub asked: Asked,
+    /// How many frames had been promised.
+    pub promised: usize,
+    /// How many sessions the client had ended or lost.
+    pub ended: u64,
+}
+
+#[derive(Debug)]
+pub enum Answer {
+    /// Where the session with this seed stands, and its checkpoint.
+    Tracked(u64, Estimates, u64),
+    /// The number of the next frame.
+    Expected(u64),
+    /// A stream that begins with this frame.
+    Opened(Arc<StreamPlace>, u64),
+    /// The session with this seed is open.
+    Born(u64),
+    Ended,
+    /// Why there is none.
+    Nothing(String),
+}
+
+#[derive(Debug)]
+struct NoQuota;
+
+impl SessionQuota for NoQuota {
+    fn check(&self) -> Result<(), QuotaExhausted> {
+        Ok(())
     }
 
-    pub fn request(&self, sender: u8, number: usize) -> Request {
-        Request {
-            sender,
-            number,
-            promised: self.promised.len(),
-            birth: self.birth.unwrap_or(0),
-            ended: self.ended.len(),
+    fn reserve(&self, _targets: usize) -> Result<Held, QuotaExhausted> {
+        Ok(Box::new(()))
+    }
+}
+
+pub struct Replica {
+    pub service: SessionService,
+    pub job: Option<JoinHandle<()>>,
+    pub stream: Option<Arc<StreamPlace>>,
+}
+
+impl Replica {
+    pub fn new(store: &HostileStore, store_every: u64) -> Self {
+        let lease = Lease {
+            first: LONG,
+            idle: LONG,
+        };
+        let counter = Counter::noop;
+        let service = SessionService::new(ServiceParts {
+            settings: ServiceSettings {
+                work_timeout: LONG,
+                max_request_cpu: LONG,
+                frame: bagtrack_ingest::Limits::default(),
+                max_request_pixels: u64::MAX,
+                max_frames: 64,
+                store_every,
+            },
+            registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
+            store: Some(Arc::new(store.clone())),
+            admission: Admission::new(64, 1).unwrap(),
+            streams: OpenStreams::default(),
+            opened: IdempotencyStore::new(64),
+            keys: Arc::new(MacKeys::new("bagtrack tests of stores", &["secret"])),
+            tracking: TrackingMetrics {
+                decode: Histogram::noop(),
+                step: Histogram::noop(),
+                tracking: counter(),
+                uncertain: counter(),
+                lost: counter(),
+                losses: counter(),
+            },
+            queue_wait: Histogram::noop(),
+            draining: AtomicBool::new(false),
+        });
+        Self {
+            service,
+            job: None,
             stream: None,
         }
     }
 
-    /// The client opens a session, by the same request until it has ended that one.
-    pub fn open_session(&mut self, replica: usize) {
-        let request = self.request(SESSION, 0);
-        let birth = FIRST_BIRTH + u8::try_from(self.ended.len()).unwrap_or(u8::MAX);
-        self.create(replica, request, vec![birth], 0);
+    pub fn is_idle(&self) -> bool {
+        self.job.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// The client ends its session.
-    pub fn end_session(&mut self, replica: usize) {
-        let request = self.request(SESSION, 0);
-        let script = match self.replicas[replica].copy {
-            None => Script::Load,
-            Some(_) => Script::End,
-        };
-        self.call(replica, request, script, 0);
-    }
-
-    /// A client opens a stream at a replica.
-    pub fn open_stream(&mut self, replica: usize) {
-        let script = match &self.replicas[replica].copy {
-            None => Script::Load,
-            Some(copy) => Script::Fence(copy.version),
-        };
-        self.call(replica, self.request(STREAM, 0), script, 0);
-    }
-
-    /// A replica gets a request with a frame, and calls the store, if it cannot answer. `is_told` says that the store has
-    /// told its copy, `is_lost` that the store has no record.
-    pub fn begin(
-        &mut self,
-        replica: usize,
-        mut request: Request,
-        attempts: usize,
-        is_told: bool,
-        is_lost: bool,
-    ) -> Option<(Request, Answer)> {
-        if let (Some(own), Some(copy)) = (request.stream, &self.replicas[replica].copy) {
-            if own != copy.version.generation {
-                // Another stream has taken its place.
-                self.replicas[replica].stream = None;
-                return None;
-            }
-            // Frames of a stream have no numbers.
-            request.number = copy.state.len();
+    /// The client gives its request up.
+    pub async fn give_up(&mut self) {
+        if let Some(job) = self.job.take() {
+            job.abort();
+            let _ = job.await;
         }
-        let script = match &self.replicas[replica].copy {
-            None => Script::Load,
-            Some(copy) if request.number == copy.state.len() => {
-                let mut tracked = copy.state.clone();
-                tracked.push(request.sender);
-                if is_lost {
-                    self.create(replica, request, tracked, attempts);
-                    return None;
+    }
+}
+
+/// The seed of a session, from the digest of the request that opened it.
+fn seed_of(session: &Session) -> u64 {
+    session.opening().request[0].into()
+}
+
+/// What the service answers.
+pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
+    match asked {
+        Asked::Frame(sender, number) => {
+            let batch =
+                FrameBatch::posted(Some(*number), vec![picture(*sender, *number).into()], None);
+            track(service, batch).await
+        }
+        Asked::Streamed(place) => {
+            let session = match service.find(ID, &Owner::default(), LANE).await {
+                Ok(session) => session,
+                Err(error) => return Answer::Nothing(error.to_string()),
+            };
+            let mut batch = FrameBatch::posted(None, Vec::new(), None);
+            let number = session.latest_frame() + 1;
+            batch.files = vec![picture(0, number).into()];
+            batch.stream = Some(place.clone());
+            match track(service, batch).await {
+                // Another picture than the frame's own: its session went on meanwhile.
+                Answer::Tracked(_, estimates, _) if estimates.first().frame != number => {
+                    Answer::Nothing("it went on meanwhile".to_owned())
                 }
-                Script::Advance {
-                    before: copy.version,
-                    token: self.jobs,
-                    stream: request.stream,
-                    writes: request.number >= copy.version.checkpoint + self.every,
-                    goes_on: is_told || request.stream.is_some(),
-                    tracked,
-                }
-            }
-            Some(copy) if is_told && request.number < copy.state.len() => {
-                return Some((request, copy.settle(request)));
-            }
-            Some(copy) => Script::Check {
-                version: copy.version,
-                goes_on: request.number > copy.state.len(),
-            },
-        };
-        self.call(replica, request, script, attempts);
-        None
-    }
-
-    /// Makes a record, whose generation no other has had.
-    pub fn create(&mut self, replica: usize, request: Request, state: State, attempts: usize) {
-        let script = Script::Create {
-            generation: 1000 * self.jobs,
-            token: self.jobs,
-            stream: request.stream.is_some(),
-            state,
-        };
-        self.call(replica, request, script, attempts);
-    }
-
-    pub fn call(&mut self, replica: usize, request: Request, script: Script, attempts: usize) {
-        let number = self.jobs;
-        self.jobs += 1;
-        let birth = match (&script, &self.replicas[replica].copy) {
-            (Script::Create { state, .. }, _) => state[0],
-            (_, Some(copy)) => copy.state[0],
-            (_, None) => 0,
-        };
-        let call = Call { birth, script };
-        self.calls.push((replica, number, call.clone()));
-        self.replicas[replica].job = Some(Job {
-            request,
-            call,
-            number,
-            attempts,
-        });
-    }
-
-    /// Runs all calls, and gives all answers.
-    pub fn settle(&mut self) {
-        while let Some((replica, number, call)) = self.calls.pop() {
-            let reply = self.run(call);
-            if let Some((request, answer)) = self.end(replica, number, reply) {
-                self.answer(request, answer, true);
+                answer => answer,
             }
         }
-    }
-
-    /// The store runs a script.
-    pub fn run(&mut self, call: Call) -> Reply {
-        let had_record = self.store.record.is_some();
-        let reply = self.store.run(call);
-        if had_record && self.store.record.is_none() {
-            self.drop_creates();
+        Asked::OpenStream => {
+            let opened = open_stream(service).await;
+            opened.unwrap_or_else(|error| Answer::Nothing(error.to_string()))
         }
-        reply
+        Asked::Open(seed) => {
+            let request = OpenRequest {
+                key: Some(CreationKey::Id(ID)),
+                owner: Owner::default(),
+                digest: [u8::try_from(*seed).unwrap(); 32],
+                start: Start::Frame {
+                    file: picture(0, 0).into(),
+                    boxes: Boxes::One(FIRST),
+                    params: Box::new(params(*seed)),
+                },
+                quota: Arc::new(NoQuota),
+                queue: service.admission.enter(LANE, Box::new(())).unwrap(),
+            };
+            match service.open(request).await {
+                Ok(opened) => Answer::Born(seed_of(&opened.session)),
+                Err(error) => Answer::Nothing(error.to_string()),
+            }
+        }
+        Asked::End => match service.end(ID, &Owner::default(), LANE).await {
+            Ok(()) => Answer::Ended,
+            Err(error) => Answer::Nothing(error.to_string()),
+        },
     }
+}
 
-    /// What was sent while there was a record is not on its way for so long that there is none.
-    pub fn drop_creates(&mut self) {
-        let creates = |script: &Script| matches!(script, Script::Create { .. });
-        self.calls.retain(|(_, _, call)| !creates(&call.script));
+async fn track(service: &SessionService, batch: FrameBatch) -> Answer {
+    let session = match service.find(ID, &Owner::default(), LANE).await {
+        Ok(session) => session,
+        Err(error) => return Answer::Nothing(error.to_string()),
+    };
+    let seed = seed_of(&session);
+    let permit = match session.enter() {
+        Ok(permit) => permit,
+        Err(error) => return Answer::Nothing(error.to_string()),
+    };
+    let queue = service.admission.enter(LANE, Box::new(())).unwrap();
+    match service.advance(permit, queue, batch).await {
+        Ok(mut tracked) => {
+            let checkpoint = tracked.checkpoint.expect("there is a store");
+            Answer::Tracked(seed, tracked.estimates.remove(0), checkpoint)
+        }
+        Err(FramesError::Replay(
+            ReplayError::OutOfOrder { expected, .. } | ReplayError::Differs { expected, .. },
+        )) => Answer::Expected(expected),
+        Err(error) => Answer::Nothing(error.to_string()),
     }
+}
+
+async fn open_stream(service: &SessionService) -> Result<Answer, ActError> {
+    let session = service.find(ID, &Owner::default(), LANE).await?;
+    let place = Arc::new(service.streams.take(ID));
+    let permit = session.read_permit()?;
+    let mut locked = service.fence(permit, LANE).await?;
+    place.begin(&session);
+    let next = locked.state().latest_frame() + 1;
+    Ok(Answer::Opened(place, next))
+}
+
+/// The answers that were given, in their order.
+pub type Answers = Arc<Mutex<Vec<(usize, Request, Answer)>>>;
+
+/// Begins with a request at a replica.
+pub fn begin(
+    store: &HostileStore,
+    answers: &Answers,
+    (number, replica): (usize, &mut Replica),
+    request: Request,
+) {
+    let (service, answers, busy) = (replica.service.clone(), answers.clone(), store.begin());
+    replica.job = Some(tokio::spawn(async move {
+        let answered = answer(&service, &request.asked).await;
+        answers.lock().unwrap().push((number, request, answered));
+        drop(busy);
+    }));
 }

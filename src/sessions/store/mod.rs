@@ -30,6 +30,3 @@ pub use self::redis::{AddressError, RedisStore, StoreAddress};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
 pub use session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
-
-#[cfg(test)]
-pub(crate) mod tests;

@@ -76,7 +76,7 @@ pub fn reconcile(local: Local, outcome: Result<Outcome, StoreUnavailable>) -> St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::store::tests::record;
+    use crate::sessions::store::record::tests::record;
 
     /// A name for a step.
     fn named(step: &Step) -> &'static str {

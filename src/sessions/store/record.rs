@@ -136,9 +136,32 @@ impl Record {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::sessions::store::tests::record;
+    use crate::sessions::targets::Estimates;
+    use crate::tracker::{Estimate, Rect, Status};
+
+    /// A record of a session that was opened at frame 0, at this frame.
+    pub(crate) fn record(incarnation: u64, frame: u64) -> Record {
+        let estimate = Estimate {
+            frame: 0,
+            target: Rect::new(1.0, 2.0, 30.0, 40.0),
+            score: 1.0,
+            status: Status::Tracking,
+        };
+        Record {
+            version: Version::first(frame),
+            owner: Owner::named("ann"),
+            opening: Opening {
+                request: [7; 32],
+                estimates: Estimates::One(estimate),
+                expires: 9,
+                incarnation,
+            },
+            state: vec![1, 2, 3],
+            ttl: Duration::from_secs(60),
+        }
+    }
 
     #[test]
     fn a_record_is_read_again_and_one_of_another_format_says_so() {
