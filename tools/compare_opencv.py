@@ -6,7 +6,7 @@
     tools/compare_opencv.py path/to/sequences/*
 
 Every argument is a folder in the OTB layout: img/ with the frames, groundtruth_rect.txt with x,y,width,height a line.
-The rules are those of `bagtrack eval`, so that the rows can be compared:
+The rules are those of `bagtrack-eval`, so that the rows can be compared:
 
 - boxes are 1-based in the file and 0-based here; a line without a size (0,0,0,0) or with NaN is not annotated;
 - the first box is given, and its frame is not scored; unannotated frames are tracked and not scored;
@@ -134,7 +134,7 @@ def updates(name, frames, boxes, nano=None):
 
 
 def track(name, frames, boxes, nano=None):
-    """One tracker through one sequence: its figures under the names that `bagtrack eval` gives them."""
+    """One tracker through one sequence: its figures under the names that `bagtrack-eval` gives them."""
     errors, overlaps, spent = [], [], 0.0
     for truth, (seconds, _, held) in zip(boxes[1:], updates(name, frames, boxes, nano)):
         spent += seconds
@@ -151,14 +151,14 @@ def track(name, frames, boxes, nano=None):
 
 def run_bagtrack(binary, preset, seeds, folders):
     """bagtrack's figures by sequence, in the order of the folders."""
-    command = [str(binary), "eval", *map(str, folders), "--preset", preset]
+    command = [str(binary), *map(str, folders), "--preset", preset]
     command += ["--seeds", str(seeds), "--jobs", "1", "--format", "json"]
     try:
         done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
     except FileNotFoundError:
         sys.exit(f"compare_opencv: {binary} is not there; cargo build --release, or name it with --bagtrack")
     except subprocess.CalledProcessError as error:
-        sys.exit(f"compare_opencv: bagtrack eval ended with {error.returncode}")
+        sys.exit(f"compare_opencv: bagtrack-eval ended with {error.returncode}")
     return json.loads(done.stdout)
 
 
@@ -208,7 +208,7 @@ def add_common(parser):
     """The arguments that every comparison with bagtrack has."""
     root = pathlib.Path(__file__).resolve().parent.parent
     parser.add_argument("sequences", nargs="+", type=pathlib.Path, metavar="DIR", help="sequences; files among them are passed over")
-    parser.add_argument("--bagtrack", default=root / "target/release/bagtrack", type=pathlib.Path, metavar="BINARY", help="default: %(default)s")
+    parser.add_argument("--bagtrack", default=root / "target/release/bagtrack-eval", type=pathlib.Path, metavar="BINARY", help="default: %(default)s")
 
 
 def folders(paths, parser):

@@ -5,7 +5,7 @@
     pip install ./python opencv-python-headless
     tools/measure_wheel.py path/to/sequences/*
 
-The program's time is that of `bagtrack eval`: the step alone, decoding excluded. Frames in colour would add their
+The program's time is that of `bagtrack-eval`: the step alone, decoding excluded. Frames in colour would add their
 conversion to luma and chroma, which the program does while it decodes. Prints the medians of the rounds, and that of
 their ratios.
 """
@@ -22,7 +22,7 @@ import cv2
 
 
 def step_of_program(program, folder):
-    command = [program, "eval", folder, "--seeds", "1", "--format", "json"]
+    command = [program, folder, "--seeds", "1", "--format", "json"]
     report = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return json.loads(report)["sequences"][0]["step_ms"]
 
@@ -39,7 +39,7 @@ def step_of_wheel(frames, box):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sequences", nargs="+", type=pathlib.Path, help="folders in the OTB layout")
-    parser.add_argument("--program", default="target/release/bagtrack")
+    parser.add_argument("--program", default="target/release/bagtrack-eval")
     parser.add_argument("--rounds", type=int, default=7)
     options = parser.parse_args()
     for folder in options.sequences:

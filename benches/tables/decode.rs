@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use bagtrack::ingest::{self, IngestError, Limits};
-use bagtrack::tracker::{Frame, Preset, Rect, Tracker};
+use bagtrack_ingest::{IngestError, Limits};
+use bagtrack_tracker::{Frame, Preset, Rect, Tracker};
 
 use crate::clock;
 
@@ -22,7 +22,7 @@ pub fn print(files: &[&str]) {
     println!("file\twidth\theight\tworking_width\tworking_height\tdecode_ms\tstep_ms");
     for file in files {
         let bytes = read(file);
-        let whole = decoded(ingest::decode(&bytes, &Limits::default()), file);
+        let whole = decoded(bagtrack_ingest::decode(&bytes, &Limits::default()), file);
         let (width, height) = whole.source_size();
         let (w, h) = (f64::from(width), f64::from(height));
         let large = Rect::new(w * 0.4, h * 0.4, w / 6.0, h / 6.0);
@@ -43,7 +43,12 @@ fn print_target(file: &str, bytes: &[u8], target: Rect) {
     let limits = Limits::default();
     let params = Preset::default().params();
     let format = |source| params.frame_format(source, &target);
-    let decode = || decoded(ingest::decode_to(black_box(bytes), &limits, &format), file);
+    let decode = || {
+        decoded(
+            bagtrack_ingest::decode_to(black_box(bytes), &limits, &format),
+            file,
+        )
+    };
     let frame = decode();
     let ((width, height), size) = (frame.source_size(), (frame.width(), frame.height()));
     let mut tracker = Tracker::new(&frame, target, params.clone()).expect("a box inside the frame");
@@ -53,7 +58,7 @@ fn print_target(file: &str, bytes: &[u8], target: Rect) {
     let times = clock::medians(
         ROUNDS,
         vec![
-            Box::new(|| ingest::recycle(black_box(decode()))),
+            Box::new(|| bagtrack_ingest::recycle(black_box(decode()))),
             Box::new(|| {
                 black_box(tracker.step(&frame)).expect("the same frame");
             }),
@@ -72,7 +77,7 @@ fn print_target(file: &str, bytes: &[u8], target: Rect) {
 pub fn repeat(count: usize, file: &str) {
     let bytes = read(file);
     for _ in 0..count {
-        let frame = ingest::decode(black_box(&bytes), &Limits::default());
-        ingest::recycle(black_box(decoded(frame, file)));
+        let frame = bagtrack_ingest::decode(black_box(&bytes), &Limits::default());
+        bagtrack_ingest::recycle(black_box(decoded(frame, file)));
     }
 }

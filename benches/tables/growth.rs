@@ -2,14 +2,14 @@
 
 use std::hint::black_box;
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Frame, Params, Preset, Tracker};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Frame, Params, Preset, Tracker};
 use jpeg_encoder::{ColorType, Encoder};
 
 use crate::clock::Action;
 use crate::fit::Order;
 use crate::growth_row::Row;
-use crate::{clock, growth_plot, scene, warm};
+use crate::{clock, scene, warm};
 
 /// Both presets have work that comes every fifth or every tenth frame.
 const PERIOD: usize = 10;
@@ -17,19 +17,15 @@ const ROUNDS: usize = 25;
 
 type Change = fn(&mut Params, u32);
 
-/// Prints the table; draws the figure, where a file is named for it.
-pub fn print(plot: Option<&str>) {
+/// Prints the table.
+pub fn print() {
     println!(
         "µs of a step, of which but one size is the preset's: over {PERIOD} steps in a row, the mean of each one's median \
          of {ROUNDS}; the sizes in turns, processor time of one thread\n"
     );
     println!("| what | size | µs | nearest of the expected order | furthest off |");
     println!("|---|---|---|---|---|");
-    let mut rows: Vec<Row> = Vec::new();
-    let mut add = |row: Row| {
-        row.print();
-        rows.push(row);
-    };
+    let add = |row: Row| row.print();
     use Order::Power;
     let particles: (&str, &[u32], Order, Change) =
         ("N", &[50, 100, 200, 400, 800], Power(1), |p, n| {
@@ -77,13 +73,6 @@ pub fn print(plot: Option<&str>) {
         ));
     }
     frame_sizes().into_iter().for_each(add);
-    if let Some(file) = plot {
-        let drawn = growth_plot::draw(&rows).and_then(|svg| Ok(std::fs::write(file, svg)?));
-        if let Err(error) = drawn {
-            eprintln!("tables: {file}: {error}");
-            std::process::exit(2);
-        }
-    }
 }
 
 /// Steps of a preset with one parameter at each of these values.
@@ -117,7 +106,7 @@ fn frame_sizes() -> [Row; 4] {
     let mut sizes = [1, 2, 4, 6, 8].map(FrameSize::new);
     let limits = Limits::default();
     let decode = timed(&mut sizes, |size| {
-        black_box(ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
+        black_box(bagtrack_ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
     });
     let downscale = timed(&mut sizes, |size| {
         black_box(frame(size.zoom, &size.luma));

@@ -1,35 +1,24 @@
 //! The tables of docs/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
 //!
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
-//! - `growth [--plot FILE]`: the time of a step against N, D, K, P and more, and of what comes before it against the
+//! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the
 //!   frame's size, each with the order that is expected; as a figure, too;
-//! - `kernels`: the tracker's own kernels of linear algebra against nalgebra's;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers;
 //! - `repeat step PRESET COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
 
-#[path = "../scene/clock.rs"]
-mod clock;
 mod decode;
 mod fit;
 mod growth;
-mod growth_plot;
 mod growth_row;
-mod kernels;
 mod memory;
 mod ratios;
-#[path = "../scene/mod.rs"]
-mod scene;
-#[allow(dead_code)] // The figures of `eval` use the rest.
-#[path = "../../src/eval/plots/style.rs"]
-mod style;
-#[path = "../../tests/textbook/mod.rs"]
-mod textbook;
 
-use bagtrack::tracker::{Params, Preset, Tracker};
+use bagtrack_testing::{bench_scene as scene, cpu_time as clock, textbook};
+use bagtrack_tracker::{Params, Preset, Tracker};
 
 /// A tracker of the scene with a full history and a full bag, and its frames.
-fn warm(params: Params) -> (Tracker, Vec<bagtrack::tracker::Frame>) {
+fn warm(params: Params) -> (Tracker, Vec<bagtrack_tracker::Frame>) {
     let frames = scene::frames();
     let until = (params.bag_size * params.update_every) as usize + 1;
     let mut tracker =
@@ -51,9 +40,7 @@ fn main() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
         ["ratios"] => ratios::print(),
-        ["kernels"] => kernels::print(),
-        ["growth"] => growth::print(None),
-        ["growth", "--plot", file] => growth::print(Some(file)),
+        ["growth"] => growth::print(),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
@@ -64,7 +51,7 @@ fn main() {
         [] => ratios::print(),
         _ => {
             eprintln!(
-                "tables: ratios | growth [--plot FILE] | kernels | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
+                "tables: ratios | growth | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
             );
             std::process::exit(2);
         }

@@ -1,6 +1,6 @@
 //! Resident memory of live trackers.
 
-use bagtrack::tracker::{Preset, Tracker};
+use bagtrack_tracker::{Preset, Tracker};
 
 use crate::{scene, warm};
 

@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use bagtrack::sample::{Clip, Scene, Settings};
-use bagtrack::tracker::{AffineSubspace, Frame, Preset, Rect, Status, Tracker, patch};
+use bagtrack_sample::{Clip, Scene, Settings};
+use bagtrack_tracker::{AffineSubspace, Frame, Preset, Rect, Status, Tracker, patch};
 use nalgebra::DMatrix;
 
 use crate::{clock, scene, textbook, warm};

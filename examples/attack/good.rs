@@ -1,10 +1,8 @@
 //! Good clients: each sends 25 numbered frames a second, and sends a frame again when it is refused.
 
-#[path = "../load/pictures.rs"]
-mod pictures;
-
 use crate::target::Target;
 use crate::{Outcome, Verdict};
+use bagtrack_testing::bench_pictures as pictures;
 use hdrhistogram::Histogram;
 use reqwest::StatusCode;
 use std::sync::Arc;

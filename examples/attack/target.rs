@@ -1,10 +1,8 @@
 //! The server that is attacked.
 
-#[path = "../load/binary.rs"]
-mod binary;
-
 use crate::good::target_box;
 use crate::{Options, Outcome};
+use bagtrack_testing::command::program;
 use reqwest::{Client, RequestBuilder};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
@@ -44,7 +42,8 @@ impl Target {
                 log_is_stalled: Arc::default(),
             });
         }
-        let binary = binary::server(options.server.clone())?;
+        let binary = options.server.clone();
+        let binary = binary.unwrap_or_else(|| program("bagtrack"));
         let mut command = Command::new(&binary);
         command
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use bagtrack::tracker::{self, Rect};
 use bagtrack_client::{Client, ClientError, OpenOptions, Preset, Session};
+use bagtrack_tracker::Rect;
 use bytes::Bytes;
 use hdrhistogram::Histogram;
 use tokio::task::JoinSet;
@@ -50,7 +50,12 @@ pub struct Driver {
 
 impl Driver {
     /// Clients of the server at `url`.
-    pub fn new(url: &str, pictures: Vec<Vec<u8>>, target: Rect, preset: tracker::Preset) -> Self {
+    pub fn new(
+        url: &str,
+        pictures: Vec<Vec<u8>>,
+        target: Rect,
+        preset: bagtrack_tracker::Preset,
+    ) -> Self {
         let Rect {
             x,
             y,
@@ -58,8 +63,8 @@ impl Driver {
             height,
         } = target;
         let preset = match preset {
-            tracker::Preset::Robust => Preset::Robust,
-            tracker::Preset::Paper => Preset::Paper,
+            bagtrack_tracker::Preset::Robust => Preset::Robust,
+            bagtrack_tracker::Preset::Paper => Preset::Paper,
         };
         Self {
             url: url.to_owned(),

@@ -1,7 +1,7 @@
 //! The baseline of the service: decoding and tracking in this process, on one thread.
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Preset, Rect, Tracker};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Preset, Rect, Tracker};
 
 use crate::Outcome;
 use crate::process::cpu_seconds;
@@ -21,7 +21,7 @@ impl InProcess {
         preset: Preset,
         sessions: u32,
     ) -> Outcome<Self> {
-        let first = ingest::decode(&pictures[0], &Limits::default())?;
+        let first = bagtrack_ingest::decode(&pictures[0], &Limits::default())?;
         let tracker = Tracker::new(&first, target, preset.params())?;
         let mut work = Self {
             trackers: vec![tracker; sessions as usize],
@@ -37,9 +37,9 @@ impl InProcess {
         for _ in 0..frames {
             let sessions = self.trackers.len();
             let picture = &self.pictures[(self.done / sessions + 1) % self.pictures.len()];
-            let frame = ingest::decode(picture, &Limits::default())?;
+            let frame = bagtrack_ingest::decode(picture, &Limits::default())?;
             self.trackers[self.done % sessions].step(&frame)?;
-            ingest::recycle(frame);
+            bagtrack_ingest::recycle(frame);
             self.done += 1;
         }
         Ok(())

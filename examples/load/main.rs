@@ -14,18 +14,17 @@
 //!
 //! Frames, sessions and time are bounded. Linux only: processor time is read from `/proc`.
 
-mod binary;
 mod churn;
 mod drive;
 mod in_process;
 mod memory;
-mod pictures;
 mod process;
 
+use bagtrack_testing::bench_pictures as pictures;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use bagtrack::tracker::Preset;
+use bagtrack_tracker::Preset;
 use clap::Parser;
 use drive::{Done, Driver};
 use in_process::InProcess;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use bagtrack::tracker::Preset;
 use bagtrack_client::Client;
+use bagtrack_tracker::Preset;
 use tokio::task::JoinSet;
 
 use crate::Outcome;

@@ -4,7 +4,8 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-use crate::{Outcome, binary};
+use crate::Outcome;
+use bagtrack_testing::command::program;
 
 /// Clock ticks of `/proc/<pid>/stat` in a second: fixed by the Linux interface.
 const TICKS: f64 = 100.0;
@@ -29,7 +30,7 @@ pub struct Server {
 impl Server {
     /// Starts `binary` with room for so many sessions, which expire after `idle`, and waits until it listens.
     pub fn start(binary: Option<PathBuf>, sessions: u32, idle: &str) -> Outcome<Self> {
-        let binary = binary::server(binary)?;
+        let binary = binary.unwrap_or_else(|| program("bagtrack"));
         let room = (3 * sessions + 16).to_string();
         let mut child = Command::new(&binary)
             .args(["serve", "--listen", "127.0.0.1:0", "--max-sessions", &room])

@@ -1,8 +1,8 @@
 //! Image files: what is taken has the size that its header says, and keeps the limits.
 #![no_main]
 
-use bagtrack::ingest::{decode_to, recycle, size, Limits};
-use bagtrack::tracker::FrameFormat;
+use bagtrack_ingest::{decode_to, recycle, size, Limits};
+use bagtrack_tracker::FrameFormat;
 use libfuzzer_sys::fuzz_target;
 use std::cell::Cell;
 use std::sync::Once;

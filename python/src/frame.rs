@@ -1,6 +1,6 @@
 //! NumPy arrays to frames.
 
-use bagtrack::tracker::Frame;
+use bagtrack_tracker::Frame;
 use numpy::ndarray::ArrayViewD;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};

@@ -1,6 +1,6 @@
 //! Keyword arguments to the tracker's parameters.
 
-use bagtrack::tracker::{Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};

@@ -1,6 +1,6 @@
 //! Boxes: four numbers in Python, a rectangle in Rust.
 
-use bagtrack::tracker::Rect;
+use bagtrack_tracker::Rect;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

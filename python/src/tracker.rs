@@ -3,7 +3,7 @@
 use super::frame::frame;
 use super::params::{by_name, params};
 use super::target::{Numbers, numbers, rect};
-use bagtrack::tracker::{Estimate, Params, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Estimate, Params, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyType};

@@ -1,8 +1,8 @@
 //! Frames with the box drawn on them.
 
 use bagtrack::drawing::{self, Drawn, Picture};
-use bagtrack::ingest::Limits;
-use bagtrack::tracker::Estimate;
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::Estimate;
 use std::error::Error;
 
 /// The frame as JPEG, upright, with the box and the score.

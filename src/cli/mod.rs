@@ -4,15 +4,12 @@
 //! after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
 mod draw;
-mod eval;
+mod evaluate;
 #[cfg(feature = "otel")]
 mod export;
 mod health;
 mod log;
 mod open_files;
-mod output;
-mod params;
-mod progress;
 mod sample;
 mod serve;
 mod signals;
@@ -49,8 +46,9 @@ enum Command {
     Serve(Box<serve::Args>),
     /// Track through a video or a folder of frames.
     Track(track::Args),
-    /// Measure accuracy and speed on annotated sequences.
-    Eval(eval::Args),
+    /// Measure accuracy and speed on annotated sequences, with the program `bagtrack-eval`.
+    #[command(disable_help_flag = true)]
+    Eval(evaluate::Args),
     /// Draw a synthetic clip with exact ground truth.
     Sample(sample::Args),
     /// Ask a running service whether it is healthy.
@@ -71,7 +69,7 @@ pub fn run(cli: Cli) -> ExitCode {
     let result = match cli.command.unwrap_or(Command::Serve(Box::new(cli.serve))) {
         Command::Serve(args) => serve::run(*args),
         Command::Track(args) => track::run(args),
-        Command::Eval(args) => eval::run(args),
+        Command::Eval(args) => evaluate::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Health(args) => health::run(args),
     };

@@ -1,7 +1,7 @@
 //! `bagtrack sample`.
 
-use super::{output, progress};
-use bagtrack::sample::{Clip, Format, Scene, Settings};
+use bagtrack_cli::{output, progress};
+use bagtrack_sample::{Clip, Format, Scene, Settings};
 use std::path::PathBuf;
 
 /// Flags of `sample`.

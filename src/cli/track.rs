@@ -1,12 +1,11 @@
 //! `bagtrack track`.
 
-use super::params::ParamFlags;
-use super::progress;
 use super::track_frames::Frames;
 use super::track_writer::Writer;
-use bagtrack::eval::Sequence;
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Estimate, Params, Rect, Tracker};
+use bagtrack_cli::progress;
+use bagtrack_cli::{BOXES, ParamFlags, read_boxes};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Estimate, Params, Rect, Tracker};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -50,7 +49,7 @@ struct Line<'a> {
     #[serde(rename = "box")]
     target: Rect,
     score: f32,
-    status: bagtrack::tracker::Status,
+    status: bagtrack_tracker::Status,
 }
 
 /// Runs `track`.
@@ -105,12 +104,12 @@ fn advance(
     match tracker {
         Some(tracker) => {
             let format = tracker.frame_format();
-            let frame = ingest::decode_to(bytes, &limits, &|_| format)?;
+            let frame = bagtrack_ingest::decode_to(bytes, &limits, &|_| format)?;
             Ok(tracker.step(&frame)?)
         }
         None => {
             let format = |source| params.frame_format(source, &target);
-            let frame = ingest::decode_to(bytes, &limits, &format)?;
+            let frame = bagtrack_ingest::decode_to(bytes, &limits, &format)?;
             let first = Tracker::new(&frame, target, params.clone())?;
             Ok(tracker.insert(first).estimate())
         }
@@ -118,20 +117,20 @@ fn advance(
 }
 
 fn first_annotated(dir: &Path) -> Result<Rect, String> {
-    if !dir.join(Sequence::BOXES).is_file() {
+    if !dir.join(BOXES).is_file() {
         return Err(format!(
             "{}: --box x,y,width,height is needed (there is no {} to take the first box from)",
             dir.display(),
-            Sequence::BOXES
+            BOXES
         ));
     }
-    let boxes = Sequence::read_boxes(dir).map_err(|error| error.to_string())?;
+    let boxes = read_boxes(dir).map_err(|error| error.to_string())?;
     let first = boxes.first().copied().flatten();
     first.ok_or_else(|| {
         format!(
             "{}: --box x,y,width,height is needed (the first frame is not annotated in {})",
             dir.display(),
-            Sequence::BOXES
+            BOXES
         )
     })
 }

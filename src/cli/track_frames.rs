@@ -1,8 +1,8 @@
 //! The frames of `bagtrack track`: those of a folder, or of a video.
 
-use bagtrack::eval::frames;
-use bagtrack::ingest::Limits;
-use bagtrack::ingest::video::{VideoDecoder, VideoLimits};
+use bagtrack_cli::frames;
+use bagtrack_ingest::Limits;
+use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! What `bagtrack track --draw` writes: a folder of pictures, or a video.
 
 use super::draw;
-use super::output;
 use super::track_frames::{FFMPEG, FrameFile};
-use bagtrack::tracker::Estimate;
+use bagtrack_cli::output;
+use bagtrack_tracker::Estimate;
 use std::error::Error;
 use std::fs;
 use std::io::{Read, Write};

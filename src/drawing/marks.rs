@@ -2,7 +2,7 @@
 
 use super::label::{self, HEIGHT, WIDTH};
 use super::picture::Picture;
-use crate::tracker::{Estimate, Rect, Status};
+use bagtrack_tracker::{Estimate, Rect, Status};
 use image::{Rgb, RgbImage};
 
 /// The colour of particles.

@@ -1,7 +1,7 @@
 //! A decoded frame in colour.
 
-use crate::ingest::{self, IngestError, Limits};
-use crate::tracker::{Frame, FrameFormat, ycbcr};
+use bagtrack_ingest::{IngestError, Limits};
+use bagtrack_tracker::{Frame, FrameFormat, ycbcr};
 use image::codecs::jpeg::JpegEncoder;
 use image::{ImageFormat, ImageResult, RgbImage};
 use std::io::Cursor;
@@ -31,7 +31,9 @@ impl Picture {
                 has_color: true,
             }
         };
-        Ok(Self::of(ingest::decode_to(bytes, limits, &format)?))
+        Ok(Self::of(bagtrack_ingest::decode_to(
+            bytes, limits, &format,
+        )?))
     }
 
     fn of(frame: Frame) -> Self {

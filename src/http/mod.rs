@@ -39,7 +39,6 @@ mod stream;
 pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
 pub use config::access::{AccessConfig, Secret};
-#[cfg(feature = "cli")]
 pub use config::flag_values::{parse_duration, parse_listen};
 pub use config::limits::LimitsConfig;
 pub use config::memory_bound::MemoryBound;

@@ -15,7 +15,6 @@ use crate::http::middleware::security_headers::secure;
 use crate::http::middleware::single_host::one_host;
 use crate::http::openapi::routes;
 use crate::http::page::docs;
-#[cfg(feature = "eval")]
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
@@ -79,7 +78,6 @@ fn routes(state: &AppState) -> Router<AppState> {
     let pages = Router::new()
         .route("/", get(static_files::index))
         .route("/page/{*file}", get(static_files::asset));
-    #[cfg(feature = "eval")]
     let pages = pages
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));

@@ -208,7 +208,7 @@ mod tests {
     use crate::sessions::{
         Admission, Fingerprint, Lane, NewSession, PerTarget, SessionState, Turn,
     };
-    use crate::tracker::{Frame, Preset, Rect};
+    use bagtrack_tracker::{Frame, Preset, Rect};
     use std::sync::mpsc;
     use std::time::Duration;
 

@@ -6,7 +6,7 @@
 
 use super::per_target::PerTarget;
 use super::targets::{Correction, Estimates};
-use crate::tracker::{Estimate, Rect};
+use bagtrack_tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
 
 /// The digest of an uploaded frame: XXH3-128 of its bytes as sent. It is not a cryptographic one: a client that forges
@@ -148,7 +148,7 @@ pub(super) fn stored(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracker::Status;
+    use bagtrack_tracker::Status;
 
     fn answered(frame: u64, bytes: &[u8]) -> Answered {
         let target = Rect {

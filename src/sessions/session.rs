@@ -10,7 +10,7 @@ use super::short_id::short_id;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
 use super::targets::Estimates;
-use crate::tracker::Params;
+use bagtrack_tracker::Params;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;

@@ -12,7 +12,7 @@ use super::mac::{MAC_BYTES, MacKeys};
 use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
 use super::targets::Targets;
-use crate::tracker::{Tracker, TrackerError};
+use bagtrack_tracker::{Tracker, TrackerError};
 use postcard::take_from_bytes;
 use serde::Serialize;
 use serde::de::Deserialize;

@@ -5,7 +5,7 @@ use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, Ta
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
-use crate::tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
+use bagtrack_tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug, Clone)]

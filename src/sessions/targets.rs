@@ -5,7 +5,7 @@
 
 use super::per_target::PerTarget;
 use super::scheduler::work_limit::{Stopped, WorkMeter};
-use crate::tracker::{Estimate, Frame, FrameFormat, Params, Rect, Seen, Tracker, TrackerError};
+use bagtrack_tracker::{Estimate, Frame, FrameFormat, Params, Rect, Seen, Tracker, TrackerError};
 
 /// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
 const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;

@@ -1,9 +1,9 @@
 //! The sample clip, and what the library says of it.
 
-use bagtrack::ingest::{self, Limits};
-use bagtrack::sample::{Clip as Sample, Format, Settings};
-use bagtrack::tracker::{Estimate, Preset, Rect, Status, Tracker};
 use bagtrack_client::Answer;
+use bagtrack_ingest::Limits;
+use bagtrack_sample::{Clip as Sample, Format, Settings};
+use bagtrack_tracker::{Estimate, Preset, Rect, Status, Tracker};
 use serde_json::{Value, json};
 use std::sync::LazyLock;
 
@@ -45,7 +45,7 @@ impl Clip {
 
     /// What the library answers to these frames after the first one.
     pub fn tracked(&self, seed: u64, frames: &[Vec<u8>]) -> Vec<Value> {
-        let decode = |file: &Vec<u8>| ingest::decode(file, &Limits::default()).unwrap();
+        let decode = |file: &Vec<u8>| bagtrack_ingest::decode(file, &Limits::default()).unwrap();
         let mut params = Preset::Robust.params();
         params.seed = seed;
         let mut tracker = Tracker::new(&decode(&self.frames[0]), self.target, params).unwrap();

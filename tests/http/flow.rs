@@ -2,7 +2,7 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
-use bagtrack::tracker::Rect;
+use bagtrack_tracker::Rect;
 use reqwest::StatusCode;
 
 #[tokio::test]

@@ -1,8 +1,8 @@
 //! Real video over HTTP.
 
 use crate::application::{TestApplication, expect};
-use bagtrack::ingest::{self, Limits};
-use bagtrack::tracker::{Estimate, Preset, Rect, Tracker};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Estimate, Preset, Rect, Tracker};
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ async fn coke_over_http_gives_the_librarys_boxes() {
         width,
         height,
     };
-    let first = ingest::decode(&frames[0], &limits).unwrap();
+    let first = bagtrack_ingest::decode(&frames[0], &limits).unwrap();
     let mut tracker = Tracker::new(&first, target, params).unwrap();
 
     let app = TestApplication::start().await;
@@ -84,7 +84,7 @@ async fn coke_over_http_gives_the_librarys_boxes() {
     .await;
     let id = created["id"].as_str().unwrap();
     for frame in &frames[1..] {
-        let decoded = ingest::decode(frame, &limits).unwrap();
+        let decoded = bagtrack_ingest::decode(frame, &limits).unwrap();
         let estimate = tracker.step(&decoded).unwrap();
         let answer = expect(app.post_frame(id, frame.clone()).await, StatusCode::OK).await;
         assert_same(&answer, &estimate);

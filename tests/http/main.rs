@@ -1,7 +1,6 @@
 //! The service over a real socket, with a real client.
 
 mod access;
-mod application;
 mod bag;
 mod base_path;
 mod binary;
@@ -31,7 +30,6 @@ mod openapi;
 mod openapi_examples;
 mod origins;
 mod page;
-mod pictures;
 mod problems;
 mod process;
 mod provoke;
@@ -49,3 +47,5 @@ mod targets;
 mod targets_carried;
 mod uploads;
 mod videos;
+
+use bagtrack_testing::service::{application, pictures};

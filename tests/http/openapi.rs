@@ -1,7 +1,7 @@
 //! The OpenAPI document: committed, generated, and held to the code.
 
 use crate::application::TestApplication;
-use bagtrack::tracker::{Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use serde_json::{Value, json};
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");

@@ -223,7 +223,7 @@ async fn a_session_counts_once_for_each_target() {
     expect(create("20,15,16,12;40,30,18,14").await, StatusCode::CREATED).await;
 
     // Memory for two targets with the usual parameters, not for three.
-    let bytes = 2 * bagtrack::tracker::Preset::Robust.params().session_bytes() + 4096;
+    let bytes = 2 * bagtrack_tracker::Preset::Robust.params().session_bytes() + 4096;
     let app = TestApplication::start_with(|config| config.limits.max_session_bytes = Some(bytes));
     let app = app.await;
     let query = [("boxes", BOXES)];

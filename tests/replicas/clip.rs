@@ -1,6 +1,6 @@
 //! What the clients upload: real videos where they are, else the project's sample clip.
 
-use bagtrack::sample::{Clip as Sample, Settings};
+use bagtrack_sample::{Clip as Sample, Settings};
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

@@ -6,15 +6,14 @@ mod chaos;
 mod clip;
 mod failures;
 mod incarnations;
-mod lossy;
 mod lost_records;
 mod pair;
 mod prefix;
 mod refusing;
-mod replica;
-mod server;
 mod sharing;
 mod stream_client;
 mod streams;
 mod tracking_client;
 mod trouble;
+
+use bagtrack_testing::service::{lossy, replica, server};

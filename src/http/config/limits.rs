@@ -3,112 +3,106 @@
 use ipnet::IpNet;
 use std::time::Duration;
 
-#[cfg(feature = "cli")]
 use super::flag_values::parse_duration;
 
 /// What one request, one connection and one client may take.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[derive(Debug, Clone, clap::Args)]
 pub struct LimitsConfig {
     /// Most pixels of the frames of one post together; a post of one frame has the limit of a frame.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_REQUEST_PIXELS",
         default_value_t = LimitsConfig::default().max_request_pixels
-    ))]
+    )]
     pub max_request_pixels: u64,
     /// Most processor time of one request; looked at between its frames.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_REQUEST_CPU",
         default_value = shown(LimitsConfig::default().max_request_cpu),
         value_parser = parse_duration
-    ))]
+    )]
     pub max_request_cpu: Duration,
     /// Least bytes a second of a request body, after its first `body-grace`.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MIN_BODY_RATE",
         default_value_t = LimitsConfig::default().min_body_rate
-    ))]
+    )]
     pub min_body_rate: u32,
     /// Time for a request body before its least rate counts.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_BODY_GRACE",
         default_value = shown(LimitsConfig::default().body_grace),
         value_parser = parse_duration
-    ))]
+    )]
     pub body_grace: Duration,
     /// Least bytes a second at which a client takes answers, after `write-timeout` of waiting for it.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MIN_ANSWER_RATE",
         default_value_t = LimitsConfig::default().min_answer_rate
-    ))]
+    )]
     pub min_answer_rate: u32,
     /// A connection is closed when its client was waited for this long while it took no byte of an answer, or took them
     /// more slowly than `min-answer-rate`.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_WRITE_TIMEOUT",
         default_value = shown(LimitsConfig::default().write_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub write_timeout: Duration,
     /// Time for the answer to a client that has closed its side of the connection; then it counts as gone.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_HALF_CLOSE_TIMEOUT",
         default_value = shown(LimitsConfig::default().half_close_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub half_close_timeout: Duration,
     /// A stream is pinged this often; one whose client is not heard of in that time is closed.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_PING_INTERVAL",
         default_value = shown(LimitsConfig::default().ping_interval),
         value_parser = parse_duration
-    ))]
+    )]
     pub ping_interval: Duration,
     /// Most frames of a video.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_VIDEO_FRAMES",
         default_value_t = LimitsConfig::default().max_video_frames
-    ))]
+    )]
     pub max_video_frames: usize,
     /// The program that decodes videos: its name or path. `off` refuses videos.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_FFMPEG",
         default_value_t = LimitsConfig::default().ffmpeg
-    ))]
+    )]
     pub ffmpeg: String,
     /// Most connections of one address, trusted proxies excepted [default: a quarter of `max-connections`].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS"))]
+    #[arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS")]
     pub client_connections: Option<usize>,
     /// Most sessions of one client [default: a quarter of `max-sessions`].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_SESSIONS"))]
+    #[arg(long, env = "BAGTRACK_CLIENT_SESSIONS")]
     pub client_sessions: Option<usize>,
     /// Most bytes that the states of all sessions take together; larger parameters take more of it [default: 512 KiB
     /// for each of `max-sessions`].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_MAX_SESSION_BYTES"))]
+    #[arg(long, env = "BAGTRACK_MAX_SESSION_BYTES")]
     pub max_session_bytes: Option<usize>,
     /// Most requests with a frame of one client at the same time [default: a quarter of `queue`].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_REQUESTS"))]
+    #[arg(long, env = "BAGTRACK_CLIENT_REQUESTS")]
     pub client_requests: Option<usize>,
     /// Most bytes of the request bodies of one client together [default: a quarter of `max-upload-bytes`].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_CLIENT_UPLOAD_BYTES"))]
+    #[arg(long, env = "BAGTRACK_CLIENT_UPLOAD_BYTES")]
     pub client_upload_bytes: Option<usize>,
     /// Most frames a second of one client; 0 for no limit.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_CLIENT_FRAME_RATE",
         default_value_t = LimitsConfig::default().client_frame_rate
-    ))]
+    )]
     pub client_frame_rate: u32,
     /// Addresses and networks, like `10.0.0.0/8`, separated by commas, whose `Forwarded` or `X-Forwarded-For` tells
     /// the client's address.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, env = "BAGTRACK_TRUSTED_PROXIES", value_delimiter = ',', value_parser = network)
-    )]
+    #[arg(long, env = "BAGTRACK_TRUSTED_PROXIES", value_delimiter = ',', value_parser = network)]
     pub trusted_proxies: Vec<IpNet>,
 }
 
 /// A network, or a single address.
-#[cfg(feature = "cli")]
 fn network(text: &str) -> Result<IpNet, String> {
     let address = || text.parse().map(|address: std::net::IpAddr| address.into());
     let network = text.parse().or_else(|_| address());
@@ -116,7 +110,6 @@ fn network(text: &str) -> Result<IpNet, String> {
 }
 
 /// A duration as flags have it.
-#[cfg(feature = "cli")]
 pub fn shown(duration: Duration) -> String {
     humantime::format_duration(duration).to_string()
 }

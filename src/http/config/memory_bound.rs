@@ -2,7 +2,7 @@
 
 use super::service::Config;
 use crate::sessions::MAX_LIST_BYTES;
-use crate::tracker::MAX_WORKING_SIDE;
+use bagtrack_tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
 pub const MAX_BUFFER_BYTES: usize = 64 << 10;

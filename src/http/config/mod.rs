@@ -6,7 +6,6 @@
 //! the first, [`memory_bound`] computes the second.
 
 pub mod access;
-#[cfg(feature = "cli")]
 pub mod flag_values;
 pub mod limits;
 pub mod memory_bound;

@@ -5,173 +5,166 @@ use super::access::AccessConfig;
 use super::limits::LimitsConfig;
 use super::store::StoreConfig;
 use crate::http::middleware::base_path::BasePath;
-use crate::ingest;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
-#[cfg(feature = "cli")]
 use super::flag_values::{parse_duration, parse_listen};
 
-#[cfg(feature = "cli")]
 use super::limits::shown;
 
 /// What a session with usual parameters is charged at most.
 const USUAL_SESSION_BYTES: usize = 512 << 10;
 
 /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`; a number alone is seconds.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Config {
     /// Address to listen on, or a host's name with a port; port 0 picks a free one.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen, value_parser = parse_listen
-    ))]
+    )]
     pub listen: SocketAddr,
     /// Frames decoded and tracked at the same time [default: the number of cores].
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_WORKERS"))]
+    #[arg(long, env = "BAGTRACK_WORKERS")]
     pub workers: Option<usize>,
     /// Requests with a frame that are inside at the same time, the ones at work included.
-    #[cfg_attr(feature = "cli", arg(long, env = "BAGTRACK_QUEUE", default_value_t = Config::default().queue))]
+    #[arg(long, env = "BAGTRACK_QUEUE", default_value_t = Config::default().queue)]
     pub queue: usize,
     /// Most sessions alive.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_SESSIONS",
         default_value_t = Config::default().max_sessions
-    ))]
+    )]
     pub max_sessions: usize,
     /// Requests at one session at the same time, the one at work included.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_SESSION_QUEUE",
         default_value_t = Config::default().session_queue
-    ))]
+    )]
     pub session_queue: usize,
     /// A session expires when no frame comes for this long.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_SESSION_IDLE",
         default_value = shown(Config::default().session_idle),
         value_parser = parse_duration
-    ))]
+    )]
     pub session_idle: Duration,
     /// A new session expires when its first frame does not come for this long.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_SESSION_FIRST",
         default_value = shown(Config::default().session_first),
         value_parser = parse_duration
-    ))]
+    )]
     pub session_first: Duration,
     /// Most bytes of a request body.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_BODY_BYTES",
         default_value_t = Config::default().max_body_bytes
-    ))]
+    )]
     pub max_body_bytes: usize,
     /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_UPLOAD_BYTES",
         default_value_t = Config::default().max_upload_bytes
-    ))]
+    )]
     pub max_upload_bytes: usize,
     /// Most frames of one post.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_FRAMES",
         default_value_t = Config::default().max_frames
-    ))]
+    )]
     pub max_frames: usize,
     /// Most bytes of one encoded frame.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_FRAME_BYTES",
         default_value_t = Config::default().max_frame_bytes
-    ))]
+    )]
     pub max_frame_bytes: usize,
     /// Longest side of a frame in pixels.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_FRAME_SIDE",
         default_value_t = Config::default().max_frame_side
-    ))]
+    )]
     pub max_frame_side: u32,
     /// Most pixels of a frame.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_FRAME_PIXELS",
         default_value_t = Config::default().max_frame_pixels
-    ))]
+    )]
     pub max_frame_pixels: u64,
     /// Most memory in bytes that decoding one frame may take.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_FRAME_MEMORY",
         default_value_t = Config::default().max_frame_memory
-    ))]
+    )]
     pub max_frame_memory: u64,
     /// Most connections open at the same time.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_MAX_CONNECTIONS",
         default_value_t = Config::default().max_connections
-    ))]
+    )]
     pub max_connections: usize,
     /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
     /// commas; `*` for all. Requests of other pages are refused.
-    #[cfg_attr(
-        feature = "cli",
-        arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')
-    )]
+    #[arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')]
     pub cors_origins: Vec<String>,
     /// The path of the service on a host that it shares with others, like `/tracker`.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_BASE_PATH", value_name = "PATH",
         default_value_t = Config::default().base_path
-    ))]
+    )]
     pub base_path: BasePath,
     /// Time for a client to send its request head; a connection that is idle for longer is closed too.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_HEADER_TIMEOUT",
         default_value = shown(Config::default().header_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub header_timeout: Duration,
     /// Time for a client to send its request body.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_BODY_TIMEOUT",
         default_value = shown(Config::default().body_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub body_timeout: Duration,
     /// Time for a request to wait for its session and a worker and to be worked on.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_WORK_TIMEOUT",
         default_value = shown(Config::default().work_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub work_timeout: Duration,
     /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
     /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_SHUTDOWN_DELAY",
         default_value = shown(Config::default().shutdown_delay),
         value_parser = parse_duration
-    ))]
+    )]
     pub shutdown_delay: Duration,
     /// Time for open requests to end on shutdown.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_SHUTDOWN_TIMEOUT",
         default_value = shown(Config::default().shutdown_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub shutdown_timeout: Duration,
     /// What one request and one client may take.
-    #[cfg_attr(feature = "cli", command(flatten))]
+    #[command(flatten)]
     pub limits: LimitsConfig,
     /// The store that replicas share.
-    #[cfg_attr(feature = "cli", command(flatten))]
+    #[command(flatten)]
     pub store: StoreConfig,
     /// Who may use the service.
-    #[cfg_attr(feature = "cli", command(flatten))]
+    #[command(flatten)]
     pub access: AccessConfig,
 }
 
 impl Default for Config {
     /// The settings that hold where no other is given. Neither flags nor the environment are read.
     fn default() -> Self {
-        let limits = ingest::Limits::default();
+        let limits = bagtrack_ingest::Limits::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             workers: None,
@@ -215,8 +208,8 @@ impl Config {
     }
 
     /// The limits of one frame.
-    pub fn frame_limits(&self) -> ingest::Limits {
-        ingest::Limits {
+    pub fn frame_limits(&self) -> bagtrack_ingest::Limits {
+        bagtrack_ingest::Limits {
             max_bytes: self.max_frame_bytes,
             max_side: self.max_frame_side,
             max_pixels: self.max_frame_pixels,

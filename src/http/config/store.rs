@@ -5,48 +5,42 @@ use crate::sessions::{RedisStore, SessionStore, StoreAddress};
 use std::sync::Arc;
 use std::time::Duration;
 
-#[cfg(feature = "cli")]
 use super::flag_values::parse_duration;
 
-#[cfg(feature = "cli")]
 use super::limits::shown;
 
 /// The store that replicas share. Without one, sessions live in this process only.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[derive(Debug, Clone, clap::Args)]
 pub struct StoreConfig {
     /// Where sessions are stored: `redis://[user:password@]host[:port][/database]`, `valkey` alike, or
     /// `redis-cluster://host:port,host:port`. In builds with the feature `tls`, `rediss` and `valkeys` for TLS.
-    #[cfg_attr(
-        feature = "cli",
-        arg(
-            long,
-            env = "BAGTRACK_STORE",
-            hide_env_values = true,
-            value_name = "URL"
-        )
+    #[arg(
+        long,
+        env = "BAGTRACK_STORE",
+        hide_env_values = true,
+        value_name = "URL"
     )]
     pub store: Option<Secret>,
     /// Write a session's state at every so many frames. Answers say `Checkpoint: N`; after the end of a replica, its
     /// clients send the frames after N again. More than 1 needs a load balancer that keeps a session at one replica.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_STORE_EVERY",
         default_value_t = StoreConfig::default().store_every
-    ))]
+    )]
     pub store_every: u64,
     /// Time for a call to the store.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_STORE_TIMEOUT",
         default_value = shown(StoreConfig::default().store_timeout),
         value_parser = parse_duration
-    ))]
+    )]
     pub store_timeout: Duration,
     /// What the keys in the store begin with. Services that share a server without sharing sessions have different
     /// ones.
-    #[cfg_attr(feature = "cli", arg(
+    #[arg(
         long, env = "BAGTRACK_STORE_PREFIX",
         default_value_t = StoreConfig::default().store_prefix
-    ))]
+    )]
     pub store_prefix: String,
 }
 

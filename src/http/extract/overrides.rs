@@ -2,7 +2,7 @@
 
 use super::settings::{WholeNumber, whole};
 use crate::http::problems::problem::Problem;
-use crate::tracker::{Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::{Map, Value};
 use std::borrow::Cow;

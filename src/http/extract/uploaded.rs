@@ -12,11 +12,11 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::RequestPermit;
 use crate::http::resources::snapshot::MEDIA_TYPE;
 use crate::http::state::AppState;
-use crate::ingest::video::{VideoFormat, video_format};
 use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
+use bagtrack_ingest::video::{VideoFormat, video_format};
 use std::sync::Arc;
 
 /// What curl calls a body, whatever it is.

@@ -207,7 +207,7 @@ fn tracking(make: &Maker) -> TrackingMetrics {
 mod tests {
     use super::*;
     use crate::sessions::PerTarget;
-    use crate::tracker::{Estimate, Rect, Status};
+    use bagtrack_tracker::{Estimate, Rect, Status};
     use std::time::Duration;
 
     #[test]

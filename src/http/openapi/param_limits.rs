@@ -1,6 +1,6 @@
 //! What the document says of the limits on products of sizes: the words of the errors with which they are refused.
 
-use crate::tracker::{Features, Params, Preset};
+use bagtrack_tracker::{Features, Params, Preset};
 
 /// The description of the call that opens a session.
 pub fn create_description() -> String {

@@ -1,7 +1,7 @@
 //! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
 
 use crate::http::extract::overrides::{ParamOverrides, by_name};
-use crate::tracker::{Parameter, Params, Preset};
+use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, SchemaFormat, Type};

@@ -3,11 +3,11 @@
 use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::ingest::IngestError;
 use crate::sessions::{
     QueueFull, ReplayError, SessionBusy, SnapshotError, StoreUnavailable, TooManySessions,
 };
-use crate::tracker::TrackerError;
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
 use std::collections::BTreeMap;
 use utoipa::openapi::{
     ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder,

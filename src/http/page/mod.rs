@@ -1,6 +1,5 @@
 //! The web page, the interactive documentation and the sample clips, all out of the binary.
 
 pub mod docs;
-#[cfg(feature = "eval")]
 pub mod sample_clips;
 pub mod static_files;

@@ -4,12 +4,12 @@
 
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
-use crate::sample::{Clip, Format, Scene, Settings};
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sample::{Clip, Format, Scene, Settings};
 use serde::Serialize;
 use std::sync::{Arc, LazyLock, OnceLock};
 use tokio::sync::Mutex;

@@ -2,13 +2,13 @@
 
 use super::kind::Kind;
 use super::problem::Problem;
-use crate::ingest::IngestError;
 use crate::sessions::{
     ActError, BytesFull, FrameFault, FramesError, NoSession, OpenError, QueueFull, QuotaExhausted,
     ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
     TooManySessions, TrackError, WorkPanicked,
 };
-use crate::tracker::TrackerError;
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
 use std::sync::Arc;
 
 impl From<ReplayError> for Problem {

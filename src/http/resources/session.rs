@@ -9,9 +9,9 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, ImageSize};
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
-use crate::tracker::Params;
 use axum::extract::State;
 use axum::http::{StatusCode, Uri};
+use bagtrack_tracker::Params;
 use serde::Serialize;
 use uuid::Uuid;
 

@@ -10,10 +10,10 @@ use crate::http::state::AppState;
 use crate::sessions::{
     ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
 };
-use crate::tracker::Seen;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::Seen;
 use std::sync::Arc;
 
 /// The header that has the answer as JSON.

@@ -2,8 +2,8 @@
 
 use super::target_box::TargetBox;
 use crate::sessions::{Estimates, PerTarget};
-use crate::tracker::{Estimate, Status};
 use axum::response::{IntoResponse, Response};
+use bagtrack_tracker::{Estimate, Status};
 use serde::Serialize;
 
 /// Bytes of a target in an answer: the value, and its JSON with six numbers.

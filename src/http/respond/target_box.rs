@@ -1,6 +1,6 @@
 //! Boxes as they are sent and received.
 
-use crate::tracker::Rect;
+use bagtrack_tracker::Rect;
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;

@@ -3,7 +3,7 @@
 use super::target_box::{BoxInput, NUMBER, TargetBox, box_forms};
 use crate::http::problems::problem::Problem;
 use crate::sessions::{Boxes, MAX_TARGETS, PerTarget};
-use crate::tracker::Rect;
+use bagtrack_tracker::Rect;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;
 use std::borrow::Cow;

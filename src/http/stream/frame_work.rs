@@ -10,7 +10,7 @@ use crate::sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
     Tracked,
 };
-use crate::tracker::Seen;
+use bagtrack_tracker::Seen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};

@@ -1,11 +1,11 @@
 //! Why an act was not done. None of them changes a session.
 
-use crate::ingest::IngestError;
 use crate::sessions::{
     InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
     StartError, Stopped, StoreUnavailable, TooManySessions, WorkPanicked,
 };
-use crate::tracker::TrackerError;
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
 
 /// Why an act was not done, whatever it was about.
 #[derive(Debug, Clone, thiserror::Error)]

@@ -3,13 +3,13 @@
 
 use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
-use crate::ingest::{self, Limits};
 use crate::sessions::streams::StreamPlace;
 use crate::sessions::{
     ByteCharge, Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError,
     WorkMeter,
 };
-use crate::tracker::{Frame, FrameFormat, Rect, Seen, TrackerError};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Frame, FrameFormat, Rect, Seen, TrackerError};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -130,7 +130,7 @@ impl FrameBatch {
         let estimates = state.advance(&frames, correction, meter, self.min_answers, seen);
         frames
             .into_iter()
-            .for_each(|(_, frame)| ingest::recycle(frame));
+            .for_each(|(_, frame)| bagtrack_ingest::recycle(frame));
         let estimates = estimates.map_err(|error| match error {
             StepError::Refused { index, error } => self.fault(index, error),
             StepError::Stopped(stopped) => stopped.into(),
@@ -155,7 +155,7 @@ impl FrameBatch {
     ) -> Result<(), FramesError> {
         let mut pixels = 0;
         for (index, file) in self.files.iter().enumerate() {
-            let size = ingest::size(file, &limits.frame);
+            let size = bagtrack_ingest::size(file, &limits.frame);
             let (got_width, got_height) = size.map_err(|error| self.fault(index, error))?;
             if (got_width, got_height) != (width, height) {
                 let error = TrackerError::FrameSize {
@@ -203,7 +203,7 @@ impl RequestLimits {
 pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let mut pixels = 0;
     for (index, file) in files.iter().enumerate() {
-        let size = ingest::size(file, &limits.frame);
+        let size = bagtrack_ingest::size(file, &limits.frame);
         let (width, height) = size.map_err(|error| fault_of(index, files.len(), error))?;
         pixels += u64::from(width) * u64::from(height);
     }
@@ -217,7 +217,7 @@ pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<()
 pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
     let sizes = files
         .iter()
-        .filter_map(|file| ingest::size(file, &limits.frame).ok());
+        .filter_map(|file| bagtrack_ingest::size(file, &limits.frame).ok());
     let pixels = sizes.map(|(width, height)| u64::from(width) * u64::from(height));
     limits.check_pixels(pixels.sum(), files.len())
 }
@@ -237,7 +237,7 @@ pub(super) fn decode(
     let decode_one = |(index, file): (usize, &Bytes)| {
         meter.check()?;
         metrics
-            .decoding(|| ingest::decode_to(file, limits, format))
+            .decoding(|| bagtrack_ingest::decode_to(file, limits, format))
             .map_err(|error| fault_of(index, files.len(), error))
     };
     files.iter().enumerate().map(decode_one).collect()

@@ -2,7 +2,6 @@
 
 use super::idempotency::IdempotencyStore;
 use super::tracking_metrics::TrackingMetrics;
-use crate::ingest;
 use crate::sessions::streams::OpenStreams;
 use crate::sessions::{Admission, MacKeys, Registry, SessionStore};
 use metrics::Histogram;
@@ -22,7 +21,7 @@ pub struct ServiceSettings {
     /// Processor time of one request.
     pub max_request_cpu: Duration,
     /// The limits of each frame.
-    pub frame: ingest::Limits,
+    pub frame: bagtrack_ingest::Limits,
     /// Most pixels of the frames of one request together.
     pub max_request_pixels: u64,
     /// Most frames of a request, and most stored answers.

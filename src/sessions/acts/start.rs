@@ -6,7 +6,7 @@ use super::service::SessionService;
 use crate::sessions::{
     Boxes, Fingerprint, PerTarget, SessionState, Stopped, WorkMeter, frame_format,
 };
-use crate::tracker::Params;
+use bagtrack_tracker::Params;
 use bytes::Bytes;
 
 /// What a session begins with.

@@ -5,7 +5,7 @@ use super::frames::{FrameBatch, GivenBox, RequestLimits, check_pixels};
 use super::service::SessionService;
 use super::start::Start;
 use crate::sessions::{Boxes, Estimates, QueuePermit, Stopped, WorkMeter, WorkPanicked};
-use crate::tracker::Params;
+use bagtrack_tracker::Params;
 use bytes::Bytes;
 
 /// Where a track without a session stands.

@@ -1,7 +1,7 @@
 //! What decoding and tracking measure.
 
 use crate::sessions::Estimates;
-use crate::tracker::Status;
+use bagtrack_tracker::Status;
 use metrics::{Counter, Histogram};
 use std::time::{Duration, Instant};
 

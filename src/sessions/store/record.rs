@@ -139,7 +139,7 @@ impl Record {
 pub(crate) mod tests {
     use super::*;
     use crate::sessions::targets::Estimates;
-    use crate::tracker::{Estimate, Rect, Status};
+    use bagtrack_tracker::{Estimate, Rect, Status};
 
     /// A record of a session that was opened at frame 0, at this frame.
     pub(crate) fn record(incarnation: u64, frame: u64) -> Record {

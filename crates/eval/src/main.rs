@@ -1,0 +1,210 @@
+//! The program `bagtrack-eval`: accuracy and speed on annotated sequences.
+//!
+//! Exit status: 0, or 1 after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
+
+use bagtrack_cli::{ParamFlags, frames, output, progress, read_boxes};
+use bagtrack_eval::plots::{self, Evaluated};
+use bagtrack_eval::{
+    Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns, Variant,
+    ablation, parse_sweep, results,
+};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::Params;
+use clap::Parser;
+use std::error::Error;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Measures accuracy and speed on annotated sequences.
+#[derive(Debug, Parser)]
+#[command(name = "bagtrack-eval", version, about)]
+struct Args {
+    /// Sequences in the OTB layout: a folder with img/ and groundtruth_rect.txt each. Files among them are passed over,
+    /// so that `bagtrack-eval sequences/*` works with a note beside the folders.
+    #[arg(required = true, value_name = "DIR")]
+    dirs: Vec<PathBuf>,
+    #[command(flatten)]
+    params: ParamFlags,
+    /// Runs of each sequence, with the seeds 0, 1, 2 …
+    #[arg(long, default_value = "1")]
+    seeds: NonZeroUsize,
+    /// Threads that share the seeds of a sequence. Times (ms/frame) are honest with 1 only.
+    #[arg(long, default_value = "1")]
+    jobs: NonZeroUsize,
+    /// Plays each sequence from its end: the run starts at the last annotated frame.
+    #[arg(long)]
+    backwards: bool,
+    /// Passes over this share of the frames, 0 <= SHARE < 1, from the end with --backwards: the run starts at the first
+    /// annotated frame after them.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    start_at: Option<f64>,
+    /// A table for people, JSON, or a table as markdown.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+    /// What the tracker is without each of its extensions: the means over the sequences, a row each.
+    #[arg(long)]
+    ablate: bool,
+    /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the
+    /// preset as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
+    #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
+    sweep: Option<PathBuf>,
+    /// Fits the coefficients of the score to the frames of all sequences and seeds, and compares them with
+    /// the tracker's.
+    #[arg(long, conflicts_with_all = ["ablate", "sweep", "plots"])]
+    fit_score: bool,
+    /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these
+    /// names.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
+    /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
+    /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at"])]
+    results: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Format {
+    Table,
+    Json,
+    Markdown,
+}
+
+impl Args {
+    fn playback(&self) -> Playback {
+        Playback {
+            backwards: self.backwards,
+            start_at: self.start_at,
+        }
+    }
+}
+
+/// Reads a share of the frames.
+fn share(text: &str) -> Result<f64, String> {
+    let share: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
+    if (0.0..1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("it must be at least 0 and less than 1".to_owned())
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bagtrack-eval: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: Args) -> Result<(), Box<dyn Error>> {
+    let base = args.params.params()?;
+    if args.fit_score && base.discriminant_weight <= 0.0 {
+        return Err(ScoreFitError::NoDiscriminant.into());
+    }
+    let variants = variants(&args, &base)?;
+    let evaluated = evaluate(&args, &base, &variants)?;
+    if args.fit_score {
+        let report = ScoreReport::new(args.params.preset, &evaluated[0].runs)?;
+        let report = report.played(args.playback());
+        return print(args.format, &report, ScoreReport::markdown);
+    }
+    if let Some(dir) = &args.plots {
+        plots::draw(dir, &evaluated)?;
+    }
+    if let Some(dir) = &args.results {
+        results::write(dir, &evaluated[0].runs)?;
+    }
+    let preset = args.params.preset;
+    let mut reports = Vec::new();
+    for (variant, evaluated) in variants.into_iter().zip(&evaluated) {
+        let report = Report::new(preset, &evaluated.runs).ok_or("none of the paths is a folder")?;
+        reports.push((variant, report.played(args.playback())));
+    }
+    if !args.ablate && args.sweep.is_none() {
+        let (_, report) = &reports[0];
+        return print(args.format, report, Report::markdown);
+    }
+    let names = evaluated[0].runs.iter().map(|runs| runs.name.clone());
+    let comparison = Comparison::new(preset, args.seeds.get(), names.collect(), &reports);
+    let comparison = comparison.played(args.playback());
+    print(args.format, &comparison, Comparison::markdown)
+}
+
+/// The preset alone, or what is to be set side by side; at least one.
+fn variants(args: &Args, base: &Params) -> Result<Vec<Variant>, Box<dyn Error>> {
+    let label = args.params.label();
+    if let Some(path) = &args.sweep {
+        let shown = path.display();
+        let text = fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+        return Ok(parse_sweep(&text, base).map_err(|error| format!("{shown}: {error}"))?);
+    }
+    let mut variants = ablation::variants(&label);
+    if !args.ablate {
+        variants.truncate(1);
+    }
+    Ok(variants)
+}
+
+/// Runs every variant on every sequence. Variants with the same parameters are run once.
+fn evaluate(
+    args: &Args,
+    base: &Params,
+    variants: &[Variant],
+) -> Result<Vec<Evaluated>, Box<dyn Error>> {
+    let dirs: Vec<&PathBuf> = args.dirs.iter().filter(|dir| !dir.is_file()).collect();
+    // A wrong path should be told now, not after the sequences before it.
+    for dir in &dirs {
+        frames::list(dir)?;
+        read_boxes(dir)?;
+    }
+    if let Some(dir) = &args.plots {
+        plots::prepare(dir)?;
+    }
+    let mut params = Vec::new();
+    for variant in variants {
+        let set = variant.params(base);
+        params.push(set.map_err(|error| format!("{}: {error}", variant.label))?);
+    }
+    let mut evaluated: Vec<Evaluated> = variants
+        .iter()
+        .map(|variant| Evaluated {
+            label: variant.label.clone(),
+            runs: Vec::new(),
+        })
+        .collect();
+    let bar = progress::bar((dirs.len() * variants.len()) as u64, "sequences");
+    for dir in dirs {
+        let sequence = Sequence::load_played(dir, args.playback(), &Limits::default())?;
+        let mut done: Vec<SequenceRuns> = Vec::new();
+        for (index, set) in params.iter().enumerate() {
+            let same = params[..index].iter().position(|before| before == set);
+            done.push(match same {
+                Some(before) => done[before].clone(),
+                None => bagtrack_eval::run(&sequence, set, args.seeds, args.jobs)?,
+            });
+            bar.inc(1);
+        }
+        for (variant, runs) in evaluated.iter_mut().zip(done) {
+            variant.runs.push(runs);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(evaluated)
+}
+
+fn print<R: serde::Serialize + std::fmt::Display>(
+    format: Format,
+    report: &R,
+    markdown: fn(&R) -> String,
+) -> Result<(), Box<dyn Error>> {
+    let text = match format {
+        Format::Table => report.to_string(),
+        Format::Json => serde_json::to_string_pretty(report)? + "\n",
+        Format::Markdown => markdown(report),
+    };
+    Ok(output::print(&text)?)
+}

@@ -1,0 +1,13 @@
+//! The evaluation: its program, synthetic clips, and the accuracy that is promised.
+
+mod command;
+mod fit_score;
+mod playback;
+mod program;
+mod program_more;
+mod results;
+mod sample_clip;
+mod sample_scenes;
+mod status;
+mod textbook_video;
+mod videos;

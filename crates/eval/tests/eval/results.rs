@@ -1,0 +1,57 @@
+//! `bagtrack-eval --results`: the boxes as other toolkits read them.
+
+use crate::command::{clip, eval, fails, folder, succeeds, text, tracked};
+use bagtrack_cli::parse_boxes;
+use bagtrack_tracker::Preset;
+use std::fs;
+
+#[test]
+fn each_sequence_and_seed_has_a_file_of_the_boxes_that_track_gives() {
+    let parent = folder();
+    let one = clip(parent.path(), "one", 1, 12);
+    let two = clip(parent.path(), "two", 2, 6);
+    let results = parent.path().join("results");
+    let args = [text(&one), text(&two), "--results", text(&results)];
+    succeeds(&[&args[..], &["--seeds", "2"]].concat());
+    for (dir, seed) in [(&one, 0), (&one, 1), (&two, 0), (&two, 1)] {
+        let name = dir.file_name().expect("a folder's name").to_string_lossy();
+        let file = results.join(format!("seed-{seed}/{name}.txt"));
+        let written = fs::read_to_string(file).expect("the file is there");
+        let written = parse_boxes(&written).expect("it has the layout of the benchmark");
+        let first = written[0].expect("every frame has a box");
+        let mut params = Preset::Robust.params();
+        params.seed = seed;
+        let tracked = tracked(dir, first, params);
+        assert_eq!(written.len(), tracked.len());
+        for (written, tracked) in written.iter().zip(tracked) {
+            let written = written.expect("every frame has a box");
+            assert!(written.overlap(&tracked.target) > 0.999, "{written:?}");
+        }
+    }
+    // One seed needs no folder of its own, and older files make way.
+    succeeds(&args);
+    let first = fs::read_to_string(results.join("one.txt")).expect("the file is there");
+    assert_eq!(
+        first,
+        fs::read_to_string(results.join("seed-0/one.txt")).expect("it is there")
+    );
+}
+
+#[test]
+fn results_that_would_mislead_are_refused() {
+    let parent = folder();
+    let one = clip(parent.path(), "clip", 0, 12);
+    let other = parent.path().join("other");
+    fs::create_dir(&other).expect("the folder is writable");
+    let same = clip(&other, "clip", 3, 12);
+    let results = parent.path().join("results");
+    let message = fails(&[text(&one), text(&same), "--results", text(&results)]);
+    assert!(
+        message.contains("two sequences are called clip"),
+        "{message}"
+    );
+    for flag in [&["--backwards"][..], &["--ablate"], &["--start-at", "0.5"]] {
+        let args = [&[text(&one), "--results", text(&results)], flag].concat();
+        assert_eq!(eval(&args).status.code(), Some(2), "{flag:?}");
+    }
+}

@@ -1,0 +1,170 @@
+//! The clips in which the target goes out of sight: nothing of it is seen when the clip says so, and something when
+//! not.
+
+use bagtrack_cli::read_boxes;
+use bagtrack_sample::{Clip, Format, Scene, Settings};
+use image::RgbImage;
+
+/// More than any two pictures of the same thing differ by through the sensor's noise (2.5 of 255 a channel).
+const NOISE: u8 = 28;
+
+fn clip(scene: Scene, seed: u64) -> Clip {
+    Clip::new(Settings {
+        scene,
+        seed,
+        ..Settings::default()
+    })
+    .expect("the settings are in order")
+}
+
+/// The frames in which nothing of the target is seen, which must be in a row.
+fn out_of_sight(clip: &Clip) -> std::ops::Range<u32> {
+    let hidden: Vec<u32> = (0..clip.frames())
+        .filter(|&index| clip.visible(index) == 0.0)
+        .collect();
+    let (first, last) = (hidden[0], hidden[hidden.len() - 1]);
+    assert_eq!(hidden.len() as u32, last + 1 - first, "{hidden:?}");
+    first..last + 1
+}
+
+/// Pixels that differ by more than noise.
+fn changed(one: &RgbImage, other: &RgbImage) -> usize {
+    let pairs = one.pixels().zip(other.pixels());
+    pairs
+        .filter(|(a, b)| (0..3).any(|channel| a.0[channel].abs_diff(b.0[channel]) > NOISE))
+        .count()
+}
+
+/// The card moves in every frame, so pictures that differ by noise alone show nothing of it, and do not tell where
+/// it is.
+fn nothing_is_seen_then_and_only_then(clip: &Clip, hidden: std::ops::Range<u32>) {
+    let empty = clip.draw(hidden.start);
+    for index in hidden.clone() {
+        assert_eq!(changed(&empty, &clip.draw(index)), 0, "frame {index}");
+    }
+    for index in [hidden.start - 2, hidden.end + 1] {
+        let strip = clip.visible(index);
+        assert!(strip > 0.0 && strip < 0.2, "frame {index}: {strip} is seen");
+        assert!(changed(&empty, &clip.draw(index)) > 20, "frame {index}");
+    }
+    for index in [0, clip.frames() - 1] {
+        assert_eq!(clip.visible(index), 1.0);
+        let card = clip.target(index).area() as usize;
+        let seen = changed(&empty, &clip.draw(index));
+        assert!(
+            seen > card * 7 / 10 && seen < card * 11 / 10,
+            "frame {index}: {seen} pixels of {card} changed"
+        );
+    }
+}
+
+#[test]
+fn behind_the_post_nothing_is_seen_for_20_frames() {
+    for seed in 0..3 {
+        let clip = clip(Scene::Covered, seed);
+        let hidden = out_of_sight(&clip);
+        assert_eq!(hidden.len(), 20, "seed {seed}");
+        nothing_is_seen_then_and_only_then(&clip, hidden.clone());
+        // It moves on behind the post by more than its own width, and stays in the frame.
+        let (before, after) = (clip.target(hidden.start), clip.target(hidden.end));
+        assert!((before.x - after.x).abs() > before.width, "seed {seed}");
+        for index in 0..clip.frames() {
+            let card = clip.target(index);
+            assert!(card.x > 0.0 && card.x + card.width < 320.0);
+            assert!(card.y > 0.0 && card.y + card.height < 240.0);
+        }
+    }
+}
+
+#[test]
+fn outside_the_frame_nothing_is_seen_for_25_frames() {
+    for seed in 0..3 {
+        let clip = clip(Scene::Leaves, seed);
+        let hidden = out_of_sight(&clip);
+        assert_eq!(hidden.len(), 25, "seed {seed}");
+        nothing_is_seen_then_and_only_then(&clip, hidden.clone());
+        let (before, after) = (clip.target(hidden.start - 1), clip.target(hidden.end));
+        let (at_left, same) = (before.x < 160.0, after.x < 160.0);
+        assert_eq!(at_left, same, "seed {seed}: it came back elsewhere");
+        assert!(
+            (before.y - after.y).abs() > before.height,
+            "seed {seed}: it came back where it left"
+        );
+        assert_eq!(clip.covered(hidden.start), 0.0);
+    }
+}
+
+#[test]
+fn the_target_never_jumps() {
+    for (scene, seed) in [Scene::Covered, Scene::Leaves]
+        .into_iter()
+        .flat_map(|scene| (0..4).map(move |seed| (scene, seed)))
+    {
+        let clip = clip(scene, seed);
+        for index in 1..clip.frames() {
+            let (now, before) = (clip.target(index).center(), clip.target(index - 1).center());
+            let step = (now.0 - before.0).hypot(now.1 - before.1);
+            assert!(step < 8.0, "{scene:?}, frame {index}: {step} pixels");
+        }
+    }
+}
+
+#[test]
+fn seeds_choose_the_side() {
+    for scene in [Scene::Covered, Scene::Leaves] {
+        let starts: Vec<f64> = (0..8).map(|seed| clip(scene, seed).target(0).x).collect();
+        let (least, most) = starts
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(least, most), &x| {
+                (least.min(x), most.max(x))
+            });
+        assert!(most - least > 10.0, "{scene:?}: {starts:?}");
+    }
+}
+
+#[test]
+fn long_and_short_clips_hide_the_target_as_long() {
+    for (scene, frames, hidden) in [
+        (Scene::Covered, 90, 20),
+        (Scene::Covered, 401, 20),
+        (Scene::Leaves, 90, 25),
+        (Scene::Leaves, 401, 25),
+    ] {
+        let clip = Clip::new(Settings {
+            scene,
+            frames,
+            ..Settings::default()
+        })
+        .expect("the settings are in order");
+        assert_eq!(
+            out_of_sight(&clip).len(),
+            hidden,
+            "{scene:?}, {frames} frames"
+        );
+        assert_eq!((clip.visible(0), clip.visible(frames - 1)), (1.0, 1.0));
+    }
+}
+
+#[test]
+fn frames_out_of_sight_are_not_annotated_in_the_folder() {
+    let parent = tempfile::tempdir().expect("the system has a place for temporary folders");
+    let clip = clip(Scene::Leaves, 1);
+    clip.write(parent.path(), Format::Jpeg, || ())
+        .expect("the folder is writable");
+    let boxes = read_boxes(parent.path()).expect("it was written");
+    let visible =
+        std::fs::read_to_string(parent.path().join("visible.txt")).expect("it was written");
+    let visible: Vec<&str> = visible.lines().collect();
+    assert_eq!((boxes.len(), visible.len()), (150, 150));
+    for index in 0..clip.frames() {
+        let (found, seen) = (boxes[index as usize], visible[index as usize]);
+        if clip.visible(index) == 0.0 {
+            assert_eq!((found, seen), (None, "0"), "frame {index}");
+        } else {
+            let found = found.expect("it is seen");
+            let card = clip.target(index);
+            assert!((found.x - card.x).abs() < 1e-3 && (found.height - card.height).abs() < 1e-3);
+            assert_eq!(seen, "1", "frame {index}");
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! An image as a file stores it, and the frame that it becomes.
+
+use super::orientation;
+use super::scratch::Planes;
+use bagtrack_tracker::{Frame, FrameError, FrameFormat, area_average, ycbcr};
+use image::metadata::Orientation;
+use std::borrow::Cow;
+
+/// Values of one channel, row by row.
+pub(super) struct Channel<'a> {
+    pub(super) values: Cow<'a, [u8]>,
+    /// Width and height.
+    pub(super) size: (u32, u32),
+}
+
+/// Luma and chroma as stored in the file, before they are turned upright.
+pub(super) struct StoredImage<'a> {
+    pub(super) luma: Channel<'a>,
+    /// Cb and Cr, mostly smaller than the luma.
+    pub(super) chroma: Option<[Channel<'a>; 2]>,
+    /// Width and height of the image in the file: larger than the luma where the decoder has reduced it.
+    pub(super) source: (u32, u32),
+    /// How it is to be turned.
+    pub(super) orientation: Orientation,
+}
+
+impl StoredImage<'_> {
+    /// Turns it upright and reduces it to `format`, in the memory of `planes`.
+    pub(super) fn into_frame(
+        self,
+        format: FrameFormat,
+        [luma, cb, cr]: Planes,
+    ) -> Result<Frame, FrameError> {
+        let source = orientation::upright(self.source, self.orientation);
+        let upright = |channel: Channel<'_>, size, memory| {
+            channel.upright(self.orientation).resized(size, memory)
+        };
+        let of_luma = orientation::upright(self.luma.size, self.orientation);
+        // Frames of another size than the session's are decoded too, and refused there.
+        let size = (format.size.0.min(of_luma.0), format.size.1.min(of_luma.1));
+        let half = ycbcr::chroma_size(size);
+        let luma = upright(self.luma, size, luma);
+        let chroma = self
+            .chroma
+            .map(|[of_cb, of_cr]| [upright(of_cb, half, cb), upright(of_cr, half, cr)]);
+        Frame::from_reduced(source, size, luma, chroma)
+    }
+}
+
+impl Channel<'_> {
+    fn upright(mut self, orientation: Orientation) -> Self {
+        if orientation != Orientation::NoTransforms {
+            let values = self.values.into_owned();
+            self.values = Cow::Owned(orientation::apply(values, &mut self.size, orientation));
+        }
+        self
+    }
+
+    /// The area average in `size`, in the given memory. Along a side that is to be longer values are repeated.
+    fn resized(self, size: (u32, u32), mut memory: Vec<u8>) -> Vec<u8> {
+        memory.clear();
+        if self.size == size {
+            memory.extend_from_slice(&self.values);
+            return memory;
+        }
+        let longer = (self.size.0.max(size.0), self.size.1.max(size.1));
+        if longer == self.size {
+            area_average(&self.values, self.size, size, &mut memory);
+            return memory;
+        }
+        let at = |index: u32, from: u32, to: u32| {
+            (u64::from(index) * u64::from(from) / u64::from(to)) as usize
+        };
+        let mut repeated = Vec::with_capacity(longer.0 as usize * longer.1 as usize);
+        for y in 0..longer.1 {
+            let width = self.size.0 as usize;
+            let row = &self.values[at(y, self.size.1, longer.1) * width..][..width];
+            repeated.extend((0..longer.0).map(|x| row[at(x, self.size.0, longer.0)]));
+        }
+        area_average(&repeated, longer, size, &mut memory);
+        memory
+    }
+}

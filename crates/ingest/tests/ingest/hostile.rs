@@ -1,0 +1,237 @@
+//! Ingest of damaged and hostile bytes: an error that says what is wrong, never a panic, never a large bill.
+
+use bagtrack_ingest::{IngestError, Limits, decode};
+use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, encode, jpeg};
+use image::{DynamicImage, ImageFormat};
+use proptest::prelude::*;
+
+const SMALL: Limits = Limits {
+    max_bytes: 1 << 20,
+    max_side: 512,
+    max_pixels: 512 * 512,
+    max_memory: 16 << 20,
+};
+
+fn files() -> Vec<(&'static str, Vec<u8>)> {
+    let picture = color(61, 47);
+    let image: DynamicImage = picture.clone().into();
+    let progressive = JpegForm {
+        scans: Some(5),
+        ..BASELINE
+    };
+    let restarts = JpegForm {
+        restart: Some(2),
+        ..BASELINE
+    };
+    vec![
+        ("baseline JPEG", jpeg(&picture, BASELINE, Some(6))),
+        ("progressive JPEG", jpeg(&picture, progressive, None)),
+        ("JPEG with restarts", jpeg(&picture, restarts, None)),
+        ("PNG", encode(&image, ImageFormat::Png)),
+        (
+            "16-bit PNG",
+            encode(&image.to_rgba16().into(), ImageFormat::Png),
+        ),
+        ("WebP", encode(&image, ImageFormat::WebP)),
+    ]
+}
+
+#[test]
+fn a_file_cut_anywhere_is_an_error() {
+    for (name, bytes) in files() {
+        decode(&bytes, &SMALL).expect("the whole file is valid");
+        for length in 0..bytes.len() {
+            let result = decode(&bytes[..length], &SMALL);
+            assert!(
+                result.is_err(),
+                "{name} of {} bytes, cut to {length}",
+                bytes.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_jpeg_cut_in_its_data_and_closed_with_an_end_marker_is_an_error() {
+    // Some cameras and proxies close what they cut.
+    // zune-jpeg 0.5.15 by itself makes gray blocks of what lacks, in strict mode too.
+    let picture = color(160, 480);
+    for scans in [None, Some(5)] {
+        let bytes = jpeg(&picture, JpegForm { scans, ..BASELINE }, None);
+        decode(&bytes, &SMALL).expect("the whole file is valid");
+        for kept in (20..=95).step_by(5) {
+            let cut = [&bytes[..bytes.len() * kept / 100], &[0xFF, 0xD9]].concat();
+            assert!(
+                decode(&cut, &SMALL).is_err(),
+                "scans {scans:?}, {kept} % kept"
+            );
+        }
+    }
+}
+
+#[test]
+fn bytes_after_the_end_are_ignored() {
+    for (name, bytes) in files() {
+        let longer = [bytes.as_slice(), b"trailing"].concat();
+        assert_eq!(decode(&longer, &SMALL), decode(&bytes, &SMALL), "{name}");
+    }
+}
+
+#[test]
+fn other_types_and_no_bytes_are_an_unknown_format() {
+    for bytes in [
+        b"".as_slice(),
+        b"GIF89a",
+        b"<svg/>",
+        b"BM",
+        b"RIFF\0\0\0\0WAVE",
+        &[0xFF, 0xD8],
+    ] {
+        assert_eq!(decode(bytes, &SMALL), Err(IngestError::UnknownFormat));
+    }
+}
+
+#[test]
+fn each_limit_is_named_with_both_numbers() {
+    let bytes = jpeg(&color(300, 200), BASELINE, None);
+    let too_large = |limits: Limits| match decode(&bytes, &limits) {
+        Err(IngestError::TooLarge(text)) => text,
+        other => panic!("expected a limit, got {other:?}"),
+    };
+    let text = too_large(Limits {
+        max_bytes: 100,
+        ..SMALL
+    });
+    assert!(
+        text.contains("100") && text.contains(&bytes.len().to_string()),
+        "{text}"
+    );
+    let text = too_large(Limits {
+        max_side: 299,
+        ..SMALL
+    });
+    assert!(text.contains("300") && text.contains("299"), "{text}");
+    let text = too_large(Limits {
+        max_pixels: 59_999,
+        ..SMALL
+    });
+    assert!(text.contains("60000") && text.contains("59999"), "{text}");
+    let text = too_large(Limits {
+        max_memory: 1000,
+        ..SMALL
+    });
+    assert!(text.contains("memory") && text.contains("1000"), "{text}");
+    for format in [ImageFormat::Png, ImageFormat::WebP] {
+        let bytes = encode(&color(300, 200).into(), format);
+        for limits in [
+            Limits {
+                max_side: 299,
+                ..SMALL
+            },
+            Limits {
+                max_pixels: 59_999,
+                ..SMALL
+            },
+            Limits {
+                max_memory: 1000,
+                ..SMALL
+            },
+        ] {
+            let result = decode(&bytes, &limits);
+            assert!(
+                matches!(result, Err(IngestError::TooLarge(_))),
+                "{format:?}: {result:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_few_hundred_bytes_that_claim_forty_million_pixels_are_refused_unread() {
+    let mut bytes = jpeg(&color(16, 16), BASELINE, None);
+    let header = bytes
+        .windows(2)
+        .position(|pair| pair == [0xFF, 0xC0])
+        .expect("a baseline file has a frame header");
+    bytes[header + 5..header + 7].copy_from_slice(&4882u16.to_be_bytes());
+    bytes[header + 7..header + 9].copy_from_slice(&8192u16.to_be_bytes());
+    let error = decode(&bytes, &Limits::default()).expect_err("it has almost no data");
+    assert!(
+        error.to_string().contains("less data than its size needs"),
+        "{error}"
+    );
+}
+
+#[test]
+fn arithmetic_and_lossless_jpegs_are_a_typed_error() {
+    let bytes = jpeg(&color(32, 32), BASELINE, None);
+    for start_of_frame in [0xC3, 0xC5, 0xC9, 0xCA, 0xCB] {
+        let mut other = bytes.clone();
+        let header = other.windows(2).position(|pair| pair == [0xFF, 0xC0]);
+        other[header.expect("a baseline file has a frame header") + 1] = start_of_frame;
+        let result = decode(&other, &SMALL);
+        assert!(
+            matches!(result, Err(IngestError::Damaged { format: "JPEG", .. })),
+            "{result:?}"
+        );
+    }
+}
+
+/// A valid file with some bytes changed, a piece dropped and a piece repeated.
+fn mutated() -> impl Strategy<Value = Vec<u8>> {
+    let edits = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..8);
+    let place = any::<prop::sample::Index>;
+    (
+        0..files().len(),
+        edits,
+        place(),
+        0..40usize,
+        place(),
+        0..40usize,
+    )
+        .prop_map(|(which, edits, drop_at, dropped, repeat_at, repeated)| {
+            let mut bytes = files().swap_remove(which).1;
+            for (at, value) in edits {
+                let at = at.index(bytes.len());
+                bytes[at] = value;
+            }
+            let from = drop_at.index(bytes.len());
+            bytes.drain(from..(from + dropped).min(bytes.len()));
+            let from = repeat_at.index(bytes.len());
+            let piece = bytes[from..(from + repeated).min(bytes.len())].to_vec();
+            bytes.splice(from..from, piece);
+            bytes
+        })
+}
+
+/// Whatever it is, the answer is an error or a frame within the limits.
+fn check(bytes: &[u8]) {
+    if let Ok(frame) = decode(bytes, &SMALL) {
+        let (width, height) = frame.source_size();
+        assert!(width <= SMALL.max_side && height <= SMALL.max_side);
+        assert!(u64::from(width) * u64::from(height) <= SMALL.max_pixels);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mutated_files_never_panic(bytes in mutated()) {
+        check(&bytes);
+    }
+
+    #[test]
+    fn random_bytes_behind_a_signature_never_panic(
+        signature in prop::sample::select(vec![
+            b"\xFF\xD8\xFF".to_vec(),
+            b"\x89PNG\r\n\x1a\n".to_vec(),
+            b"RIFF\x40\0\0\0WEBPVP8 ".to_vec(),
+            b"RIFF\x40\0\0\0WEBPVP8L".to_vec(),
+            b"RIFF\x40\0\0\0WEBPVP8X".to_vec(),
+        ]),
+        rest in prop::collection::vec(any::<u8>(), 0..400),
+    ) {
+        check(&[signature, rest].concat());
+    }
+}

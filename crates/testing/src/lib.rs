@@ -1,0 +1,22 @@
+//! What the tests, benchmarks, examples and the load generator share.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`scene`] | drawn frames for the tracker's tests |
+//! | [`bench_scene`] | drawn frames for the benchmarks and the load generator |
+//! | [`bench_pictures`] | the same as JPEG |
+//! | [`textbook`] | sections III-B and III-D of the paper as printed: the oracle of the tracker's evaluation |
+//! | [`picture_files`] | JPEG, PNG and WebP files of many forms |
+//! | [`cpu_time`] | times of actions in turns, in processor time of the thread |
+//! | [`command`] | the programs of the workspace, run in folders that go away |
+//! | [`service`] | services under test: in the process, as processes, behind a line that breaks |
+
+pub mod bench_pictures;
+pub mod bench_scene;
+pub mod command;
+pub mod cpu_time;
+pub mod picture_files;
+pub mod scene;
+#[cfg(feature = "service")]
+pub mod service;
+pub mod textbook;

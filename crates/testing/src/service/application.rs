@@ -1,0 +1,192 @@
+//! The service on a free port, driven by named methods.
+
+use super::pictures;
+use bagtrack::http::{Application, Config};
+use bagtrack::sessions::Clock;
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode, Url};
+use serde_json::Value;
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+
+/// The box of the target in `pictures::scene(0)`.
+pub const BOX: &str = "20,15,16,12";
+
+/// A running service.
+pub struct TestApplication {
+    pub address: SocketAddr,
+    pub client: Client,
+    pub clock: Clock,
+    /// The API key or session token that requests are sent with.
+    pub key: Option<String>,
+    stop: Option<oneshot::Sender<()>>,
+    served: JoinHandle<bool>,
+}
+
+impl TestApplication {
+    /// Starts with the default settings.
+    pub async fn start() -> Self {
+        Self::start_with(|_| ()).await
+    }
+
+    /// Starts with other settings. Time limits are long, so that a busy machine does not fail a test.
+    pub async fn start_with(change: impl FnOnce(&mut Config)) -> Self {
+        let mut config = Config {
+            listen: "127.0.0.1:0".parse().unwrap(),
+            workers: Some(2),
+            body_timeout: Duration::from_secs(60),
+            work_timeout: Duration::from_secs(60),
+            shutdown_delay: Duration::ZERO,
+            ..Config::default()
+        };
+        change(&mut config);
+        let first = config.access.api_keys.first();
+        let key = first.and_then(|named| named.text().split_once(':'));
+        let key = key.map(|(_, key)| key.to_owned());
+        let clock = Clock::default();
+        let application = Application::bind_with_clock(config, clock.clone());
+        let application = application.await.expect("a free port");
+        let panics = axum::routing::get(async || -> () { panic!("a test panics in a handler") });
+        let application = application.with_routes(axum::Router::new().route("/panic", panics));
+        let (stop, stopped) = oneshot::channel::<()>();
+        Self {
+            address: application.local_addr().unwrap(),
+            client: Client::new(),
+            clock,
+            key,
+            stop: Some(stop),
+            served: tokio::spawn(application.serve(async {
+                let _ = stopped.await;
+            })),
+        }
+    }
+
+    /// Asks the service to end.
+    pub fn shut_down(&mut self) {
+        let stop = self.stop.take().expect("asked once");
+        stop.send(()).unwrap();
+    }
+
+    /// Waits for the end; gives whether all open requests ended in time.
+    pub async fn ended(self) -> bool {
+        self.served.await.unwrap()
+    }
+
+    pub fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
+        let url = format!("http://{}{path}", self.address);
+        let url = match query {
+            [] => Url::parse(&url),
+            query => Url::parse_with_params(&url, query),
+        };
+        let request = self.client.request(method, url.unwrap());
+        match &self.key {
+            Some(key) => request.bearer_auth(key),
+            None => request,
+        }
+    }
+
+    pub async fn get(&self, path: &str) -> Response {
+        self.request(Method::GET, path, &[]).send().await.unwrap()
+    }
+
+    /// `POST /sessions` with a raw body.
+    pub async fn create(&self, frame: Vec<u8>, query: &[(&str, &str)]) -> Response {
+        let request = self.request(Method::POST, "/sessions", query);
+        request.body(frame).send().await.unwrap()
+    }
+
+    /// Opens a session on the first drawn frame, with seed 7.
+    pub async fn open(&self) -> String {
+        let response = self
+            .create(pictures::png(0), &[("box", BOX), ("seed", "7")])
+            .await;
+        let created = expect(response, StatusCode::CREATED).await;
+        created["id"].as_str().unwrap().to_owned()
+    }
+
+    /// `POST /sessions/{id}/frames` with a raw body.
+    pub async fn post_frame(&self, id: &str, frame: Vec<u8>) -> Response {
+        let path = format!("/sessions/{id}/frames");
+        let request = self.request(Method::POST, &path, &[]);
+        request.body(frame).send().await.unwrap()
+    }
+
+    /// `POST /sessions/{id}/frames?frame=N` with a raw body.
+    pub async fn post_numbered(&self, id: &str, number: u64, frame: Vec<u8>) -> Response {
+        let path = format!("/sessions/{id}/frames");
+        let number = number.to_string();
+        let request = self.request(Method::POST, &path, &[("frame", &number)]);
+        request.body(frame).send().await.unwrap()
+    }
+
+    /// `PUT /sessions/{id}/target` with a raw body.
+    pub async fn put_target(&self, id: &str, frame: Vec<u8>, query: &[(&str, &str)]) -> Response {
+        let path = format!("/sessions/{id}/target");
+        let request = self.request(Method::PUT, &path, query);
+        request.body(frame).send().await.unwrap()
+    }
+
+    pub async fn get_session(&self, id: &str) -> Response {
+        self.get(&format!("/sessions/{id}")).await
+    }
+
+    /// The number of frames that the session has taken.
+    pub async fn frames_of(&self, id: &str) -> u64 {
+        let view = expect(self.get_session(id).await, StatusCode::OK).await;
+        view["frames"].as_u64().unwrap()
+    }
+
+    pub async fn delete_session(&self, id: &str) -> Response {
+        let request = self.request(Method::DELETE, &format!("/sessions/{id}"), &[]);
+        request.send().await.unwrap()
+    }
+
+    /// `GET /sessions/{id}/snapshot`.
+    pub async fn snapshot_of(&self, id: &str) -> Response {
+        self.get(&format!("/sessions/{id}/snapshot")).await
+    }
+
+    /// The bytes of a session.
+    pub async fn snapshot(&self, id: &str) -> Vec<u8> {
+        let response = self.snapshot_of(id).await;
+        assert_eq!(response.status(), StatusCode::OK);
+        let media_type = bagtrack::http::SNAPSHOT_MEDIA_TYPE;
+        assert_eq!(response.headers()["content-type"], media_type);
+        response.bytes().await.unwrap().to_vec()
+    }
+}
+
+/// The JSON of a response that must have this status.
+pub async fn expect(response: Response, status: StatusCode) -> Value {
+    let got = response.status();
+    let text = response.text().await.unwrap();
+    assert_eq!(got, status, "{text}");
+    serde_json::from_str(&text).unwrap_or(Value::Null)
+}
+
+/// The JSON of a response that must be this problem.
+pub async fn expect_problem(response: Response, slug: &str) -> Value {
+    let headers = response.headers().clone();
+    let status = response.status().as_u16();
+    let path = response.url().path().to_owned();
+    let text = response.text().await.unwrap();
+    let problem: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{status}: {text}"));
+    assert_eq!(
+        problem["type"],
+        format!("urn:bagtrack:problem:{slug}"),
+        "{text}"
+    );
+    assert_eq!(headers["content-type"], "application/problem+json");
+    assert_eq!(problem["status"], status);
+    assert_eq!(problem["instance"], path);
+    assert_eq!(
+        problem["request_id"],
+        headers["x-request-id"].to_str().unwrap()
+    );
+    assert!(!problem["title"].as_str().unwrap().is_empty());
+    assert!(!problem["detail"].as_str().unwrap().is_empty());
+    let may_retry = matches!(status, 429 | 503);
+    assert_eq!(headers.contains_key("retry-after"), may_retry, "{text}");
+    problem
+}

@@ -1,0 +1,7 @@
+//! Services under test.
+
+pub mod application;
+pub mod lossy;
+pub mod pictures;
+pub mod replica;
+pub mod server;

@@ -1,0 +1,30 @@
+//! The answer to one frame.
+
+use serde::{Deserialize, Serialize};
+
+use crate::image::rect::Rect;
+
+/// Whether the tracker believes its own box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The box is on the target.
+    Tracking,
+    /// The box may be on the target.
+    Uncertain,
+    /// The target is out of sight; the box is the best guess.
+    Lost,
+}
+
+/// The answer to one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Which frame this answers; the first frame of a session is 0.
+    pub frame: u64,
+    /// Where the target is, in the pixels of the uploaded frame.
+    pub target: Rect,
+    /// The chance, in [0, 1], that the box overlaps the target by half or more.
+    pub score: f32,
+    /// What the score and its history mean.
+    pub status: Status,
+}

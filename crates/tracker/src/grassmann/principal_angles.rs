@@ -1,0 +1,69 @@
+//! The principal angles between two subspaces (equations 6 and 7).
+//!
+//! Their cosines are the singular values of EᵀF, so the squares of these are the eigenvalues of (EᵀF)ᵀ EᵀF. In double
+//! precision that leaves the smallest cosine off by 1e-8. There is one such matrix for each candidate and entry, a
+//! thousand a frame: nalgebra's `singular_values` takes five times as long, and stops early where singular values are
+//! small (dimforge/nalgebra issue 1172).
+
+use nalgebra::{SMatrix, SimdPartialOrd, SimdValue};
+
+use crate::grassmann::Lanes;
+use crate::linalg::{acos, jacobi};
+
+/// ‖Θ‖² (equation 6) of the `dim` smallest principal angles, in radians², of bases with these products EᵀF.
+#[inline(always)]
+pub(crate) fn squared_norm<const N: usize>(products: &SMatrix<Lanes, N, N>, dim: Lanes) -> Lanes {
+    let squared_cosines = jacobi::eigenvalues(products.tr_mul(products));
+    let mut sum = Lanes::splat(0.0);
+    for (j, squares) in squared_cosines.iter().enumerate() {
+        let squared_angles = Lanes::from(acos::squared_angles(&squares.0));
+        let is_among = dim.simd_gt(Lanes::splat(j as f64));
+        sum += squared_angles.select(is_among, Lanes::splat(0.0));
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Rotation3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn the_cosines_of_known_angles_are_found_in_any_bases() {
+        let turn =
+            |axis: Vector3<f64>, angle: f64| Rotation3::new(axis.normalize() * angle).into_inner();
+        let (left, right) = (
+            turn(Vector3::new(1.0, 2.0, 3.0), 0.7),
+            turn(Vector3::new(-2.0, 1.0, 0.5), 1.9),
+        );
+        for angles in [
+            [0.0, 0.0, 0.0],
+            [1e-6, 1e-3, 0.1],
+            [0.3, 0.3, 1.2],
+            [0.0, 1.56, 1.568],
+            [0.5, 1.0, std::f64::consts::FRAC_PI_2],
+        ] {
+            let cosines = Vector3::from(angles.map(f64::cos));
+            let product = left * Matrix3::from_diagonal(&cosines) * right;
+            for dim in 0..=3 {
+                let expected: f64 = angles[..dim].iter().map(|angle| angle * angle).sum();
+                let found = squared_norm(&product.map(Lanes::splat), Lanes::splat(dim as f64)).0[7];
+                assert!(
+                    (found - expected).abs() < 1e-7,
+                    "{angles:?}, {dim}: {found}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn zero_columns_are_right_angles_and_tiny_ones_stay_finite() {
+        for value in [0.0, 1e-30, 1e-160, 1e-300] {
+            let product = SMatrix::<Lanes, 6, 6>::repeat(Lanes::splat(value));
+            let found = squared_norm(&product, Lanes::splat(6.0)).0[0];
+            let right = std::f64::consts::FRAC_PI_2.powi(2);
+            assert!((found - 6.0 * right).abs() < 1e-7, "{value}: {found}");
+        }
+    }
+}

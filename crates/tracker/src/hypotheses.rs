@@ -1,0 +1,107 @@
+//! The hypotheses of a frame: particles are proposed, and weighed by all that is known of them.
+
+use rand_chacha::ChaCha8Rng;
+
+use crate::appearance::color_histogram::ColorPixels;
+use crate::features::extractor::Extractor;
+use crate::image::frame::Frame;
+use crate::linalg::scratch::clear_and_reserve;
+use crate::motion::search::{self, SearchContext};
+use crate::motion::{orientation, resampling};
+use crate::params::table::Search;
+use crate::state::State;
+use crate::workspace::Scratch;
+
+impl State {
+    /// (A) Draws the first round of particles, in the channels of `image` that it computes.
+    pub fn propose(
+        &self,
+        image: &Frame,
+        search: &SearchContext<'_>,
+        draws: &mut ChaCha8Rng,
+        scratch: &mut Scratch,
+    ) {
+        let (bounds, params, radius) = (&self.bounds, &self.params, search.window_radius());
+        scratch.candidates.begin(self, orientation::HYPOTHESES);
+        clear_and_reserve(&mut scratch.log_priors, search::max_count(params));
+        clear_and_reserve(&mut scratch.original, search::max_count(params));
+        let extractor = &mut scratch.extractor;
+        let particles = &mut scratch.candidates.particles;
+        match params.search {
+            Search::Resampled => {
+                let cloud = (&self.particles[..], &self.weights[..]);
+                let sums = &mut scratch.sums;
+                resampling::resample(cloud, params, bounds, draws, sums, particles);
+                extractor.compute_channels(image, particles, radius, bounds, params);
+            }
+            Search::Answer => {
+                extractor.compute_channels(image, &[self.answer], radius, bounds, params);
+                let dense_search = &mut scratch.dense_search;
+                let foreground = &mut scratch.foreground;
+                let pixels = ColorPixels::of(image, self.format.has_color);
+                foreground.compute(pixels, &self.color, &self.answer, radius, bounds);
+                dense_search.run(extractor, search, &self.discriminant, foreground);
+                let cell = Extractor::cell_size(&self.answer, bounds, params);
+                search.propose(&dense_search.maxima, cell, draws, particles);
+            }
+        }
+    }
+
+    /// Compares the surroundings with those of the frame in which the target was last seen.
+    pub fn test_for_change(
+        &self,
+        frame: &Frame,
+        search: &SearchContext<'_>,
+        scratch: &mut Scratch,
+    ) {
+        if self.params.static_penalty > 0.0 {
+            let displaced = search.in_original(search.displaced());
+            let test = &mut scratch.change_test;
+            test.load(frame, &self.answer, &self.bounds);
+            test.compare(
+                &self.last_seen,
+                &displaced,
+                search.window_radius(),
+                &self.bounds,
+            );
+        }
+    }
+
+    /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`.
+    /// Returns the most likely one of all.
+    pub fn weigh(&self, image: &Frame, search: &SearchContext<'_>, scratch: &mut Scratch) -> usize {
+        scratch
+            .candidates
+            .describe_and_compare(image, &mut scratch.extractor, self);
+        self.push_log_priors(search, scratch);
+        scratch.candidates.weigh(&scratch.log_priors, &self.params)
+    }
+
+    /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
+    /// there.
+    fn push_log_priors(&self, search: &SearchContext<'_>, scratch: &mut Scratch) {
+        let known = scratch.log_priors.len();
+        let new = &scratch.candidates.particles[known..];
+        let weight = self.params.histogram_weight;
+        let (foreground, scale) = (&scratch.foreground, self.answer.scale);
+        let last = self.update_gate.last_distance;
+        let log_priors = new.iter().enumerate().map(|(index, particle)| {
+            let distance = scratch.candidates.distances_of(known + index)[0];
+            let prior_width = search::prior_width(last, distance);
+            search.log_prior(particle, prior_width)
+                + weight * foreground.mean(particle, scale, &self.bounds)
+        });
+        scratch.log_priors.extend(log_priors);
+        if self.params.static_penalty > 0.0 {
+            scratch.original.clear();
+            let original = new.iter().map(|&particle| search.in_original(particle));
+            scratch.original.extend(original);
+            scratch.change_test.penalize(
+                &scratch.original,
+                &self.bounds,
+                self.params.static_penalty,
+                &mut scratch.log_priors[known..],
+            );
+        }
+    }
+}

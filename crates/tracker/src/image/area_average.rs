@@ -1,0 +1,188 @@
+//! Exact area averaging, in integers.
+//!
+//! Along each axis, target pixel `o` covers the source interval `[o * S / T, (o + 1) * S / T)` for source size `S` and
+//! target size `T`. In units of `1 / T` source pixel every interval has the length `S`, and its shares of source pixels
+//! are whole numbers too. So the average is exact up to the final rounding.
+
+use pulp::{Arch, Simd};
+
+/// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
+/// `1 / T`.
+struct Cell {
+    begin: usize,
+    end: usize,
+    before: u32,
+    after: u32,
+}
+
+/// The source pixels that each target pixel covers, `target <= source`.
+fn cells(source: u32, target: u32) -> Vec<Cell> {
+    let (source, target) = (u64::from(source), u64::from(target));
+    (0..target)
+        .map(|index| {
+            let (from, until) = (index * source, (index + 1) * source);
+            let (begin, end) = (from.div_ceil(target), until / target);
+            Cell {
+                begin: begin as usize,
+                end: end as usize,
+                before: (begin * target - from) as u32,
+                after: (until - end * target) as u32,
+            }
+        })
+        .collect()
+}
+
+/// The area average of `luma` (`source` = width, height, row by row) on a grid of `target` = width, height. No target
+/// side is longer than its source side. The averages are appended to `out`.
+#[pulp::with_simd(area_average = Arch::new())]
+#[inline(always)]
+pub fn area_average_simd<S: Simd>(
+    _: S,
+    luma: &[u8],
+    source: (u32, u32),
+    target: (u32, u32),
+    out: &mut Vec<u8>,
+) {
+    let is_whole = source.0.is_multiple_of(target.0);
+    let columns = cells(source.0, target.0);
+    let width = source.0 as usize;
+    out.reserve_exact(target.0 as usize * target.1 as usize);
+    // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
+    // source height; 255 times that stays far below 2^32 for any image that fits into memory.
+    let mut sums = vec![0_u32; width];
+    for cell in cells(source.1, target.1) {
+        sums.fill(0);
+        let first = cell.begin - usize::from(cell.before > 0);
+        let end = cell.end + usize::from(cell.after > 0);
+        let rows = luma.chunks_exact(width).enumerate();
+        for (index, row) in rows.take(end).skip(first) {
+            let share = match index {
+                _ if index < cell.begin => cell.before,
+                _ if index >= cell.end => cell.after,
+                _ => target.1,
+            };
+            for (sum, &value) in sums.iter_mut().zip(row) {
+                *sum += u32::from(value) * share;
+            }
+        }
+        match source.0 / target.0 {
+            2 if is_whole => average_whole::<2>(&sums, source.1, out),
+            3 if is_whole => average_whole::<3>(&sums, source.1, out),
+            4 if is_whole => average_whole::<4>(&sums, source.1, out),
+            6 if is_whole => average_whole::<6>(&sums, source.1, out),
+            _ => average_row(&sums, &columns, source, target.0, out),
+        }
+    }
+}
+
+/// Appends the averages of one row of target pixels, from the sums of its source columns.
+#[inline(always)]
+fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, out: &mut Vec<u8>) {
+    let full = u64::from(source.0) * u64::from(source.1);
+    let inverse = 1.0 / full as f64;
+    out.extend(cells.iter().map(|cell| {
+        let whole = sums[cell.begin..cell.end].iter();
+        let whole: u64 = whole.map(|&sum| u64::from(sum)).sum();
+        let mut total = whole * u64::from(target);
+        total +=
+            u64::from(sums[cell.begin - usize::from(cell.before > 0)]) * u64::from(cell.before);
+        if cell.after > 0 {
+            total += u64::from(sums[cell.end]) * u64::from(cell.after);
+        }
+        quotient(total + full / 2, full, inverse) as u8
+    }));
+}
+
+/// As [`average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
+#[inline(always)]
+fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
+    let full = WIDTH as u32 * height;
+    let inverse = 1.0 / f64::from(full);
+    let cells = sums.as_chunks::<WIDTH>().0;
+    out.extend(cells.iter().map(|cell| {
+        let value = cell.iter().sum::<u32>() + full / 2;
+        let near = (f64::from(value) * inverse) as i32 as u32;
+        let near = near - u32::from(near * full > value);
+        (near + u32::from((near + 1) * full <= value)) as u8
+    }));
+}
+
+/// `value / divisor`, where `inverse` is 1 / `divisor` and the quotient is small. An integer division would take longer
+/// than everything else that is done for a target pixel.
+#[inline(always)]
+fn quotient(value: u64, divisor: u64, inverse: f64) -> u32 {
+    let near = (value as f64 * inverse) as u32;
+    // The product is off by far less than one, so the quotient is this or a neighbour.
+    let near = near - u32::from(u64::from(near) * divisor > value);
+    near + u32::from((u64::from(near) + 1) * divisor <= value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same by the definition: overlaps of intervals, in floating point.
+    fn by_definition(luma: &[u8], source: (u32, u32), target: (u32, u32)) -> Vec<f64> {
+        let overlap = |o: u32, s: u32, source: u32, target: u32| {
+            let ratio = f64::from(source) / f64::from(target);
+            let (begin, end) = (f64::from(o) * ratio, f64::from(o + 1) * ratio);
+            ((f64::from(s) + 1.0).min(end) - f64::from(s).max(begin)).max(0.0) / ratio
+        };
+        let mut out = Vec::new();
+        for row in 0..target.1 {
+            for column in 0..target.0 {
+                let mut sum = 0.0;
+                for y in 0..source.1 {
+                    let vertical = overlap(row, y, source.1, target.1);
+                    for x in 0..source.0 {
+                        let share = vertical * overlap(column, x, source.0, target.0);
+                        sum += share * f64::from(luma[(y * source.0 + x) as usize]);
+                    }
+                }
+                out.push(sum);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn averages_are_exact_up_to_rounding() {
+        for (source, target) in [
+            ((7, 5), (3, 2)),
+            ((8, 6), (4, 3)),
+            ((9, 4), (9, 1)),
+            ((13, 11), (12, 11)),
+            ((5, 1), (2, 1)),
+            ((1, 9), (1, 4)),
+            ((6, 6), (6, 6)),
+        ] {
+            let luma: Vec<u8> = (0..source.0 * source.1)
+                .map(|i| (i * 89 % 256) as u8)
+                .collect();
+            let mut averages = Vec::new();
+            area_average(&luma, source, target, &mut averages);
+            let expected = by_definition(&luma, source, target);
+            assert_eq!(averages.len(), expected.len());
+            for (&average, &expected) in averages.iter().zip(&expected) {
+                let difference = (f64::from(average) - expected).abs();
+                assert!(difference <= 0.5 + 1e-9, "{source:?} to {target:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn white_stays_white_at_any_size() {
+        for (source, target) in [
+            ((1921, 1079), (320, 180)),
+            ((321, 1), (320, 1)),
+            ((1, 5000), (1, 320)),
+            ((640, 480), (320, 240)),
+        ] {
+            let luma = vec![255; source.0 as usize * source.1 as usize];
+            let mut averages = Vec::new();
+            area_average(&luma, source, target, &mut averages);
+            assert_eq!(averages.len(), target.0 as usize * target.1 as usize);
+            assert!(averages.iter().all(|&value| value == 255));
+        }
+    }
+}

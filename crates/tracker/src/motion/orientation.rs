@@ -1,0 +1,66 @@
+//! The target's in-plane rotation, against the first frame.
+//!
+//! A head tilts, a rider leans. Boxes do not rotate, so an upright one slides along the target to where edges still
+//! fit. So the image is rotated back ([`Rotation`]), and everything else sees the target upright.
+//!
+//! The angle is measured in frames that the models are updated from: the answer is compared once more in images rotated
+//! a step further either way, and weighed as particles are. The bag's first subspace does not rotate along, so the
+//! angle does not drift with what was learned.
+
+use std::f64::consts::PI;
+
+use crate::image::warp::Rotation;
+use crate::motion::particles::Particle;
+use crate::params::table::{Params, Search};
+
+/// How many angles are tried: one either way. The last angle itself does not tell which way to turn.
+pub(crate) const HYPOTHESES: usize = 2;
+/// By how many degrees, either way, a further rotation is tried: heads tilt by some degrees a frame.
+const STEP: f64 = 6.0;
+/// The share of a measured change that is applied, so that noise evens out.
+const GAIN: f64 = 0.5;
+/// σ of the likelihood of an angle, as a multiple of that of a place: limbs that move make small rotations likely.
+pub(crate) const SIGMA_FACTOR: f64 = 3.0;
+/// Standard deviation of the prior on the angle, in degrees: targets are upright rather than not.
+const PRIOR_STD: f64 = 25.0;
+/// Below this angle, in degrees, the image is not rotated: the features hardly change.
+const MIN_ANGLE: f64 = 8.0;
+/// An angle is measured only where the distance to the first subspace is below this: a target half covered is nearer to
+/// it at some angle by chance.
+const MAX_DISTANCE: f64 = 0.25;
+
+/// Whether rotations are looked for. In the paper's V former frames would be upright.
+pub(crate) fn is_on(params: &Params) -> bool {
+    params.single_vector_candidate && params.search == Search::Answer
+}
+
+/// Whether `angle`, in radians, may be that of a tracker with `params`.
+pub(crate) fn is_valid_for(angle: f64, params: &Params) -> bool {
+    angle == 0.0 || is_on(params) && angle.abs() <= PI
+}
+
+/// The rotation about `target` that makes it upright; none where it nearly is.
+pub(crate) fn rotation(target: &Particle, angle: f64) -> Option<Rotation> {
+    let is_notable = angle.abs() >= MIN_ANGLE.to_radians();
+    is_notable.then(|| Rotation::about((target.x, target.y), angle))
+}
+
+/// The angles to try, in radians, and the logarithms of their priors; none where that is off or the target, at
+/// `distance` from the first subspace, looks too unlike it.
+pub(crate) fn hypotheses(
+    angle: f64,
+    distance: f64,
+    params: &Params,
+) -> Option<[(f64, f64); HYPOTHESES]> {
+    let step = STEP.to_radians();
+    let log_prior = |angle: f64| -0.5 * (angle / PRIOR_STD.to_radians()).powi(2);
+    let tried = [angle - step, angle + step].map(|angle| (angle, log_prior(angle)));
+    (is_on(params) && distance < MAX_DISTANCE).then_some(tried)
+}
+
+/// `angle` moved towards the [`hypotheses`] by their weights, which sum to 1.
+pub(crate) fn updated(angle: f64, weights: [f64; HYPOTHESES]) -> f64 {
+    let change = (weights[1] - weights[0]) * STEP.to_radians();
+    // Half a turn is as far as there is.
+    (angle + GAIN * change).clamp(-PI, PI)
+}

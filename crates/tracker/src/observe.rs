@@ -1,0 +1,81 @@
+//! What is seen of a frame: the displacement of the image, where the target is searched, and in which pixels.
+
+use crate::appearance::background::{self, Background};
+use crate::features::extractor::Extractor;
+use crate::image::downsample::downsampled;
+use crate::image::frame::Frame;
+use crate::motion::orientation;
+use crate::motion::search::SearchContext;
+use crate::state::State;
+use crate::workspace::{Scratch, ViewBuffers};
+
+/// The views of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Views<'a> {
+    /// The frame, in larger pixels where the target is large.
+    pub original: &'a Frame,
+    /// The same with a rotated target upright, within the window of the search.
+    pub rectified: &'a Frame,
+}
+
+impl State {
+    /// The displacement of the whole image since the last frame, in working pixels.
+    pub fn displacement(&mut self, frame: &Frame, scratch: &mut Scratch) -> (f64, f64) {
+        let profiles = self.global_motion.as_mut();
+        profiles.map_or((0.0, 0.0), |profiles| {
+            profiles.displacement(frame, &mut scratch.global_motion)
+        })
+    }
+
+    /// The search in frame `number`, whose image is displaced by so much.
+    pub fn search(&self, number: u64, displacement: (f64, f64)) -> SearchContext<'_> {
+        let rotation = orientation::rotation(&self.answer, self.orientation);
+        let samples_radius = match Background::wanted(number, &self.params) {
+            0 => 0.0,
+            _ => background::radius(&self.answer, &self.bounds),
+        };
+        SearchContext {
+            last: self.answer,
+            displacement: rotation.map_or(displacement, |rotation| {
+                rotation.rotated_displacement(displacement)
+            }),
+            rotation,
+            spread: self.spread(),
+            samples_radius,
+            params: &self.params,
+            bounds: &self.bounds,
+        }
+    }
+
+    /// The views of `frame` for this search.
+    pub fn views<'a>(
+        &self,
+        frame: &'a Frame,
+        search: &SearchContext<'_>,
+        buffers: &'a mut ViewBuffers,
+    ) -> Views<'a> {
+        let original = self.original(frame, &mut buffers.downsampled);
+        let memory = &mut buffers.rectified;
+        let rectified = search.rotation.map_or(original, |rotation| {
+            let radius = search.window_radius();
+            let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
+            *memory = rotation.apply(original, &window, std::mem::take(memory));
+            memory
+        });
+        Views {
+            original,
+            rectified,
+        }
+    }
+
+    /// `frame`, or the frame in larger pixels where the target is large.
+    pub fn original<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
+        match Extractor::downsample_factor(&self.answer, &self.bounds, &self.params) {
+            1 => frame,
+            factor => {
+                *memory = downsampled(frame, factor, std::mem::take(memory));
+                memory
+            }
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! The state of a tracker as bytes.
+//!
+//! A snapshot comes back from a client, so it is hostile until proven otherwise. The checksum finds damage, not
+//! malice: whoever can change the bytes can change the checksum. So after decoding everything is checked that the
+//! tracker relies on, and a state that passes can be stepped without a panic, a NaN, or more memory than parameters
+//! allow.
+//!
+//! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
+//! postcard's encoding.
+
+use crate::appearance::background;
+use crate::appearance::bag::Bag;
+use crate::appearance::subspace::{self, AffineSubspace};
+use crate::error::TrackerError;
+use crate::image::resolution::MAX_WORKING_SIDE;
+use crate::input;
+use crate::motion::orientation;
+use crate::motion::particles::Particle;
+use crate::params::table::Params;
+use crate::state::State;
+use crate::workspace;
+
+const MAGIC: &[u8; 8] = b"BAGTRACK";
+/// Grows with every change of [`State`] or of what its numbers mean.
+const VERSION: u32 = 16;
+const HEADER: usize = 16;
+
+/// No feature has a greater magnitude; gray values are in [0, 1].
+const MAX_FEATURE: f32 = 1e3;
+/// The greatest difference of UᵀU from the identity that single precision leaves.
+const ORTHONORMAL: f64 = 1e-3;
+/// Frame numbers are below: 2^53 can also be said exactly in JSON.
+const FRAMES: u64 = 1 << 53;
+
+/// The snapshot of `state`.
+pub(crate) fn write(state: &State) -> Vec<u8> {
+    let body = postcard::to_stdvec(state).expect("the state has no type that postcard refuses");
+    let mut bytes = Vec::with_capacity(HEADER + body.len());
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&crc32fast::hash(&body).to_le_bytes());
+    bytes.extend_from_slice(&body);
+    bytes
+}
+
+/// The state in `bytes`, fully checked.
+pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
+    let damaged = TrackerError::Snapshot("is damaged");
+    let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
+        return Err(TrackerError::Snapshot("is too short"));
+    };
+    let word = |at: usize| {
+        u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+    };
+    if header[..8] != MAGIC[..] {
+        return Err(TrackerError::Snapshot("is not one of this program"));
+    }
+    if word(8) != VERSION {
+        return Err(TrackerError::Snapshot("is of another version"));
+    }
+    if word(12) != crc32fast::hash(body) {
+        return Err(damaged);
+    }
+    match postcard::take_from_bytes::<State>(body) {
+        Ok((mut state, [])) => {
+            check(&state)?;
+            restore(&mut state);
+            Ok(state)
+        }
+        _ => Err(damaged),
+    }
+}
+
+/// Computes what a snapshot does not carry.
+fn restore(state: &mut State) {
+    workspace::with(|workspace| {
+        let learning = &mut workspace.scratch.learning;
+        let params = &state.params;
+        background::learn(&mut state.background, params, &mut learning.background);
+        state
+            .bag
+            .rebuild(&state.background, params, &mut learning.bag);
+    });
+}
+
+fn check(state: &State) -> Result<(), TrackerError> {
+    state.params.validate()?;
+    let is_valid = check_numbers(state)
+        && check_particles(state)
+        && state.history.is_valid_for(&state.params, MAX_FEATURE)
+        && check_bag(&state.bag, &state.params)
+        && check_extensions(state);
+    if is_valid {
+        Ok(())
+    } else {
+        Err(TrackerError::Snapshot("holds a state that cannot be"))
+    }
+}
+
+/// Sizes, bounds and the last answer.
+fn check_numbers(state: &State) -> bool {
+    let (width, height) = state.source;
+    if width == 0 || height == 0 {
+        return false;
+    }
+    let working = state.format.size;
+    let fits = |side: u32, whole: u32| (1..=whole.min(MAX_WORKING_SIDE)).contains(&side);
+    if !fits(working.0, width) || !fits(working.1, height) {
+        return false;
+    }
+    let bounds = &state.bounds;
+    let (horizontal, vertical) = input::to_working(state.source, working);
+    let box_sides = [
+        (bounds.box_width, horizontal),
+        (bounds.box_height, vertical),
+    ];
+    // Scaling back and forth may have rounded.
+    let could_be_given = |&(side, scale): &(f64, f64)| {
+        side >= 0.99 && side / scale <= 1.01 * input::max_box_side(state.source)
+    };
+    let target = &state.estimate.target;
+    let far = 1e2 * f64::from(width.max(height)) + 1e3;
+    bounds.frame_width == f64::from(working.0)
+        && bounds.frame_height == f64::from(working.1)
+        && box_sides.iter().all(could_be_given)
+        && target.is_valid()
+        && [target.x, target.y, target.width, target.height]
+            .iter()
+            .all(|value| value.abs() <= far)
+        && (0.0..=1.0).contains(&state.estimate.score)
+        && state.estimate.frame < FRAMES
+        && state
+            .baseline
+            .distance
+            .is_none_or(|distance| (0.0..=1e6).contains(&distance))
+}
+
+fn check_particles(state: &State) -> bool {
+    let count = state.params.stored_particles();
+    let total: f64 = state.weights.iter().sum();
+    state.particles.len() == count
+        && state.weights.len() == count
+        && is_clamped(&state.answer, state)
+        && state
+            .weights
+            .iter()
+            .all(|weight| (0.0..=1.0).contains(weight))
+        && (count == 0 || (total - 1.0).abs() < 1e-6)
+        && state
+            .particles
+            .iter()
+            .all(|particle| is_clamped(particle, state))
+}
+
+/// Whether a particle is within its bounds: to two pixels, for a box that the user gave may lie a pixel beyond, and to
+/// the rounding of the scale.
+fn is_clamped(particle: &Particle, state: &State) -> bool {
+    let held = state.bounds.clamp(*particle);
+    (held.x - particle.x).abs() <= 2.0
+        && (held.y - particle.y).abs() <= 2.0
+        && (held.scale - particle.scale).abs() <= 1e-9
+}
+
+/// The models of the extensions: there when their parameters ask for them, and not otherwise.
+fn check_extensions(state: &State) -> bool {
+    let params = &state.params;
+    let (width, height) = state.format.size;
+    state.background.is_valid_for(params, MAX_FEATURE)
+        && state.discriminant.is_valid_for(params, MAX_FEATURE)
+        && state
+            .color
+            .is_valid_for(params.histogram_weight > 0.0, state.format.has_color)
+        && state.scale_filter.is_valid_for(params, MAX_FEATURE)
+        && state.global_motion.is_some() == params.global_motion
+        && state
+            .global_motion
+            .as_ref()
+            .is_none_or(|global_motion| global_motion.is_valid_for(width as usize, height as usize))
+        && state
+            .last_seen
+            .is_valid_for((width, height), params.static_penalty > 0.0)
+        && orientation::is_valid_for(state.orientation, params)
+        && (0.0..=1e6).contains(&state.update_gate.mean_distance)
+        && (0.0..=1e6).contains(&state.update_gate.last_distance)
+}
+
+fn check_bag(bag: &Bag, params: &Params) -> bool {
+    // With single-vector candidates a subspace follows from its templates.
+    let len = match params.single_vector_candidate {
+        true => 0,
+        false => params.feature_len(),
+    };
+    (1..=params.bag_size as usize).contains(&bag.entries.len())
+        && bag
+            .entries
+            .iter()
+            .all(|entry| entry.is_valid_for(params, MAX_FEATURE))
+        && bag.subspaces().all(|entry| {
+            entry.mean.len() == len
+                && entry.basis.len().is_multiple_of(len)
+                && entry.dim() <= params.basis_dim as usize
+                && are_features(&entry.mean)
+                && are_features(&entry.basis)
+                && is_orthonormal(entry)
+        })
+}
+
+fn are_features(values: &[f32]) -> bool {
+    values.iter().all(|value| value.abs() <= MAX_FEATURE)
+}
+
+fn is_orthonormal(entry: &AffineSubspace) -> bool {
+    let gram = subspace::gram(&entry.basis, entry.mean.len().max(1));
+    let shape = (entry.dim(), entry.dim());
+    gram.view((0, 0), shape)
+        .into_owned()
+        .is_identity(ORTHONORMAL)
+}

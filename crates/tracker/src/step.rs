@@ -1,0 +1,91 @@
+//! One frame, from the last answer to the next: section III of the paper, in its order.
+//!
+//! An answer is judged against statistics of the frames before it, and nothing is learned before it is judged.
+
+use crate::confidence::score::Evidence;
+use crate::confidence::update_gate;
+use crate::estimate::{Estimate, Status};
+use crate::image::frame::Frame;
+use crate::learn::Localization;
+use crate::motion::random::{self, Draws};
+use crate::state::State;
+use crate::workspace::Workspace;
+
+impl State {
+    /// Finds the target in `frame`, the next one, and learns from it. Returns also what the score is made of.
+    pub fn step(&mut self, frame: &Frame, workspace: &mut Workspace) -> (Estimate, Evidence) {
+        let Workspace { views, scratch } = workspace;
+        let number = self.estimate.frame + 1;
+        let displacement = self.displacement(frame, scratch);
+        let search = self.search(number, displacement);
+        let views = self.views(frame, &search, views);
+
+        // (A) Propose: where the target may be.
+        let mut draws = random::generator(self.params.seed, number, Draws::Particles);
+        self.propose(views.rectified, &search, &mut draws, scratch);
+        self.test_for_change(frame, &search, scratch);
+
+        // (B) Describe, (D) compare and weigh. Twice, since a second round is drawn around the best of the first.
+        let mut best = self.weigh(views.rectified, &search, scratch);
+        let candidates = &mut scratch.candidates;
+        if search.refine(&candidates.weights, &mut draws, &mut candidates.particles) {
+            best = self.weigh(views.rectified, &search, scratch);
+        }
+
+        // Answer (equation 12). A lost target counts as where it was, displaced with the image.
+        let candidates = &scratch.candidates;
+        let distance = candidates.distances_of(best)[0];
+        let is_lost = self.update_gate.is_lost(
+            candidates.score_of(best),
+            distance,
+            self.frames_lost,
+            search.spread,
+            &self.params,
+        );
+        let rectified = if is_lost {
+            search.displaced()
+        } else {
+            let mean = search.answer(&candidates.particles, &candidates.weights, best);
+            self.measure_scale(views.rectified, mean, scratch)
+        };
+        let answer = self.bounds.clamp(search.in_original(rectified));
+        let found = Localization {
+            number,
+            answer,
+            rectified,
+            distance,
+        };
+
+        // Judge: how likely the box is right, and whether it may be learned from.
+        let mean_distance = self.update_gate.mean_distance;
+        let evidence = scratch
+            .candidates
+            .evidence(best, mean_distance, answer.scale);
+        let (score, status, may_learn) = self.judge(number, &evidence, is_lost);
+
+        // (C) Learn: what is remembered of the frame.
+        self.remember(&found, is_lost, scratch);
+        if may_learn {
+            self.learn(&views, &found, scratch);
+        }
+        self.estimate = Estimate {
+            frame: number,
+            target: self.target_of(&answer),
+            score,
+            status,
+        };
+        (self.estimate, evidence)
+    }
+
+    /// The score and the status of the answer to frame `number`, and whether the frame may be learned from. Updates the
+    /// statistics that later answers are judged against.
+    fn judge(&mut self, number: u64, evidence: &Evidence, is_lost: bool) -> (f32, Status, bool) {
+        let (distance, has_color) = (evidence.first_distance, self.format.has_color);
+        let (gate, params) = (&mut self.update_gate, &self.params);
+        let is_near = !is_lost && gate.admit_distance(distance, has_color, number, params);
+        let (score, status) = self.baseline.judge(evidence, is_lost, is_near);
+        // Without a discriminant the score is no probability.
+        let is_likely = !self.discriminant.is_on() || update_gate::passes(score, number);
+        (score, status, is_near && is_likely)
+    }
+}

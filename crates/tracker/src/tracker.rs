@@ -1,0 +1,164 @@
+//! The tracker of one session, as the rest of the program sees it.
+
+use std::borrow::Cow;
+
+use crate::bag_view::BagEntry;
+use crate::candidates::Candidates;
+use crate::confidence::score::Evidence;
+use crate::error::TrackerError;
+use crate::estimate::Estimate;
+use crate::image::frame::{Frame, FrameFormat};
+use crate::image::rect::Rect;
+use crate::input;
+use crate::params::table::Params;
+use crate::seen::Seen;
+use crate::snapshot;
+use crate::state::State;
+use crate::workspace;
+
+/// Follows one object.
+///
+/// An error of any method leaves the tracker as it was.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    state: State,
+    evidence: Option<Evidence>,
+}
+
+impl Tracker {
+    /// Starts on `frame` with the box `target`, in the pixels of the uploaded frame. The box may reach over the edge.
+    ///
+    /// # Errors
+    /// A parameter out of its range; a frame that was reduced to less than [`Params::frame_format`]; a box that is not
+    /// finite, has a side below [`MIN_BOX_SIDE`](crate::MIN_BOX_SIDE) pixels (or below one pixel of the
+    /// working image) or above four times the frame's longer side, or lies outside the frame.
+    pub fn new(frame: &Frame, target: Rect, params: Params) -> Result<Self, TrackerError> {
+        params.validate()?;
+        let source = frame.source_size();
+        let mut format = params.frame_format(source, &target);
+        input::check_target(source, format.size, &target)?;
+        format.has_color &= frame.has_color();
+        let frame = frame.in_format(format).ok_or(TrackerError::Reduced)?;
+        Ok(workspace::with(|workspace| {
+            let state = State::new(&frame, format, target, params, workspace);
+            Self {
+                state,
+                evidence: None,
+            }
+        }))
+    }
+
+    /// Finds the target in the next frame.
+    ///
+    /// # Errors
+    /// A frame whose uploaded size is not that of the session's first frame, or that was reduced to less than
+    /// [`frame_format`](Self::frame_format).
+    pub fn step(&mut self, frame: &Frame) -> Result<Estimate, TrackerError> {
+        Ok(self.advance(frame, |_, _| ())?.0)
+    }
+
+    /// Like [`step`](Self::step), and tells what the tracker saw.
+    ///
+    /// # Errors
+    /// As for [`step`](Self::step).
+    pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
+        self.advance(frame, Seen::of)
+    }
+
+    /// Steps, and has a look at the candidates of the step.
+    fn advance<T>(
+        &mut self,
+        frame: &Frame,
+        look: impl FnOnce(&State, &Candidates) -> T,
+    ) -> Result<(Estimate, T), TrackerError> {
+        let frame = self.checked(frame)?;
+        workspace::with(|workspace| {
+            let (estimate, evidence) = self.state.step(&frame, workspace);
+            self.evidence = Some(evidence);
+            Ok((estimate, look(&self.state, &workspace.scratch.candidates)))
+        })
+    }
+
+    /// The user corrects the box: `frame` counts as the next frame, with the answer given.
+    /// The bag keeps its entries and gains one for the new box; history and particles restart at the box.
+    ///
+    /// # Errors
+    /// A frame as in [`step`](Self::step), a box as in [`new`](Self::new).
+    pub fn retarget(&mut self, frame: &Frame, target: Rect) -> Result<Estimate, TrackerError> {
+        let frame = self.checked(frame)?;
+        input::check_target(self.state.source, self.state.format.size, &target)?;
+        workspace::with(|workspace| self.state.retarget(&frame, target, workspace));
+        self.evidence = None;
+        Ok(self.state.estimate)
+    }
+
+    /// `frame` as this session sees frames.
+    fn checked<'a>(&self, frame: &'a Frame) -> Result<Cow<'a, Frame>, TrackerError> {
+        input::check_frame(self.state.source, frame)?;
+        frame
+            .in_format(self.state.format)
+            .ok_or(TrackerError::Reduced)
+    }
+
+    /// How this session sees its frames. One that comes in this format is not copied.
+    pub fn frame_format(&self) -> FrameFormat {
+        self.state.format
+    }
+
+    /// The last answer.
+    pub fn estimate(&self) -> Estimate {
+        self.state.estimate
+    }
+
+    /// What the score of the last answer is made of, where that was given by [`step`](Self::step). None after
+    /// [`new`](Self::new), [`retarget`](Self::retarget) and [`restore`](Self::restore).
+    pub fn evidence(&self) -> Option<Evidence> {
+        self.evidence
+    }
+
+    /// The particles of the last frame, in the order in which they were drawn: the box of each, in the pixels of the
+    /// uploaded frame, and its weight. Weights are at least 0 and sum to 1; the next particles are drawn by them.
+    ///
+    /// After [`new`](Self::new) and [`retarget`](Self::retarget) all are at the box given, with equal weights. There
+    /// are none with [`Search::Answer`](crate::Search::Answer): then the next particles are drawn around the
+    /// answer, and the last ones are not kept.
+    pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
+        let state = &self.state;
+        let boxes = state.particles.iter().map(|it| state.target_of(it));
+        boxes.zip(state.weights.iter().copied())
+    }
+
+    /// The entries of the bag, oldest first, for people to look at.
+    pub fn bag(&self) -> Vec<BagEntry> {
+        let entries = self.state.bag.entries.iter();
+        let view = |entry| BagEntry::of(entry, &self.state.params);
+        entries.map(view).collect()
+    }
+
+    /// The parameters of this tracker.
+    pub fn params(&self) -> &Params {
+        &self.state.params
+    }
+
+    /// Width and height of the session's frames, before downscaling.
+    pub fn source_size(&self) -> (u32, u32) {
+        self.state.source
+    }
+
+    /// The whole state as bytes, versioned.
+    pub fn snapshot(&self) -> Vec<u8> {
+        snapshot::write(&self.state)
+    }
+
+    /// A tracker that goes on from `snapshot`, bit for bit.
+    ///
+    /// # Errors
+    /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
+    pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
+        let state = snapshot::read(snapshot)?;
+        Ok(Self {
+            state,
+            evidence: None,
+        })
+    }
+}
