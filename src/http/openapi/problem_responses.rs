@@ -3,10 +3,10 @@
 use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{
+use bagtrack_ingest::IngestError;
+use bagtrack_sessions::{
     QueueFull, ReplayError, SessionBusy, SnapshotError, StoreUnavailable, TooManySessions,
 };
-use bagtrack_ingest::IngestError;
 use bagtrack_tracker::TrackerError;
 use std::collections::BTreeMap;
 use utoipa::openapi::{
