@@ -74,17 +74,18 @@ fn tracker(known: &mut Trackers, seed: u64, history: &[u8]) -> Tracker {
     tracked
 }
 
-/// The history after which this is the answer to its last frame.
-pub fn history(seed: u64, answer: &Estimates) -> History {
+/// The histories after which this is the answer to the last frame: mostly one.
+pub fn histories(seed: u64, answer: &Estimates) -> Vec<History> {
     static KNOWN: OnceLock<Mutex<Trackers>> = OnceLock::new();
     let mut known = KNOWN.get_or_init(Mutex::default).lock().unwrap();
     let length = answer.first().frame as u32;
-    for senders in 0..2_u32.pow(length) {
-        let history: History = (0..length).map(|at| (senders >> at & 1) as u8).collect();
-        let tracker = tracker(&mut known, seed, &history);
-        if Estimates::One(tracker.estimate()) == *answer {
-            return history;
-        }
-    }
-    panic!("no history gives the answer {answer:?}");
+    let all = (0..2_u32.pow(length)).map(|senders| {
+        let senders = (0..length).map(|at| (senders >> at & 1) as u8);
+        senders.collect::<History>()
+    });
+    let mut answers_so = |history: &History| {
+        let tracker = tracker(&mut known, seed, history);
+        Estimates::One(tracker.estimate()) == *answer
+    };
+    all.filter(|history| answers_so(history)).collect()
 }
