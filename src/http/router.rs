@@ -18,6 +18,8 @@ use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
+#[cfg(feature = "tls")]
+use crate::http::resources::https_only::to_https;
 use crate::http::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -33,12 +35,24 @@ use tower_http::timeout::RequestBodyDeadlineLayer;
 /// The whole service. `extra` routes are served beside its own. They pass through the layers of all requests, and not
 /// through those of [`routes`], which say who may use the service.
 pub fn router(state: AppState, extra: Router) -> Router {
-    let config = &state.config;
     let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
         .fallback(async || Problem::route_not_found())
-        .method_not_allowed_fallback(async || Problem::method_not_allowed())
+        .method_not_allowed_fallback(async || Problem::method_not_allowed());
+    mount(&state.config.base_path, with_layers(routes, &state))
+}
+
+/// What is served where TLS is expected, and is not spoken.
+#[cfg(feature = "tls")]
+pub fn https_only(state: &AppState) -> Router {
+    with_layers(Router::new().fallback(to_https), state)
+}
+
+/// The layers that every request passes through.
+fn with_layers(routes: Router, state: &AppState) -> Router {
+    let config = &state.config;
+    routes
         // The last layer is the first to see a request.
         .layer(DefaultBodyLimit::max(config.max_body_bytes))
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
@@ -60,8 +74,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), count_request))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
-        .layer(middleware::map_request(remove_unusable_id));
-    mount(&state.config.base_path, routes)
+        .layer(middleware::map_request(remove_unusable_id))
 }
 
 /// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and

@@ -17,7 +17,7 @@ fn listed(command: &str) -> Vec<Vec<String>> {
 #[test]
 fn the_long_help_has_a_line_for_each_parameter() {
     let robust = serde_json::to_value(Preset::Robust.params()).unwrap();
-    for command in ["track", "eval"] {
+    for command in ["track"] {
         let lines = listed(command);
         assert_eq!(lines.len(), Params::TABLE.len(), "{command}: {lines:?}");
         for (line, row) in lines.iter().zip(Params::TABLE) {
@@ -55,7 +55,7 @@ fn the_list_says_what_the_default_preset_has() {
 
 #[test]
 fn the_short_help_stays_short_and_points_to_the_long_one() {
-    for command in ["track", "eval"] {
+    for command in ["track"] {
         let help = succeeds(&[command, "-h"]);
         assert!(help.contains("`--help` lists the parameters"), "{help}");
         for row in Params::TABLE.iter().filter(|row| row.name.contains('_')) {

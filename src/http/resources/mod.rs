@@ -10,6 +10,8 @@ pub mod create_named;
 pub mod create_request;
 pub mod frames;
 pub mod health;
+#[cfg(feature = "tls")]
+pub mod https_only;
 pub mod metrics;
 pub mod saturation;
 pub mod session;
