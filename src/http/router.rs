@@ -4,7 +4,7 @@ use crate::http::auth::layer::{authenticate, authenticate_metrics};
 use crate::http::auth::origin::check_origin;
 use crate::http::metrics::layer::count_request;
 use crate::http::middleware::answer_problems::{answer_problems, panic_response};
-use crate::http::middleware::base_path::mount;
+use crate::http::middleware::base_path::{client_path, mount};
 use crate::http::middleware::client_identity::identify;
 use crate::http::middleware::cors::cors;
 use crate::http::middleware::draining::mark_draining;
@@ -22,9 +22,9 @@ use crate::http::problems::problem::Problem;
 use crate::http::resources::https_only::to_https;
 use crate::http::state::AppState;
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
-use axum::http::HeaderValue;
+use axum::extract::{DefaultBodyLimit, Request};
 use axum::http::header::CACHE_CONTROL;
+use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -38,7 +38,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
     let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
-        .fallback(async || Problem::route_not_found())
+        .fallback(async |request: Request| Problem::no_route(&client_path(&request)))
         .method_not_allowed_fallback(async || Problem::method_not_allowed());
     mount(&state.config.base_path, with_layers(routes, &state))
 }
@@ -87,6 +87,7 @@ fn routes(state: &AppState) -> Router<AppState> {
     let document = docs::document(&state.config.base_path);
     let (sessions, _) = routes::sessions().split_for_parts();
     let (metrics, _) = routes::metrics().split_for_parts();
+    let (version, _) = routes::version().split_for_parts();
     let (probes, _) = routes::probes().split_for_parts();
     let pages = Router::new()
         .route("/", get(static_files::index))
@@ -95,7 +96,12 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));
     pages
-        .route("/openapi.json", get(move || docs::served(document.clone())))
+        .route(
+            "/openapi.json",
+            get(move |headers: HeaderMap| docs::served(document.clone(), headers)),
+        )
+        .route("/docs/problems", get(docs::problems))
+        .merge(version)
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))

@@ -19,3 +19,5 @@ pub mod session_path;
 pub mod snapshot;
 pub mod token;
 pub mod track;
+mod track_video;
+pub mod version;
