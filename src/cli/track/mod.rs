@@ -17,8 +17,8 @@ mod video_file;
 mod video_info;
 
 use super::formats::{Columns, Format};
-use bagtrack::sessions::MAX_TARGETS;
 use bagtrack_cli::{BOXES, ParamFlags, progress, read_boxes};
+use bagtrack_sessions::MAX_TARGETS;
 use bagtrack_tracker::Rect;
 use drawn::Destination;
 use follow::Job;

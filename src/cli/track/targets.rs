@@ -1,7 +1,7 @@
 //! The targets of `bagtrack track`: a tracker for each, which all see the same frames.
 
-use bagtrack::sessions::{PerTarget, frame_format, largest_format, target_seed};
 use bagtrack_ingest::Limits;
+use bagtrack_sessions::{PerTarget, frame_format, largest_format, target_seed};
 use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
 use std::error::Error;
 

@@ -1,7 +1,7 @@
 //! How much memory the service takes at most, by its settings.
 
 use super::service::Config;
-use crate::sessions::MAX_LIST_BYTES;
+use bagtrack_sessions::MAX_LIST_BYTES;
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.

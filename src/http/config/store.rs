@@ -1,7 +1,7 @@
 //! The settings of the store that replicas share.
 
 use super::access::Secret;
-use crate::sessions::{RedisStore, SessionStore, StoreAddress};
+use bagtrack_sessions::{RedisStore, SessionStore, StoreAddress};
 use std::sync::Arc;
 use std::time::Duration;
 

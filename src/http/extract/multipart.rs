@@ -6,10 +6,10 @@ use super::misnamed;
 use super::settings::Settings;
 use super::texts::MAX_TEXT_BYTES;
 use crate::http::problems::problem::Problem;
-use crate::sessions::ByteCharge;
 use axum::body::Bytes;
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
+use bagtrack_sessions::ByteCharge;
 
 /// Adds the parts of a multipart body to `fields`: at most `max_files` files. The router limits all bodies to
 /// `max_bytes` bytes. What is kept is charged to `charge`.

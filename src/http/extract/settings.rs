@@ -1,6 +1,6 @@
 //! What the settings of a route are to the parsers and to the OpenAPI document.
 
-use crate::sessions::MAX_TARGETS;
+use bagtrack_sessions::MAX_TARGETS;
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;

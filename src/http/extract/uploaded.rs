@@ -12,11 +12,11 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::RequestPermit;
 use crate::http::resources::snapshot::MEDIA_TYPE;
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
 use bagtrack_ingest::video::{VideoFormat, video_format};
+use bagtrack_sessions::{ByteCharge, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
 /// What curl calls a body, whatever it is.
@@ -93,9 +93,9 @@ impl<S: Settings> Upload<S> {
                 fields.files.push(bytes);
             }
         }
-        let (lane, permit) = (permit.lane(), Arc::new(permit));
+        let (flow, permit) = (permit.flow(), Arc::new(permit));
         let held = Box::new((charge, permit.clone()));
-        let queue = state.service.admission.enter(lane, held)?;
+        let queue = state.service.admission.enter(flow, held)?;
         if let Some(bytes) = json {
             let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;

@@ -22,10 +22,10 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Peer;
 use crate::http::router::router;
 use crate::http::state::AppState;
-use crate::sessions::Clock;
 #[cfg(fuzzing)]
 use axum::Extension;
 use axum::Router;
+use bagtrack_sessions::Clock;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;

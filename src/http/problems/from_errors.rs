@@ -2,12 +2,12 @@
 
 use super::kind::Kind;
 use super::problem::Problem;
-use crate::sessions::{
+use bagtrack_ingest::IngestError;
+use bagtrack_sessions::{
     ActError, BytesFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
     QuotaExhausted, ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
     TooManySessions, TrackError, WorkPanicked,
 };
-use bagtrack_ingest::IngestError;
 use bagtrack_tracker::TrackerError;
 use std::sync::Arc;
 

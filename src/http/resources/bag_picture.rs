@@ -8,12 +8,12 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, SessionState};
 use axum::Extension;
 use axum::extract::{Query, State};
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{ByteCharge, SessionState};
 use bagtrack_tracker::{BagEntry, VectorView};
 use image::{ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
@@ -78,7 +78,7 @@ pub async fn get(
     let queue = state
         .service
         .admission
-        .enter(request.lane(), Box::new(request))?;
+        .enter(request.flow(), Box::new(request))?;
     let draw = move |state: &SessionState| {
         let bag = state.bag(target);
         let bytes = draw(

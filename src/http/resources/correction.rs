@@ -14,9 +14,9 @@ use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json::Json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::state::AppState;
-use crate::sessions::{FrameBatch, GivenBox, Tracked, box_warnings};
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{FrameBatch, GivenBox, Tracked, box_warnings};
 use serde::Deserialize;
 
 /// The settings of a correction.

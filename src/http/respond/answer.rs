@@ -1,8 +1,8 @@
 //! Answers as they are sent.
 
 use super::target_box::TargetBox;
-use crate::sessions::{Estimates, PerTarget};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{Estimates, PerTarget};
 use bagtrack_tracker::{Estimate, Status};
 use serde::Serialize;
 

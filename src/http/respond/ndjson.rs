@@ -15,13 +15,13 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use crate::http::stream::message::StreamAnswer;
-use crate::sessions::{
-    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
-    check_readable_pixels,
-};
 use axum::body::{Body, Bytes, HttpBody};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{
+    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
+    check_readable_pixels,
+};
 use http_body::Frame;
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -89,7 +89,7 @@ impl LineWork {
     pub async fn answer(mut self) -> Result<Response, Problem> {
         if self.number.is_some() {
             // What is compared with the number must be the newest.
-            let flow = self.queue.lane();
+            let flow = self.queue.flow();
             let session = self.permit.session();
             self.state.service.refresh(session, None, flow).await?;
         }

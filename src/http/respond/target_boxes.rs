@@ -2,7 +2,7 @@
 
 use super::target_box::{BoxInput, NUMBER, TargetBox};
 use crate::http::problems::problem::Problem;
-use crate::sessions::{Boxes, MAX_TARGETS, PerTarget};
+use bagtrack_sessions::{Boxes, MAX_TARGETS, PerTarget};
 use bagtrack_tracker::Rect;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;

@@ -6,7 +6,7 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
-use crate::sessions::{
+use bagtrack_sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
     Tracked, box_warnings,
 };
@@ -112,7 +112,7 @@ impl FrameWork {
         let queue = state
             .service
             .admission
-            .enter(request.lane(), Box::new(request.clone()))?;
+            .enter(request.flow(), Box::new(request.clone()))?;
         request.count_frames(1)?;
         let targets = session.session().target_count();
         Ok((session, queue.for_frames(targets)))
@@ -126,7 +126,7 @@ impl FrameWork {
         if caller.has_ended(state.now()) || !has_key {
             return Err(Problem::unauthorized());
         }
-        let flow = self.account.lane();
+        let flow = self.account.flow();
         Ok(state
             .service
             .find(self.session, caller.owner(), flow)
@@ -140,7 +140,7 @@ impl FrameWork {
     /// The token has ended, or the key; or the session.
     pub async fn check_newest(&self) -> Result<(), Problem> {
         let session = self.find().await?;
-        let flow = self.account.lane();
+        let flow = self.account.flow();
         self.state.service.refresh(&session, None, flow).await?;
         self.place.has_ended(&session);
         Ok(())

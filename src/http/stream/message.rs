@@ -3,7 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
 use crate::http::respond::target_box::TargetBox;
-use crate::sessions::{Estimates, GivenBox};
+use bagtrack_sessions::{Estimates, GivenBox};
 use bagtrack_tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;

@@ -2,7 +2,7 @@
 
 use super::pictures;
 use bagtrack::http::{Application, Config};
-use bagtrack::sessions::Clock;
+use bagtrack_sessions::Clock;
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode, Url};
 use serde_json::Value;
 use std::net::SocketAddr;
