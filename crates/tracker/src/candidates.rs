@@ -7,13 +7,11 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd};
 
-use crate::appearance::bag_matrix;
-use crate::appearance::point_distance::{self, PointDistance};
+use crate::appearance::model::{Comparison, Vectors};
 use crate::classifier::ridge::Discriminant;
 use crate::classifier::samples::TrainingSamples;
 use crate::confidence::score::Evidence;
 use crate::features::extractor::Extractor;
-use crate::grassmann::evaluation::Evaluation;
 use crate::image::frame::Frame;
 use crate::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::linalg::vector_ops;
@@ -50,7 +48,7 @@ pub(crate) struct RotatedView {
 #[derive(Debug, Default)]
 pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
-    /// The feature vectors; with single-vector candidates the background's mean is subtracted.
+    /// The feature vectors, with the mean of the appearance model subtracted.
     vectors: AlignedBuffer,
     /// D.
     len: usize,
@@ -58,8 +56,7 @@ pub(crate) struct Candidates {
     squares: Vec<f32>,
     /// What the discriminant says of them.
     pub samples: TrainingSamples,
-    point_distance: PointDistance,
-    evaluation: Evaluation,
+    comparison: Comparison,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
     likelihoods: Likelihoods,
@@ -80,17 +77,10 @@ impl Candidates {
         clear_and_reserve(&mut self.distances, count * entries);
         clear_and_reserve(&mut self.weights, count);
         self.likelihoods.reserve(count, entries);
-        let background = &state.background;
+        let model = state.appearance.model();
         let Discriminant { weights, origin } = &state.discriminant;
-        self.samples.begin(weights, origin, &background.mean, count);
-        if params.single_vector_candidate {
-            let queries = self.samples.query_vectors();
-            let matrix = &mut self.point_distance.matrix;
-            bag_matrix::load(matrix, &state.bag, background, queries, self.len);
-        } else {
-            self.evaluation.prepare(params);
-            self.evaluation.set_bag(state.bag.subspaces());
-        }
+        self.samples.begin(weights, origin, model.mean(), count);
+        model.load(self.samples.query_vectors(), params, &mut self.comparison);
     }
 
     /// The feature vectors of the particles that were described.
@@ -127,29 +117,21 @@ impl Candidates {
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors.values_mut()[range];
         extractor.describe(image, particles, &state.bounds, &state.params, vectors);
-        let mean = &state.background.mean;
+        let mean = state.appearance.model().mean();
         center(vectors, self.len, mean, &mut self.squares);
     }
 
     /// (D) The distances and the discriminant's scores of a batch.
     fn compare(&mut self, batch: Range<usize>, state: &State) {
-        let vectors = &self.vectors.values()[batch.start * self.len..batch.end * self.len];
-        if state.params.single_vector_candidate {
-            let squares = &self.squares[batch.start..];
-            let (compared, out) = (&mut self.point_distance, &mut self.distances);
-            point_distance::distances(compared, (vectors, squares), &state.params, out);
-            if state.discriminant.is_on() {
-                let products = self.point_distance.query_products(squares.len());
-                self.samples.push_scores(products, squares);
-            }
-            return;
-        }
+        let candidates = Vectors {
+            values: &self.vectors.values()[batch.start * self.len..batch.end * self.len],
+            squares: &self.squares[batch.start..],
+        };
+        let (model, comparison) = (state.appearance.model(), &mut self.comparison);
+        model.compare(candidates, &state.params, comparison, &mut self.distances);
         if state.discriminant.is_on() {
-            self.samples.score_vectors(vectors);
+            model.score(candidates, comparison, &mut self.samples);
         }
-        let history = state.history.exact.iter().map(Vec::as_slice);
-        let distances = self.evaluation.distances(vectors, history);
-        self.distances.extend_from_slice(distances);
     }
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as

@@ -6,9 +6,8 @@ use crate::appearance::color_histogram::ColorPixels;
 use crate::features::extractor::Extractor;
 use crate::image::frame::Frame;
 use crate::linalg::scratch::clear_and_reserve;
+use crate::motion::orientation;
 use crate::motion::search::{self, SearchContext};
-use crate::motion::{orientation, resampling};
-use crate::params::table::Search;
 use crate::state::State;
 use crate::workspace::Scratch;
 
@@ -27,14 +26,12 @@ impl State {
         clear_and_reserve(&mut scratch.original, search::max_count(params));
         let extractor = &mut scratch.extractor;
         let particles = &mut scratch.candidates.particles;
-        match params.search {
-            Search::Resampled => {
-                let cloud = (&self.particles[..], &self.weights[..]);
-                let sums = &mut scratch.sums;
-                resampling::resample(cloud, params, bounds, draws, sums, particles);
+        match &self.cloud {
+            Some(cloud) => {
+                cloud.resample(params, bounds, draws, &mut scratch.sums, particles);
                 extractor.compute_channels(image, particles, radius, bounds, params);
             }
-            Search::Answer => {
+            None => {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut scratch.dense_search;
                 let foreground = &mut scratch.foreground;

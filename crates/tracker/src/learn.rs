@@ -2,8 +2,7 @@
 //!
 //! The background comes before the bag: the bag's subspaces are those of vectors under the new metric.
 
-use crate::appearance::background::{self, Background};
-use crate::appearance::bag::Bag;
+use crate::appearance::background;
 use crate::appearance::color_histogram::ColorPixels;
 use crate::classifier::labels;
 use crate::features::extractor::Extractor;
@@ -33,9 +32,9 @@ impl State {
     /// Keeps what the next frame starts from.
     pub fn remember(&mut self, found: &Localization, is_lost: bool, scratch: &Scratch) {
         self.answer = found.answer;
-        if self.params.stored_particles() > 0 {
-            self.particles.clone_from(&scratch.candidates.particles);
-            self.weights.clone_from(&scratch.candidates.weights);
+        if let Some(cloud) = &mut self.cloud {
+            cloud.particles.clone_from(&scratch.candidates.particles);
+            cloud.weights.clone_from(&scratch.candidates.weights);
         }
         if is_lost {
             self.frames_lost = self.frames_lost.saturating_add(1);
@@ -63,25 +62,23 @@ impl State {
         self.learn_discriminant(at, scratch);
         self.learn_color(image, at, scratch);
         self.learn_scale(image, at, scratch);
-        let samples = Background::wanted(found.number, &self.params);
+        let model = self.appearance.model();
+        let samples = model.background_wanted(found.number, &self.params);
         if samples > 0 {
             let mut draws = random::generator(self.params.seed, found.number, Draws::Samples);
             let areas = &mut scratch.learning.areas;
             background::areas(at, &self.bounds, samples, &mut draws, areas);
             self.learn_background(image, scratch);
-            let bag = &mut scratch.learning.bag;
-            self.bag.rebuild(&self.background, &self.params, bag);
         }
-        let Learning { features, bag, .. } = &mut scratch.learning;
+        let Learning {
+            features,
+            appearance,
+            ..
+        } = &mut scratch.learning;
         let (extractor, params) = (&mut scratch.extractor, &self.params);
         extractor.features(image, &[*at], &self.bounds, params, features);
-        if Bag::admits(found.number, &self.params) {
-            // V: the answer and the previous frames (equation 2).
-            self.history.append_to(features, &self.params);
-            self.bag
-                .admit(features, &self.background, &self.params, bag);
-        }
-        self.history.push(features, &self.params);
+        let model = self.appearance.model_mut();
+        model.learn(features, found.number, params, appearance);
     }
 
     /// The target's rotation in `original`, in radians: the last one, or moved towards the likelier of two others.
@@ -176,7 +173,7 @@ impl State {
         scratch
             .extractor
             .features(image, areas, &self.bounds, &self.params, features);
-        self.background
-            .rebuild(features, &self.params, &mut learning.background);
+        let model = self.appearance.model_mut();
+        model.learn_background(features, &self.params, &mut learning.appearance);
     }
 }

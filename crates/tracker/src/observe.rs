@@ -1,6 +1,6 @@
 //! What is seen of a frame: the displacement of the image, where the target is searched, and in which pixels.
 
-use crate::appearance::background::{self, Background};
+use crate::appearance::background;
 use crate::features::extractor::Extractor;
 use crate::image::downsample::downsampled;
 use crate::image::frame::Frame;
@@ -30,7 +30,8 @@ impl State {
     /// The search in frame `number`, whose image is displaced by so much.
     pub fn search(&self, number: u64, displacement: (f64, f64)) -> SearchContext<'_> {
         let rotation = orientation::rotation(&self.answer, self.orientation);
-        let samples_radius = match Background::wanted(number, &self.params) {
+        let appearance = self.appearance.model();
+        let samples_radius = match appearance.background_wanted(number, &self.params) {
             0 => 0.0,
             _ => background::radius(&self.answer, &self.bounds),
         };

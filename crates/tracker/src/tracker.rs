@@ -124,15 +124,21 @@ impl Tracker {
     /// answer, and the last ones are not kept.
     pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
         let state = &self.state;
-        let boxes = state.particles.iter().map(|it| state.target_of(it));
-        boxes.zip(state.weights.iter().copied())
+        let cloud = state.cloud.as_ref();
+        let particles = cloud.map_or(&[][..], |cloud| &cloud.particles);
+        let weights = cloud.map_or(&[][..], |cloud| &cloud.weights);
+        let boxes = particles.iter().map(|it| state.target_of(it));
+        boxes.zip(weights.iter().copied())
     }
 
     /// The entries of the bag, oldest first, for people to look at.
     pub fn bag(&self) -> Vec<BagEntry> {
-        let entries = self.state.bag.entries.iter();
-        let view = |entry| BagEntry::of(entry, &self.state.params);
-        entries.map(view).collect()
+        let State {
+            appearance, params, ..
+        } = &self.state;
+        let entries = appearance.model().subspaces(params);
+        let view = |entry| BagEntry::of(entry, params);
+        entries.iter().map(view).collect()
     }
 
     /// The parameters of this tracker.

@@ -1,9 +1,10 @@
 //! (B) Affine subspaces and (C) the bag of them: what the target has looked like, and what surrounds it.
 //!
-//! - `subspace`: an affine subspace A = {μ, U} as vectors (equation 1), for the printed evaluation.
-//! - `span`: the same as coefficients of the few vectors that it is made of, for single-vector candidates.
-//! - `history`: the vectors of the last tracked frames, of which a subspace is made.
-//! - `bag`: up to K subspaces, a new one every W frames (equation 3, section III-C).
+//! - `model`: what a step asks of either model: `printed`, the paper's, or `single_vector`, the extension.
+//! - `bag`: up to K subspaces, a new one every W frames (equation 3, section III-C), and the vectors of the last tracked
+//!   frames, of which a subspace is made.
+//! - `subspace`: an affine subspace A = {μ, U} as vectors (equation 1), as the printed model keeps it.
+//! - `span`: the same as coefficients of the few vectors that it is made of, as the single-vector model keeps it.
 //! - `augmentation`: rotated copies of the first box's image, which make its subspace.
 //! - `background`: vectors of areas beside the target; `mahalanobis`: the metric that their covariance makes.
 //! - `color_histogram`: the colours of the target and of what is around it, which `sparse_bins` stores;
@@ -22,9 +23,11 @@ pub(crate) mod bag;
 pub(crate) mod bag_matrix;
 pub(crate) mod color_histogram;
 pub(crate) mod foreground_map;
-pub(crate) mod history;
 pub(crate) mod mahalanobis;
+pub(crate) mod model;
 pub(crate) mod point_distance;
+pub(crate) mod printed;
+pub(crate) mod single_vector;
 pub(crate) mod span;
 pub(crate) mod sparse_bins;
 pub(crate) mod subspace;

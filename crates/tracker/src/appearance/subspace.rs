@@ -5,10 +5,14 @@ use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 use crate::linalg::jacobi;
+use crate::params::table::Params;
 
 /// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
 /// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
 pub const RANK_TOLERANCE: f64 = 1e-5;
+
+/// The greatest difference of UᵀU from the identity that single precision leaves.
+const ORTHONORMAL: f64 = 1e-3;
 
 /// The most vectors that a subspace is made of: P + 1.
 pub(crate) const MAX_VECTORS: usize = 11;
@@ -55,6 +59,20 @@ impl AffineSubspace {
     /// The number of columns of U: n, or fewer.
     pub fn dim(&self) -> usize {
         self.basis.len() / self.mean.len().max(1)
+    }
+
+    /// Whether this may be a subspace of a tracker with `params`: of its sizes, with orthonormal columns.
+    pub(crate) fn is_valid_for(&self, params: &Params) -> bool {
+        let (len, dim) = (params.feature_len(), self.dim());
+        let has_sizes = self.mean.len() == len
+            && self.basis.len().is_multiple_of(len)
+            && dim <= params.basis_dim as usize;
+        has_sizes && {
+            let gram = gram(&self.basis, len);
+            gram.view((0, 0), (dim, dim))
+                .into_owned()
+                .is_identity(ORTHONORMAL)
+        }
     }
 }
 

@@ -27,7 +27,12 @@ pub(crate) fn between<const M: usize, const N: usize>(
     columns: usize,
     params: &Params,
 ) -> Lanes {
-    let (number, alpha, gamma) = (Lanes::splat, params.alpha, params.gamma());
+    // γ = 1 / D: the greatest squared distance of two patches is D.
+    let (number, alpha, gamma) = (
+        Lanes::splat,
+        params.alpha,
+        1.0 / params.feature_len() as f64,
+    );
     // ‖μ - μₖ‖² (equation 5), where μ = V 1 / (P + 1); rounding can put it below 0.
     let mean_product = products.with_mean::<M>(k).sum() / number(columns as f64);
     let origins = batch.mean_square - number(2.0) * mean_product + number(entry.mean_square);

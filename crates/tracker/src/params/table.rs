@@ -197,32 +197,6 @@ impl Params {
         cells * self.features.channels()
     }
 
-    /// γ (equation 5): one over the greatest squared distance of two feature vectors. Two unit vectors are at most 2
-    /// apart.
-    pub(crate) fn gamma(&self) -> f64 {
-        if self.single_vector_candidate {
-            0.25
-        } else {
-            1.0 / self.feature_len() as f64
-        }
-    }
-
-    /// How many particles are kept from one frame to the next.
-    pub(crate) fn stored_particles(&self) -> usize {
-        match self.search {
-            Search::Resampled => self.particles as usize,
-            Search::Answer => 0,
-        }
-    }
-
-    /// How many samples the background's metric is made of.
-    pub(crate) fn metric_samples(&self) -> usize {
-        match self.single_vector_candidate {
-            true => self.background_samples as usize,
-            false => 0,
-        }
-    }
-
     /// How many of the bag's entries are pinned.
     pub(crate) fn pinned_entries(&self) -> usize {
         usize::from(self.pinned_weight > 0.0 && self.bag_size > 1)
