@@ -1,6 +1,6 @@
 //! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
 
-use crate::http::extract::overrides::{ParamOverrides, by_name};
+use crate::http::extract::overrides::ParamOverrides;
 use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
 use std::borrow::Cow;
@@ -17,9 +17,9 @@ impl ToSchema for ParamOverrides {
 impl PartialSchema for ParamOverrides {
     /// An object with a property for each parameter.
     fn schema() -> RefOr<Schema> {
-        let mut defaults = by_name(&Preset::default().params());
+        let mut defaults = ParamOverrides::from(&Preset::default().params());
         // Without one, a session draws its own.
-        defaults.remove("seed");
+        defaults.take("seed");
         let object = Params::TABLE.iter().fold(
             ObjectBuilder::new()
                 .description(Some(
@@ -28,7 +28,7 @@ impl PartialSchema for ParamOverrides {
                      drawn.",
                 ))
                 .additional_properties(Some(AdditionalProperties::FreeForm(false))),
-            |object, row| object.property(row.name, param(row, defaults.remove(row.name))),
+            |object, row| object.property(row.name, param(row, defaults.take(row.name))),
         );
         object.build().into()
     }
@@ -63,21 +63,17 @@ fn param(row: &Parameter, default: Option<Value>) -> Schema {
             greatest.map(Number::Float),
         ),
         "u32" => (Type::Integer, least.map(whole), greatest.map(whole)),
-        "u64" => (
+        _ => (
             Type::Integer,
             Some(Number::UInt(0)),
             Some(Number::UInt(usize::MAX)),
         ),
-        "bool" => (Type::Boolean, None, None),
-        _ => (Type::String, None, None),
     };
-    let choices = (!row.choices.is_empty()).then_some(row.choices.iter().copied());
     let schema = ObjectBuilder::new()
         .schema_type(schema_type)
         .description(Some(row.description.trim()))
         .minimum(minimum)
         .maximum(maximum)
-        .enum_values(choices)
         .default(default);
     schema.build().into()
 }

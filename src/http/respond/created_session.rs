@@ -9,7 +9,6 @@ use crate::sessions::{Opened, PerTarget, Session};
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::{IntoResponse, Response};
-use bagtrack_tracker::Params;
 use serde::Serialize;
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
@@ -33,7 +32,7 @@ pub struct CreatedSession {
     /// With `verbose`: the tracker's parameters, with the seed that was drawn when none was given.
     #[serde(rename = "parameters", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = ParamOverrides, nullable = false, required = false)]
-    params: Option<Params>,
+    params: Option<ParamOverrides>,
     /// When the session ends if no frame comes (RFC 3339); every frame moves this on.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
     expires_at: String,
@@ -55,7 +54,7 @@ impl CreatedSession {
                 PerTarget::List(list) => Some(list),
             },
             image: session.source_size().into(),
-            params: is_verbose.then(|| session.params().clone()),
+            params: is_verbose.then(|| session.params().into()),
             expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
         }
     }
