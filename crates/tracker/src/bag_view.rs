@@ -1,7 +1,7 @@
 //! The bag for people: each entry as its subspace, and each vector of it as pictures.
 
-use crate::appearance::subspace::AffineSubspace;
 use crate::features::hog::channels::{CHANNELS, CHROMA, DIRECTIONS, GRAY};
+use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::{Features, Params};
 
 /// One entry of the bag: an affine subspace (equation 1).

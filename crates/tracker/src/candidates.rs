@@ -13,9 +13,10 @@ use crate::classifier::samples::TrainingSamples;
 use crate::confidence::score::Evidence;
 use crate::features::extractor::Extractor;
 use crate::image::frame::Frame;
+use crate::image::warp::Rotation;
 use crate::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::linalg::vector_ops;
-use crate::motion::particles::Particle;
+use crate::motion::particles::{Particle, StateBounds};
 use crate::motion::search;
 use crate::params::table::Params;
 use crate::state::State;
@@ -40,8 +41,26 @@ fn center_simd<S: Simd>(
 /// The frame rotated about a particle, and its channels.
 #[derive(Debug, Default)]
 pub(crate) struct RotatedView {
-    pub image: Frame,
-    pub extractor: Extractor,
+    image: Frame,
+    extractor: Extractor,
+}
+
+impl RotatedView {
+    /// Becomes the view of `frame` in which a particle at `angle` radians is upright.
+    pub fn rotate(
+        &mut self,
+        frame: &Frame,
+        particle: Particle,
+        angle: f64,
+        bounds: &StateBounds,
+        params: &Params,
+    ) {
+        let rotation = Rotation::about((particle.x, particle.y), angle);
+        let window = Extractor::window(&[particle], 0.0, bounds, params);
+        self.image = rotation.apply(frame, &window, std::mem::take(&mut self.image));
+        self.extractor
+            .compute_channels(&self.image, &[particle], 0.0, bounds, params);
+    }
 }
 
 /// The particles of a frame, and all that is computed of them.
@@ -130,31 +149,30 @@ impl Candidates {
         let (model, comparison) = (state.appearance.model(), &mut self.comparison);
         model.compare(candidates, &state.params, comparison, &mut self.distances);
         if state.discriminant.is_on() {
-            model.score(candidates, comparison, &mut self.samples);
+            let squares = candidates.squares;
+            match model.query_products(squares.len(), comparison) {
+                Some(products) => self.samples.push_scores(products, squares),
+                None => self.samples.score_vectors(candidates.values),
+            }
         }
     }
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
     /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
-    pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
-        self.weights.clear();
-        self.weights.extend_from_slice(log_priors);
-        let (likelihoods, scores) = (&mut self.likelihoods, &self.samples.scores);
-        let weights = &mut self.weights;
-        weigh(
-            likelihoods,
-            &self.distances,
-            scores,
-            params.sigma,
-            params,
-            weights,
-        );
-        weights::arg_max(&self.weights)
+    pub fn posterior(&mut self, log_priors: &[f64], params: &Params) -> usize {
+        let (weights, distances) = (&mut self.weights, &self.distances);
+        weights.clear();
+        weights.extend_from_slice(log_priors);
+        add_scores(&self.samples.scores, params, weights);
+        let pinned = (params.pinned_entries(), params.pinned_weight);
+        let likelihoods = &mut self.likelihoods;
+        weights::sum_rule_weights(likelihoods, distances, params.sigma, pinned, weights);
+        weights::arg_max(weights)
     }
 
     /// The weights of one particle in several `views` of the frame, with these logarithmic priors and this σ. The
     /// particles of the frame stay as they are.
-    pub fn weigh_views<const N: usize>(
+    pub fn posterior_in_views<const N: usize>(
         &mut self,
         particle: Particle,
         views: &mut [RotatedView; N],
@@ -170,15 +188,10 @@ impl Candidates {
         let mut weights = log_priors;
         let distances = &self.distances[first * entries..];
         let scores = self.samples.scores.get(first..).unwrap_or_default();
+        add_scores(scores, &state.params, &mut weights);
+        let pinned = (state.params.pinned_entries(), state.params.pinned_weight);
         let likelihoods = &mut self.likelihoods;
-        weigh(
-            likelihoods,
-            distances,
-            scores,
-            sigma,
-            &state.params,
-            &mut weights,
-        );
+        weights::sum_rule_weights(likelihoods, distances, sigma, pinned, &mut weights);
         self.particles.truncate(first);
         self.squares.truncate(first);
         self.distances.truncate(first * entries);
@@ -191,6 +204,11 @@ impl Candidates {
         &self.distances[index * self.entries()..][..self.entries()]
     }
 
+    /// The distance of particle `index` to the first entry of the bag, which is that of the first box where it is pinned.
+    pub fn first_distance_of(&self, index: usize) -> f64 {
+        self.distances_of(index)[0]
+    }
+
     /// The discriminant's score of particle `index`; none without a discriminant.
     pub fn score_of(&self, index: usize) -> Option<f32> {
         self.samples.scores.get(index).copied()
@@ -201,7 +219,7 @@ impl Candidates {
     pub fn evidence(&self, index: usize, mean_first_distance: f64, scale: f64) -> Evidence {
         let distances = self.distances_of(index);
         Evidence {
-            first_distance: distances[0],
+            first_distance: self.first_distance_of(index),
             mean_first_distance,
             nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.score_of(index),
@@ -215,20 +233,11 @@ impl Candidates {
     }
 }
 
-/// Turns `weights`, which are logarithmic priors, into the weights of particles with these distances to the bag's
-/// entries and these scores of the discriminant; there are no scores without one.
-fn weigh(
-    likelihoods: &mut Likelihoods,
-    distances: &[f64],
-    scores: &[f32],
-    sigma: f64,
-    params: &Params,
-    weights: &mut [f64],
-) {
+/// Adds the logarithm of the discriminant's likelihood to `exponents`, the logarithms of priors; there are no scores
+/// without a discriminant.
+fn add_scores(scores: &[f32], params: &Params, exponents: &mut [f64]) {
     let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    for (weight, score) in weights.iter_mut().zip(scores) {
-        *weight += params.discriminant_weight * f64::from(score - max);
+    for (exponent, score) in exponents.iter_mut().zip(scores) {
+        *exponent += params.discriminant_weight * f64::from(score - max);
     }
-    let pinned = (params.pinned_entries(), params.pinned_weight);
-    weights::weigh(likelihoods, distances, sigma, pinned, weights);
 }

@@ -80,7 +80,7 @@ impl State {
     /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
     fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
         let Workspace { views, scratch } = workspace;
-        let image = self.original(frame, &mut views.downsampled);
+        let image = self.working_view(frame, &mut views.downsampled);
         // All particles are there, with equal weights.
         self.cloud = Cloud::at(self.answer, &self.params);
         let profiles = || GlobalMotion::new(frame);

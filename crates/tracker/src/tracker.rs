@@ -5,13 +5,13 @@ use std::borrow::Cow;
 use crate::bag_view::BagEntry;
 use crate::candidates::Candidates;
 use crate::confidence::score::Evidence;
+use crate::diagnostics::Diagnostics;
 use crate::error::TrackerError;
 use crate::estimate::Estimate;
 use crate::image::frame::{Frame, FrameFormat};
 use crate::image::rect::Rect;
 use crate::input;
 use crate::params::table::Params;
-use crate::seen::Seen;
 use crate::snapshot;
 use crate::state::State;
 use crate::workspace;
@@ -57,12 +57,15 @@ impl Tracker {
         Ok(self.advance(frame, |_, _| ())?.0)
     }
 
-    /// Like [`step`](Self::step), and tells what the tracker saw.
+    /// Like [`step`](Self::step), with the particles and votes that the answer was chosen from.
     ///
     /// # Errors
     /// As for [`step`](Self::step).
-    pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
-        self.advance(frame, Seen::of)
+    pub fn step_with_diagnostics(
+        &mut self,
+        frame: &Frame,
+    ) -> Result<(Estimate, Diagnostics), TrackerError> {
+        self.advance(frame, Diagnostics::of)
     }
 
     /// Steps, and has a look at the candidates of the step.

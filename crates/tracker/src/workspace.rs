@@ -46,8 +46,8 @@ pub(crate) struct Scratch {
     pub sums: Vec<f64>,
     /// For each particle the logarithm of its prior.
     pub log_priors: Vec<f64>,
-    /// Particles where they are in the original view.
-    pub original: Vec<Particle>,
+    /// Particles where they are in the frame that is not rotated.
+    pub in_frame: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
     /// The frame at other angles of the target.

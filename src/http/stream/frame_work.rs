@@ -10,7 +10,7 @@ use crate::sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
     Tracked,
 };
-use bagtrack_tracker::Seen;
+use bagtrack_tracker::Diagnostics;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -50,7 +50,7 @@ pub struct Given {
     /// Whether it was given before.
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
-    pub seen: Option<Seen>,
+    pub seen: Option<Diagnostics>,
     /// The last frame whose state is in the store.
     pub checkpoint: Option<u64>,
 }

@@ -3,8 +3,7 @@
 //! - `model`: what a step asks of either model: `printed`, the paper's, or `single_vector`, the extension.
 //! - `bag`: up to K subspaces, a new one every W frames (equation 3, section III-C), and the vectors of the last tracked
 //!   frames, of which a subspace is made.
-//! - `subspace`: an affine subspace A = {μ, U} as vectors (equation 1), as the printed model keeps it.
-//! - `span`: the same as coefficients of the few vectors that it is made of, as the single-vector model keeps it.
+//! - `span`: an affine subspace as coefficients of the few vectors that it is made of, as the single-vector model keeps it.
 //! - `augmentation`: rotated copies of the first box's image, which make its subspace.
 //! - `background`: vectors of areas beside the target; `mahalanobis`: the metric that their covariance makes.
 //! - `color_histogram`: the colours of the target and of what is around it, which `sparse_bins` stores;
@@ -30,4 +29,3 @@ pub(crate) mod printed;
 pub(crate) mod single_vector;
 pub(crate) mod span;
 pub(crate) mod sparse_bins;
-pub(crate) mod subspace;

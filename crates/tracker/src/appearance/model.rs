@@ -7,10 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::appearance::point_distance::PointDistance;
 use crate::appearance::printed::Printed;
 use crate::appearance::single_vector::SingleVector;
-use crate::appearance::subspace::AffineSubspace;
 use crate::appearance::{background, span};
-use crate::classifier::samples::TrainingSamples;
 use crate::grassmann::evaluation::Evaluation;
+use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::Params;
 
 /// The bag of affine subspaces, and what the next one is made of.
@@ -54,7 +53,7 @@ pub(crate) trait AppearanceModel {
     /// (C) Learns the vector of the answer to frame `number`: every W-th frame for the bag too.
     fn learn(&mut self, answer: &[f32], number: u64, params: &Params, scratch: &mut Scratch);
 
-    /// Loads the bag, and two vectors whose products with candidates [`score`](Self::score) needs.
+    /// Loads the bag, and two vectors for [`query_products`](Self::query_products).
     fn load(&self, queries: [&[f32]; 2], params: &Params, comparison: &mut Comparison);
 
     /// (D) Appends the distances of each candidate to all entries of the bag (equation 4).
@@ -66,13 +65,12 @@ pub(crate) trait AppearanceModel {
         distances: &mut Vec<f64>,
     );
 
-    /// Appends the discriminant's scores of the candidates that were compared last.
-    fn score(
+    /// The products of the `count` candidates that were compared last with the two vectors, where comparing makes them.
+    fn query_products<'a>(
         &self,
-        candidates: Vectors<'_>,
-        comparison: &Comparison,
-        samples: &mut TrainingSamples,
-    );
+        count: usize,
+        comparison: &'a Comparison,
+    ) -> Option<[&'a [f32]; 2]>;
 
     /// The bag as vectors, oldest first.
     fn subspaces(&self, params: &Params) -> Vec<AffineSubspace>;

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::appearance::bag::{Bag, History};
 use crate::appearance::model::{AppearanceModel, Comparison, Scratch, Vectors};
-use crate::appearance::subspace::{self, AffineSubspace};
-use crate::classifier::samples::TrainingSamples;
+use crate::grassmann::subspace::{self, AffineSubspace};
 use crate::params::table::Params;
 
 /// The bag B (equation 3), and the patches that V is made of (equation 2).
@@ -66,8 +65,8 @@ impl AppearanceModel for Printed {
         distances.extend_from_slice(comparison.printed.distances(candidates.values, history));
     }
 
-    fn score(&self, candidates: Vectors<'_>, _: &Comparison, samples: &mut TrainingSamples) {
-        samples.score_vectors(candidates.values);
+    fn query_products<'a>(&self, _: usize, _: &'a Comparison) -> Option<[&'a [f32]; 2]> {
+        None
     }
 
     fn subspaces(&self, _: &Params) -> Vec<AffineSubspace> {

@@ -10,10 +10,9 @@ use crate::appearance::background::{self, Background};
 use crate::appearance::bag::{Bag, History};
 use crate::appearance::model::{AppearanceModel, Comparison, Scratch, Vectors};
 use crate::appearance::span::{self, Span};
-use crate::appearance::subspace::AffineSubspace;
 use crate::appearance::{augmentation, bag_matrix, point_distance};
-use crate::classifier::samples::TrainingSamples;
 use crate::features::quantized::QuantizedVector;
+use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::Params;
 
 /// The bag (equation 3), the history, and the background, under whose metric vectors are compared.
@@ -80,15 +79,12 @@ impl AppearanceModel for SingleVector {
         point_distance::distances(compared, candidates, params, distances);
     }
 
-    fn score(
+    fn query_products<'a>(
         &self,
-        candidates: Vectors<'_>,
-        comparison: &Comparison,
-        samples: &mut TrainingSamples,
-    ) {
-        let squares = candidates.squares;
-        let products = comparison.single_vector.query_products(squares.len());
-        samples.push_scores(products, squares);
+        count: usize,
+        comparison: &'a Comparison,
+    ) -> Option<[&'a [f32]; 2]> {
+        Some(comparison.single_vector.query_products(count))
     }
 
     /// Those of the vectors that the entries keep, under the plain metric.

@@ -10,8 +10,8 @@ use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 use crate::appearance::background::Background;
-use crate::appearance::subspace::{self, AffineSubspace, Gram};
 use crate::features::quantized::QuantizedVector;
+use crate::grassmann::subspace::{self, AffineSubspace, Gram};
 use crate::linalg::{combinations, gemm, jacobi, vector_ops};
 use crate::params::table::Params;
 

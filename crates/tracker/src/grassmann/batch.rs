@@ -2,8 +2,8 @@
 
 use nalgebra::{SMatrix, SimdComplexField, SimdPartialOrd, SimdValue};
 
-use crate::appearance::subspace::RANK_TOLERANCE;
 use crate::grassmann::Lanes;
+use crate::grassmann::subspace::RANK_TOLERANCE;
 use crate::linalg::jacobi;
 
 /// The subspaces {μ, U} of candidates with V of up to M columns, as what V's columns are multiplied with.

@@ -2,10 +2,10 @@
 
 use pulp::{Arch, Simd};
 
-use crate::appearance::subspace::{self, AffineSubspace};
 use crate::grassmann::batch::Batch;
 use crate::grassmann::distance::Entry;
 use crate::grassmann::inner_products::InnerProducts;
+use crate::grassmann::subspace::{self, AffineSubspace};
 use crate::grassmann::{LANES, distance};
 use crate::params::table::Params;
 

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector, SimdValue};
 use pulp::Simd;
 
-use crate::appearance::subspace::{self, AffineSubspace};
+use crate::grassmann::subspace::{self, AffineSubspace};
 use crate::grassmann::{LANES, Lanes};
 use crate::linalg::gemm;
 use crate::params::table::Params;

@@ -32,6 +32,7 @@ mod distance;
 pub(crate) mod evaluation;
 mod inner_products;
 mod principal_angles;
+pub(crate) mod subspace;
 
 use crate::linalg::acos::LANES;
 

@@ -1,4 +1,4 @@
-//! The hypotheses of a frame: particles are proposed, and weighed by all that is known of them.
+//! (A) Particles are proposed, and weighed by all that is known of them.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -23,7 +23,7 @@ impl State {
         let (bounds, params, radius) = (&self.bounds, &self.params, search.window_radius());
         scratch.candidates.begin(self, orientation::HYPOTHESES);
         clear_and_reserve(&mut scratch.log_priors, search::max_count(params));
-        clear_and_reserve(&mut scratch.original, search::max_count(params));
+        clear_and_reserve(&mut scratch.in_frame, search::max_count(params));
         let extractor = &mut scratch.extractor;
         let particles = &mut scratch.candidates.particles;
         match &self.cloud {
@@ -52,7 +52,7 @@ impl State {
         scratch: &mut Scratch,
     ) {
         if self.params.static_penalty > 0.0 {
-            let displaced = search.in_original(search.displaced());
+            let displaced = search.in_frame(search.displaced());
             let test = &mut scratch.change_test;
             test.load(frame, &self.answer, &self.bounds);
             test.compare(
@@ -66,12 +66,19 @@ impl State {
 
     /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`.
     /// Returns the most likely one of all.
-    pub fn weigh(&self, image: &Frame, search: &SearchContext<'_>, scratch: &mut Scratch) -> usize {
+    pub fn weigh_particles(
+        &self,
+        image: &Frame,
+        search: &SearchContext<'_>,
+        scratch: &mut Scratch,
+    ) -> usize {
         scratch
             .candidates
             .describe_and_compare(image, &mut scratch.extractor, self);
         self.push_log_priors(search, scratch);
-        scratch.candidates.weigh(&scratch.log_priors, &self.params)
+        scratch
+            .candidates
+            .posterior(&scratch.log_priors, &self.params)
     }
 
     /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
@@ -83,18 +90,18 @@ impl State {
         let (foreground, scale) = (&scratch.foreground, self.answer.scale);
         let last = self.update_gate.last_distance;
         let log_priors = new.iter().enumerate().map(|(index, particle)| {
-            let distance = scratch.candidates.distances_of(known + index)[0];
+            let distance = scratch.candidates.first_distance_of(known + index);
             let prior_width = search::prior_width(last, distance);
             search.log_prior(particle, prior_width)
                 + weight * foreground.mean(particle, scale, &self.bounds)
         });
         scratch.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {
-            scratch.original.clear();
-            let original = new.iter().map(|&particle| search.in_original(particle));
-            scratch.original.extend(original);
+            scratch.in_frame.clear();
+            let in_frame = new.iter().map(|&particle| search.in_frame(particle));
+            scratch.in_frame.extend(in_frame);
             scratch.change_test.penalize(
-                &scratch.original,
+                &scratch.in_frame,
                 &self.bounds,
                 self.params.static_penalty,
                 &mut scratch.log_priors[known..],
