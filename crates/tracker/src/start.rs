@@ -2,7 +2,6 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::appearance::augmentation;
 use crate::appearance::background;
 use crate::appearance::color_histogram::ColorHistogram;
 use crate::appearance::model::Appearance;
@@ -125,8 +124,10 @@ impl State {
         self.learn_scale(image, &answer, scratch);
     }
 
-    /// Appends the feature vectors of the augmented views of the answer to `features`. The extractor has the channels of the last of
-    /// them then.
+    /// Appends the feature vectors of the augmented views of the answer to `features`: copies rotated by some degrees
+    /// either way. A subspace of one vector is a point; with these it spans what the target looks like when it tilts.
+    /// The frame is rotated, so the rim shows what would be there. The extractor has the channels of the last of them
+    /// then.
     fn describe_augmented(
         &self,
         image: &Frame,
@@ -135,7 +136,8 @@ impl State {
     ) {
         let (answer, params) = ([self.answer], &self.params);
         let window = Extractor::window(&answer, 0.0, &self.bounds, params);
-        for angle in augmentation::angles(params) {
+        let angle = params.augmentation_angle.to_radians();
+        for angle in [angle, -angle].into_iter().filter(|it| *it != 0.0) {
             let rotation = Rotation::about((self.answer.x, self.answer.y), angle);
             let rotated = rotation.apply(image, &window, Frame::default());
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);

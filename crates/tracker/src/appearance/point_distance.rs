@@ -150,7 +150,8 @@ mod tests {
     use super::*;
     use crate::appearance::background::{self, Background};
     use crate::appearance::bag::Bag;
-    use crate::appearance::{bag_matrix, span};
+    use crate::appearance::bag_matrix;
+    use crate::appearance::span::{self, Span};
     use crate::features::quantized::QuantizedVector;
     use crate::params::presets::Preset;
     use crate::params::table::Features;

@@ -10,10 +10,13 @@ use crate::appearance::background::{self, Background};
 use crate::appearance::bag::{Bag, History};
 use crate::appearance::model::{AppearanceModel, Comparison, Scratch, Vectors};
 use crate::appearance::span::{self, Span};
-use crate::appearance::{augmentation, bag_matrix, point_distance};
+use crate::appearance::{bag_matrix, point_distance};
 use crate::features::quantized::QuantizedVector;
 use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::Params;
+
+/// The vectors that an entry is made of beside that of the box, when the first box's image is augmented.
+const MAX_AUGMENTED: usize = 2;
 
 /// The bag (equation 3), the history, and the background, under whose metric vectors are compared.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -96,7 +99,7 @@ impl AppearanceModel for SingleVector {
     fn is_valid_for(&self, params: &Params, max: f32) -> bool {
         let len = params.feature_len();
         let is_vector = |vector: &QuantizedVector| vector.is_valid_for(len, max);
-        let most = (params.history as usize).max(augmentation::MAX_VIEWS) + 1;
+        let most = (params.history as usize).max(MAX_AUGMENTED) + 1;
         let is_entry = |entry: &Span| {
             (1..=most).contains(&entry.templates.len()) && entry.templates.iter().all(is_vector)
         };

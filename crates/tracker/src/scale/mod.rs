@@ -1,4 +1,5 @@
-//! The target's scale, once its position is known: the scale filter of DSST (Danelljan et al. 2014).
+//! The target's scale, once its position is known: the scale filter of DSST (Danelljan et al. 2014). All of it is ours:
+//! the paper's scale is that of the best particle.
 //!
 //! In: the feature vectors of a *scale pyramid*, 17 areas around one centre whose sizes differ by 3 % each (`pyramid`
 //! says where they are and how they are described; the caller samples them), f32, one after the other.

@@ -31,7 +31,7 @@ pub(crate) const RESPONSE_STD: f64 = 1.2;
 /// Buffers for one pyramid; nothing in them is kept for the next.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    areas: Vec<Particle>,
+    pub areas: Vec<Particle>,
     /// The feature vectors of a pyramid, smallest area first.
     pub features: Vec<f32>,
     /// Their Fourier transform along the scale: for each frequency the real parts of all features, then the
