@@ -9,8 +9,9 @@ files=target/release-files
 rm -rf "$files"
 mkdir -p "$files"
 
-cargo package --locked --package bagtrack --package bagtrack-client
-cp "target/package/bagtrack-$version.crate" "target/package/bagtrack-client-$version.crate" "$files"
+crates=(bagtrack-tracker bagtrack-ingest bagtrack-sample bagtrack-cli bagtrack-eval bagtrack bagtrack-client)
+cargo package --locked "${crates[@]/#/--package=}"
+for crate in "${crates[@]}"; do cp "target/package/$crate-$version.crate" "$files"; done
 
 [ -x target/python/bin/pip ] || python3 -m venv target/python
 target/python/bin/pip install --quiet --disable-pip-version-check "maturin>=1.9,<2"

@@ -1,11 +1,12 @@
 //! `bagtrack health`: asks a running service whether it is healthy, for health checks in containers without another
 //! client.
 
+use super::address::loopback;
 use bagtrack::http::{parse_duration, parse_listen};
 use http::Uri;
 use std::error::Error;
 use std::io::{Read, Write};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 /// Longest answer that is read; `/healthz` has some hundred bytes.
@@ -45,10 +46,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 /// An address to connect to: a service that listens on all addresses is on the local one.
 fn reachable(mut listen: SocketAddr) -> SocketAddr {
     if listen.ip().is_unspecified() {
-        listen.set_ip(match listen {
-            SocketAddr::V4(_) => IpAddr::V4(Ipv4Addr::LOCALHOST),
-            SocketAddr::V6(_) => IpAddr::V6(Ipv6Addr::LOCALHOST),
-        });
+        listen.set_ip(loopback(listen.ip()));
     }
     listen
 }

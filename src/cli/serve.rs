@@ -3,11 +3,16 @@
 //! It ends with status 0 when all open requests have ended in time, and with 1 when some were cut off, or when a second
 //! signal ended it at once.
 
+use super::address::Addresses;
 use super::log::{Log, LogFormat};
 use super::open_files;
 use super::signals::{self, Signals};
-use bagtrack::http::{Application, Config, MemoryBound};
+use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use std::error::Error;
+use std::net::SocketAddr;
+
+/// How clients speak with the service.
+const SCHEME: &str = "http";
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -39,6 +44,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
+    let base_path = config.base_path.clone();
     let application = Application::bind(config).await?;
     let keys = application.api_keys();
     let mut signals = Signals::listen()?;
@@ -46,7 +52,8 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    tracing::info!("listening on http://{}", application.local_addr()?);
+    let address = application.local_addr()?;
+    tracing::info!("listening on {SCHEME}://{address}");
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -56,6 +63,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
+    tell_addresses(SCHEME, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload_keys(keys));
     let ended = tokio::select! {
@@ -72,5 +80,21 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     match ended {
         true => Ok(()),
         false => Err("requests were cut off".into()),
+    }
+}
+
+/// Logs what to open in a browser.
+fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
+    let Addresses { here, elsewhere } = Addresses::of(scheme, listen, base_path);
+    if let Some(url) = elsewhere {
+        tracing::info!("on other machines, open {url}");
+        if scheme == "http" {
+            tracing::info!(
+                "a phone's browser gives its camera to https only: for that, put a proxy with TLS in front"
+            );
+        }
+    }
+    if let Some(url) = here {
+        tracing::info!("open {url} in a browser");
     }
 }

@@ -74,4 +74,7 @@ pub use store::{
     reconcile,
 };
 pub use streams::{OpenStreams, StreamPlace};
-pub use targets::{Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format};
+pub use targets::{
+    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+    target_seed,
+};

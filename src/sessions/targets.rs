@@ -84,6 +84,11 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
     })
 }
 
+/// The seed of a target, counted from 0, where `seed` is that of the first.
+pub fn target_seed(seed: u64, target: usize) -> u64 {
+    seed.wrapping_add(SEED_STEP.wrapping_mul(target as u64))
+}
+
 impl Targets {
     /// A tracker for each box in `frame`. Before each of them `check` says whether to go on.
     ///
@@ -102,8 +107,7 @@ impl Targets {
         let start = |target: usize, given: &Rect| {
             check().map_err(StartError::Stopped)?;
             let mut params = params.clone();
-            let step = SEED_STEP.wrapping_mul(target as u64);
-            params.seed = params.seed.wrapping_add(step);
+            params.seed = target_seed(params.seed, target);
             Tracker::new(frame, *given, params)
                 .map_err(|error| StartError::Refused { target, error })
         };
