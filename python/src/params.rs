@@ -1,6 +1,6 @@
 //! Keyword arguments to the tracker's parameters.
 
-use bagtrack_tracker::{Parameter, Params, Preset};
+use bagtrack_tracker::{Params, Preset};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
@@ -43,10 +43,11 @@ pub fn params(
 pub fn by_name(params: &Params, py: Python<'_>) -> PyResult<Py<PyDict>> {
     let dict = PyDict::new(py);
     let fields = fields(params);
-    for Parameter { name, .. } in Params::TABLE {
-        match fields[*name].as_u64() {
-            Some(whole) => dict.set_item(name, whole)?,
-            None => dict.set_item(name, fields[*name].as_f64())?,
+    for row in Params::TABLE {
+        let value = &fields[row.name];
+        match value.as_u64() {
+            Some(whole) => dict.set_item(row.name, whole)?,
+            None => dict.set_item(row.name, value.as_f64())?,
         }
     }
     Ok(dict.unbind())
