@@ -16,7 +16,7 @@ use crate::image::frame::Frame;
 use crate::image::warp::Rotation;
 use crate::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::linalg::vector_ops;
-use crate::motion::particles::{Particle, StateBounds};
+use crate::motion::particles::Particle;
 use crate::motion::search;
 use crate::params::table::Params;
 use crate::state::State;
@@ -47,14 +47,8 @@ pub(crate) struct RotatedView {
 
 impl RotatedView {
     /// Becomes the view of `frame` in which a particle at `angle` radians is upright.
-    pub fn rotate(
-        &mut self,
-        frame: &Frame,
-        particle: Particle,
-        angle: f64,
-        bounds: &StateBounds,
-        params: &Params,
-    ) {
+    pub fn rotate(&mut self, frame: &Frame, particle: Particle, angle: f64, state: &State) {
+        let (bounds, params) = (&state.bounds, &state.params);
         let rotation = Rotation::about((particle.x, particle.y), angle);
         let window = Extractor::window(&[particle], 0.0, bounds, params);
         self.image = rotation.apply(frame, &window, std::mem::take(&mut self.image));

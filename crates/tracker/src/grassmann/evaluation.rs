@@ -6,17 +6,14 @@ use nalgebra::{DMatrixView, DVectorView, SMatrix, SVector};
 use pulp::{Arch, Simd};
 
 use crate::grassmann::principal_angles;
-use crate::grassmann::subspace::{self, AffineSubspace, Gram, MAX_VECTORS};
+use crate::grassmann::subspace::{self, AffineSubspace, MAX_VECTORS};
 use crate::linalg::{gemm, jacobi};
 use crate::params::table::Params;
 
 /// n at most.
 const MAX_DIM: usize = 6;
-
-/// Vᵀx of a vector x.
-type Products = SVector<f64, MAX_VECTORS>;
-/// Those of n vectors, or their n combinations of the columns of V.
-type Columns = SMatrix<f64, MAX_VECTORS, MAX_DIM>;
+/// Candidates that are compared together: more of the longest vectors would take many megabytes.
+const BATCH: usize = 128;
 
 /// The evaluation of N candidates against a bag, as [`Tracker::step`](crate::Tracker::step) does it with the preset
 /// `paper`.
@@ -29,7 +26,7 @@ pub struct Evaluation {
     entries: Vec<Entry>,
     /// μ₁, F₁, …, μ_K, F_K, of D values each, and then H.
     bag: Vec<f64>,
-    /// H, and then the candidates.
+    /// H, and then a batch of candidates.
     patches: Vec<f64>,
     /// For each of `patches`, its inner products with all of `bag`.
     products: Vec<f64>,
@@ -46,28 +43,29 @@ struct Entry {
     dim: usize,
 }
 
-/// A candidate's subspace {μ, U} (equation 1) of V = [v, H] (equation 2).
-struct Candidate {
+/// A candidate's subspace {μ, U} (equation 1) of V = [v, H] (equation 2). Matrices have M rows for the columns of V, N
+/// columns for those of U, and are zero beyond.
+struct Candidate<const M: usize, const N: usize> {
     /// P + 1, the number of columns of V.
     columns: usize,
     /// ‖μ‖².
     mean_square: f64,
     /// W S⁻¹, so that U = V W S⁻¹.
-    coefficients: Columns,
+    coefficients: SMatrix<f64, M, N>,
     /// The number of columns of U: n, or fewer where V has fewer directions.
     dim: usize,
 }
 
-impl Candidate {
-    /// From VᵀV, which is zero beyond its P + 1 rows and columns.
+impl<const M: usize, const N: usize> Candidate<M, N> {
+    /// From VᵀV.
     #[inline(always)]
-    fn of(gram: Gram, columns: usize, basis_dim: usize) -> Self {
+    fn of(gram: SMatrix<f64, M, M>, columns: usize, basis_dim: usize) -> Self {
         // μ = V 1 / (P + 1).
         let mean_square = gram.sum() / (columns * columns) as f64;
         // VᵀV = W S² Wᵀ.
         let (squares, w) = jacobi::eigenpairs(gram);
         let dim = subspace::dominant(squares.iter().copied(), basis_dim);
-        let mut coefficients = Columns::zeros();
+        let mut coefficients = SMatrix::<f64, M, N>::zeros();
         for j in 0..dim {
             coefficients.set_column(j, &(w.column(j) / squares[j].sqrt()));
         }
@@ -81,7 +79,13 @@ impl Candidate {
 
     /// dist(A, B\[k\]) (equation 4), from Vᵀμₖ and VᵀFₖ.
     #[inline(always)]
-    fn distance(&self, entry: Entry, of_mean: Products, of_basis: Columns, params: &Params) -> f64 {
+    fn distance(
+        &self,
+        entry: Entry,
+        of_mean: SVector<f64, M>,
+        of_basis: SMatrix<f64, M, N>,
+        params: &Params,
+    ) -> f64 {
         // ‖μ - μₖ‖² (equation 5); rounding can put it below 0.
         let mean_product = of_mean.sum() / self.columns as f64;
         let origins = (self.mean_square - 2.0 * mean_product + entry.mean_square).max(0.0);
@@ -147,48 +151,60 @@ impl Evaluation {
         let vectors: usize = self.entries.iter().map(|entry| 1 + entry.dim).sum();
         self.bag.truncate(vectors * len);
         self.bag.extend_from_slice(&self.patches);
-        widen(candidates, &mut self.patches);
-
-        let (rows, columns) = (self.patches.len() / len, vectors + previous);
-        self.products.resize(rows * columns, 0.0);
-        gemm::inner_products(&self.patches, &self.bag, len, columns, &mut self.products);
+        let columns = vectors + previous;
         self.distances.clear();
-        compare(self, vectors, previous);
+        for batch in candidates.chunks(BATCH * len) {
+            self.patches.truncate(previous * len);
+            widen(batch, &mut self.patches);
+            let (patches, products) = (&self.patches, &mut self.products);
+            products.resize(patches.len() / len * columns, 0.0);
+            gemm::inner_products(patches, &self.bag, len, columns, products);
+            compare(self, vectors, previous);
+        }
         &self.distances
     }
 }
 
-/// Appends the distances of all candidates, by the products with so many `vectors` of the bag and `previous` patches.
+/// Appends the distances of a batch, with matrices of the paper's size or of the largest.
 #[pulp::with_simd(compare = Arch::new())]
 #[inline(always)]
 fn compare_simd<S: Simd>(_: S, evaluation: &mut Evaluation, vectors: usize, previous: usize) {
+    match previous <= 5 && evaluation.params.basis_dim <= 3 {
+        true => compare_as::<6, 3>(evaluation, vectors, previous),
+        false => compare_as::<MAX_VECTORS, MAX_DIM>(evaluation, vectors, previous),
+    }
+}
+
+/// Appends the distances of a batch, by its products with so many `vectors` of the bag and `previous` patches.
+#[inline(always)]
+fn compare_as<const M: usize, const N: usize>(
+    evaluation: &mut Evaluation,
+    vectors: usize,
+    previous: usize,
+) {
     let (params, len) = (&evaluation.params, evaluation.params.feature_len());
     let (rows, columns) = (vectors + previous, evaluation.patches.len() / len);
     let products = DMatrixView::from_slice(&evaluation.products, rows, columns);
-    for (i, v) in evaluation
-        .patches
-        .chunks_exact(len)
-        .enumerate()
-        .skip(previous)
-    {
+    let patches = evaluation.patches.chunks_exact(len).enumerate();
+    for (i, v) in patches.skip(previous) {
         // Vᵀx of the x-th vector; zero beyond the columns of V, v and H.
         let with = |x: usize| {
-            let mut column = Products::zeros();
+            let mut column = SVector::<f64, M>::zeros();
             column[0] = products[(x, i)];
             (0..previous).for_each(|j| column[1 + j] = products[(x, j)]);
             column
         };
-        let mut gram = Gram::zeros();
+        let mut gram = SMatrix::<f64, M, M>::zeros();
         gram[(0, 0)] = square(v);
         for j in 1..=previous {
             let column = with(vectors + j - 1);
             gram.set_column(j, &column);
             gram[(j, 0)] = column[0];
         }
-        let candidate = Candidate::of(gram, 1 + previous, params.basis_dim as usize);
+        let candidate = Candidate::<M, N>::of(gram, 1 + previous, params.basis_dim as usize);
         let mut mean = 0;
         for &entry in &evaluation.entries {
-            let mut of_basis = Columns::zeros();
+            let mut of_basis = SMatrix::<f64, M, N>::zeros();
             for j in 0..entry.dim {
                 of_basis.set_column(j, &with(mean + 1 + j));
             }

@@ -60,13 +60,13 @@ impl State {
         if !is_on(&self.params) || found.first_distance >= MAX_DISTANCE {
             return self.orientation;
         }
-        let (bounds, params, step) = (&self.bounds, &self.params, STEP.to_radians());
+        let step = STEP.to_radians();
         let angles = [self.orientation - step, self.orientation + step];
         for (view, angle) in scratch.rotated.iter_mut().zip(angles) {
-            view.rotate(frame, found.answer, angle, bounds, params);
+            view.rotate(frame, found.answer, angle, self);
         }
         let log_priors = angles.map(|angle| -0.5 * (angle / PRIOR_STD.to_radians()).powi(2));
-        let (views, sigma) = (&mut scratch.rotated, SIGMA_FACTOR * params.sigma);
+        let (views, sigma) = (&mut scratch.rotated, SIGMA_FACTOR * self.params.sigma);
         let candidates = &mut scratch.candidates;
         let weights = candidates.posterior_in_views(found.answer, views, log_priors, sigma, self);
         let change = (weights[1] - weights[0]) * step;
