@@ -13,7 +13,7 @@ export class Problem extends Error {
     super(document.detail ?? document.title ?? "The service cannot be reached.");
     this.name = "Problem";
     /** The kind: the last part of the type, such as `session-not-found`; `unreachable` where there was no answer. */
-    this.slug = (document.type ?? (document.status ? "" : "unreachable")).split(":").pop() ?? "";
+    this.slug = (document.type ?? (document.status ? "" : "unreachable")).split(/[#:]/).pop() ?? "";
     /** The status of the answer; 0 where there was none. */
     this.status = document.status ?? 0;
     /** With a wrong frame number: the number of the next frame. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 
@@ -18,7 +19,7 @@ class ServiceError(Exception):
     @property
     def kind(self) -> str:
         """The kind of problem, like `invalid-box`; empty where the answer was no problem document."""
-        return str(self.problem.get("type", "")).rpartition(":")[2]
+        return re.split("[#:]", str(self.problem.get("type", "")))[-1]
 
 
 class ServiceUnavailable(Exception):

@@ -5,6 +5,8 @@
 //! `track`.
 
 mod address;
+#[cfg(feature = "tls")]
+mod any_certificate;
 mod completions;
 mod evaluate;
 #[cfg(feature = "otel")]

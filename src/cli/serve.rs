@@ -6,13 +6,10 @@
 use super::address::Addresses;
 use super::log::{Log, LogFormat};
 use super::open_files;
-use super::signals::{self, Signals};
+use super::signals::{self, Reloaded, Signals};
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use std::error::Error;
 use std::net::SocketAddr;
-
-/// How clients speak with the service.
-const SCHEME: &str = "http";
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -46,14 +43,14 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let base_path = config.base_path.clone();
     let application = Application::bind(config).await?;
-    let keys = application.api_keys();
+    let reloaded = Reloaded::of(&application);
     let mut signals = Signals::listen()?;
     let (mut first, again) = (signals.clone(), &mut signals);
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    let address = application.local_addr()?;
-    tracing::info!("listening on {SCHEME}://{address}");
+    let (scheme, address) = (application.scheme(), application.local_addr()?);
+    tracing::info!("listening on {scheme}://{address}");
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -63,9 +60,9 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
-    tell_addresses(SCHEME, address, &base_path);
+    tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
-    let reloads = tokio::spawn(signals::reload_keys(keys));
+    let reloads = tokio::spawn(signals::reload(reloaded));
     let ended = tokio::select! {
         ended = application.serve(first.shutdown()) => ended,
         () = again.second_shutdown() => {
@@ -90,7 +87,7 @@ fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
         tracing::info!("on other machines, open {url}");
         if scheme == "http" {
             tracing::info!(
-                "a phone's browser gives its camera to https only: for that, put a proxy with TLS in front"
+                "a phone's browser gives its camera to https only: see --tls-cert and docs/HTTPS.md"
             );
         }
     }

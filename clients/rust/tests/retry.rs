@@ -120,7 +120,7 @@ async fn a_call_that_is_dropped_counts_as_one_without_answer() {
 
 #[tokio::test]
 async fn a_refused_frame_is_not_sent_again() {
-    let text = r#"{"type": "urn:bagtrack:problem:invalid-image", "title": "Not an image", "status": 422, "index": 0}"#;
+    let text = r#"{"type": "/docs/problems#invalid-image", "title": "Not an image", "status": 422, "index": 0}"#;
     let replies = [created(0), Reply::new(422, text), answer(1)];
     let script = Script::start(replies).await;
     let mut session = open(client(&script)).await;
@@ -151,7 +151,7 @@ async fn a_proxys_page_is_a_problem_without_a_kind() {
 async fn frames_that_the_service_lost_are_sent_again_as_far_as_they_are_kept() {
     let conflict = |expected: u64| {
         let text = format!(
-            r#"{{"type": "urn:bagtrack:problem:frame-out-of-order", "status": 409, "expected_frame": {expected}}}"#
+            r#"{{"type": "/docs/problems#frame-out-of-order", "status": 409, "expected_frame": {expected}}}"#
         );
         Reply::new(409, &text)
     };

@@ -4,14 +4,33 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use crate::sessions::{QueueFull, QueuePermit};
+use std::time::Duration;
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, sleep, timeout_at};
+
+/// How long a frame of a video waits before it asks for a place in the quota again.
+const RETRY: Duration = Duration::from_millis(20);
 
 /// A place for a process that decodes a video, given back when this is dropped.
 #[derive(Debug)]
 pub struct VideoPlace {
     _of_client: OwnedSemaphorePermit,
     _of_all: OwnedSemaphorePermit,
+}
+
+/// Waits until a frame of a video has a place in the client's quota of frames.
+///
+/// # Errors
+/// It has none in the time that a request may take.
+pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Problem> {
+    let account = state.clients.account(client);
+    let deadline = Instant::now() + state.config.work_timeout;
+    loop {
+        match account.count_frames(1) {
+            Err(_) if Instant::now() < deadline => sleep(RETRY).await,
+            counted => return counted,
+        }
+    }
 }
 
 impl VideoPlace {

@@ -30,7 +30,7 @@ const GROUND: Rgb<u8> = Rgb([24, 25, 28]);
 #[into_params(parameter_in = Query)]
 pub struct BagSettings {
     /// Whose bag, counted from 0, in a session that was opened with `boxes`.
-    #[param(required = false, nullable = false, default = 0)]
+    #[param(value_type = u32, required = false, nullable = false, maximum = 15, default = 0)]
     target: Option<usize>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::snapshot::charged;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, FrameNumber, Settings};
 use crate::http::extract::switch::Switch;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
@@ -31,9 +31,9 @@ use std::sync::Arc;
 #[into_params(parameter_in = Query)]
 pub struct FramesSettings {
     /// The number of the (first) frame of this request.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    frame: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    frame: Option<FrameNumber>,
     /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
     /// has the answer as JSON.
     #[serde(default)]
@@ -87,12 +87,10 @@ operation_problems!(
         FramesSettings,
     ),
     request_body(
-        description = "The frame in one of three forms; the second and third take several.",
+        description = "The frame as a raw body (JPEG, PNG, WebP, or a video: MP4, WebM, GIF, Motion JPEG as \
+            `video/x-motion-jpeg`), as a form, or as JSON with base64. The last two take several frames.",
         content(
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
-            (BinaryBody = "video/mp4"), (BinaryBody = "video/webm"), (BinaryBody = "image/gif"),
-            (BinaryBody = "video/x-motion-jpeg"),
             (FramesForm = "multipart/form-data"),
             (FramesJson = "application/json", example = json!({"frame": example_frames::next()})),
         )

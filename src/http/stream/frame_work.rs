@@ -8,9 +8,9 @@ use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
 use crate::sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
-    Tracked,
+    Tracked, box_warnings,
 };
-use bagtrack_tracker::Diagnostics;
+use bagtrack_tracker::{Diagnostics, Rect};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -51,6 +51,8 @@ pub struct Given {
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
     pub seen: Option<Diagnostics>,
+    /// What may be wrong with the box that came with it.
+    pub warnings: Option<Vec<String>>,
     /// The last frame whose state is in the store.
     pub checkpoint: Option<u64>,
 }
@@ -180,7 +182,11 @@ impl FrameWork {
             };
             let at = session.session().clone();
             match self.state.service.advance(session, queue, next).await {
-                Ok(answered) => return Ok(Given::of(answered, shown)),
+                Ok(answered) => {
+                    let given = header.r#box.map(Rect::from);
+                    let warnings = box_warnings(given.as_slice(), at.source_size());
+                    return Ok(Given::of(answered, shown, warnings));
+                }
                 Err(FramesError::Act(ActError::Store(_))) if Instant::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
                     number = number.or(Some(at.latest_frame() + 1));
@@ -195,13 +201,14 @@ impl FrameWork {
 
 impl Given {
     /// The answer to one frame, with what the tracker of this target saw.
-    fn of(mut answered: Tracked, target: usize) -> Self {
+    fn of(mut answered: Tracked, target: usize, warnings: Option<Vec<String>>) -> Self {
         let seen =
             (target < answered.diagnostics.len()).then(|| answered.diagnostics.swap_remove(target));
         Self {
             estimates: answered.estimates.swap_remove(0),
             replayed: answered.replayed,
             seen,
+            warnings,
             checkpoint: answered.checkpoint,
         }
     }

@@ -147,6 +147,12 @@ impl StreamAnswer {
         self
     }
 
+    /// With what may be wrong with the box that was given, where anything is.
+    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
+        self.answer = self.answer.with_warnings(warnings);
+        self
+    }
+
     /// With what the tracker saw.
     pub fn with_seen(mut self, seen: Option<Diagnostics>) -> Self {
         self.seen = seen.map(SeenView::from);

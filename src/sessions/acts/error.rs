@@ -1,5 +1,6 @@
 //! Why an act was not done. None of them changes a session.
 
+use super::box_check::ImplausibleBox;
 use crate::sessions::{
     InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
     StartError, Stopped, StoreUnavailable, TooManySessions, WorkPanicked,
@@ -95,6 +96,9 @@ pub enum FramesError {
         /// Why.
         fault: FrameFault,
     },
+    /// The corrected box cannot be meant.
+    #[error(transparent)]
+    Box(#[from] ImplausibleBox),
     /// The frames have too many pixels together.
     #[error("the frames have {pixels} pixels together, over {limit}")]
     TooManyPixels {
@@ -151,6 +155,14 @@ pub enum OpenError {
         error: StartError,
         /// How many boxes were given, where they were given as a list.
         listed: Option<usize>,
+    },
+    /// A box cannot be meant.
+    #[error("{error}")]
+    Box {
+        /// Why.
+        error: ImplausibleBox,
+        /// Which of how many, where they were given as a list.
+        listed: Option<(usize, usize)>,
     },
     /// The snapshot cannot be restored.
     #[error(transparent)]

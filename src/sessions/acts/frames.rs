@@ -1,6 +1,7 @@
 //! The next frames of a session, as they were received: decode them, then track through them, or take the box that the
 //! user gives.
 
+use super::box_check;
 use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
 use crate::sessions::streams::StreamPlace;
@@ -42,8 +43,9 @@ pub struct GivenBox {
 }
 
 impl GivenBox {
-    /// The correction in a session with so many targets.
-    fn of(self, count: usize) -> Result<Correction, FramesError> {
+    /// The correction in a session with so many targets and frames of this size.
+    fn of(self, count: usize, size: (u32, u32)) -> Result<Correction, FramesError> {
+        box_check::check(&self.to, size)?;
         match self.target {
             None if count != 1 => Err(FramesError::NoSuchTarget { count }),
             Some(target) if target >= count => Err(FramesError::NoSuchTarget { count }),
@@ -108,7 +110,9 @@ impl FrameBatch {
     ) -> Result<Tracked, FramesError> {
         let fingerprints = self.files.iter().map(|file| Fingerprint::of(file));
         let fingerprints: Vec<Fingerprint> = fingerprints.collect();
-        let correction = self.correction.map(|given| given.of(state.target_count()));
+        let correction = self
+            .correction
+            .map(|given| given.of(state.target_count(), state.source_size()));
         let correction = correction.transpose()?;
         let decision = state.replay_decision(self.number, &fingerprints, correction)?;
         if let ReplayDecision::Replay(estimates) = decision {

@@ -13,6 +13,7 @@
 //! between two frames, and its copy is dropped).
 
 mod advance;
+mod box_check;
 mod error;
 mod find;
 mod flush;
@@ -27,6 +28,7 @@ mod tracking_metrics;
 mod turn;
 mod work;
 
+pub use box_check::{ImplausibleBox, box_warnings};
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};
 pub use frames::{FrameBatch, GivenBox, RequestLimits, Tracked, check_readable_pixels};
 pub use idempotency::{CreationKey, IdempotencyStore};

@@ -1,5 +1,6 @@
 //! What a session begins with.
 
+use super::box_check;
 use super::error::OpenError;
 use super::frames;
 use super::service::SessionService;
@@ -58,6 +59,15 @@ impl Start {
         let files = std::slice::from_ref(file);
         let limits = &service.settings.frame;
         let frame = &frames::decode(files, limits, &format, meter, &service.tracking)?[0];
+        for (target, given) in boxes.as_slice().iter().enumerate() {
+            box_check::check(given, frame.source_size()).map_err(|error| OpenError::Box {
+                error,
+                listed: match boxes {
+                    PerTarget::One(_) => None,
+                    PerTarget::List(list) => Some((target, list.len())),
+                },
+            })?;
+        }
         let check = || meter.check();
         let started = SessionState::start(frame, Fingerprint::of(file), boxes, params, check);
         started.map_err(|error| match error {

@@ -1,10 +1,13 @@
 //! Tracks without a session: from a first frame or a snapshot to a new snapshot.
 
+use super::box_check::box_warnings;
 use super::error::TrackError;
 use super::frames::{FrameBatch, GivenBox, RequestLimits, check_pixels};
 use super::service::SessionService;
 use super::start::Start;
-use crate::sessions::{Boxes, Estimates, QueuePermit, Stopped, WorkMeter, WorkPanicked};
+use crate::sessions::{
+    Boxes, Estimates, QueuePermit, SessionState, Stopped, WorkMeter, WorkPanicked,
+};
 use bagtrack_tracker::Params;
 use bytes::Bytes;
 
@@ -24,6 +27,8 @@ pub struct TrackedAway {
     pub estimates: Vec<Estimates>,
     /// The track up to there, signed.
     pub snapshot: Vec<u8>,
+    /// What may be wrong with the boxes that were given.
+    pub warnings: Option<Vec<String>>,
 }
 
 impl SessionService {
@@ -52,6 +57,44 @@ impl SessionService {
         .await
     }
 
+    /// Begins a track without a session, which [`Self::continue_track`] goes on with.
+    ///
+    /// # Errors
+    /// The frame, a box or a parameter cannot be used, or time is over.
+    pub async fn begin_track(
+        &self,
+        queue: QueuePermit,
+        start: Start,
+    ) -> Result<SessionState, TrackError> {
+        let service = self.clone();
+        let begin = move |meter: &mut WorkMeter| Ok(start.run(&service, meter)?);
+        self.run(queue, begin).await
+    }
+
+    /// The track after one more frame.
+    ///
+    /// # Errors
+    /// The frame cannot be used, or time is over.
+    pub async fn continue_track(
+        &self,
+        queue: QueuePermit,
+        mut track: SessionState,
+        file: Bytes,
+    ) -> Result<SessionState, TrackError> {
+        let service = self.clone();
+        let go_on = move |meter: &mut WorkMeter| {
+            let batch = FrameBatch::posted(None, vec![file], None);
+            batch.track(
+                &mut track,
+                &service.request_limits(),
+                meter,
+                &service.tracking,
+            )?;
+            Ok(track)
+        };
+        self.run(queue, go_on).await
+    }
+
     fn track_away(
         &self,
         from: TrackFrom,
@@ -59,14 +102,16 @@ impl SessionService {
         meter: &mut WorkMeter,
     ) -> Result<TrackedAway, TrackError> {
         let limits = self.request_limits();
-        let mut estimates = Vec::new();
+        let (mut estimates, mut given) = (Vec::new(), Vec::new());
         let (mut track, correction) = match from {
             TrackFrom::Snapshot(bytes, correction) => {
+                given.extend(correction.map(|given| given.to));
                 (Start::Snapshot(bytes).run(self, meter)?, correction)
             }
             TrackFrom::Start(boxes, params) => {
                 check_pixels(&files, &limits)?;
                 let file = files.remove(0);
+                given.extend(boxes.as_slice());
                 let track = Start::Frame {
                     file,
                     boxes,
@@ -85,6 +130,7 @@ impl SessionService {
         Ok(TrackedAway {
             estimates,
             snapshot: track.snapshot(&self.keys),
+            warnings: box_warnings(&given, track.source_size()),
         })
     }
 
