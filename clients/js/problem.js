@@ -21,6 +21,11 @@ export class Problem extends Error {
     this.retryAfter = retryAfter;
   }
 
+  /** Whether the service does not have the session any more. */
+  get isGone() {
+    return this.status === 404 || this.status === 410;
+  }
+
   /** Whether the same request may succeed later. */
   get isTemporary() {
     return this.status === 0 || LATER.has(this.status) || this.slug === "not-in-order";

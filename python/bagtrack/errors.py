@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
+TEMPORARY = (408, 429, 502, 503, 504)
+"""Statuses with which the same request may succeed later: of the service, and of proxies before it."""
+
 
 class ServiceError(Exception):
     """The service refused a request; the session is as it was. Its problem document (RFC 9457) says what to do."""
@@ -20,6 +23,11 @@ class ServiceError(Exception):
     def kind(self) -> str:
         """The kind of problem, like `invalid-box`; empty where the answer was no problem document."""
         return re.split("[#:]", str(self.problem.get("type", "")))[-1]
+
+    @property
+    def is_temporary(self) -> bool:
+        """Whether the same request may succeed later."""
+        return self.status in TEMPORARY or self.kind == "not-in-order"
 
 
 class ServiceUnavailable(Exception):

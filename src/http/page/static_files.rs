@@ -5,6 +5,7 @@
 use super::static_file::StaticFile;
 use crate::http::middleware::base_path::client_path;
 use crate::http::middleware::security_headers::PAGE_POLICY;
+use crate::http::page::sample_clips;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::rejection::PathRejection;
@@ -44,19 +45,25 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 16] = [
+const FILES: [File; 22] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
+    file!("camera.js", SCRIPT),
     file!("chart.js", SCRIPT),
     file!("clip.js", SCRIPT),
+    file!("file.js", SCRIPT),
+    file!("matroska.js", SCRIPT),
     file!("problems.js", SCRIPT),
+    file!("recording.js", SCRIPT),
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
+    file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
-    file!("video.js", SCRIPT),
+    client_file!("js/backoff.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
+    client_file!("js/kept.js"),
     client_file!("js/problem.js"),
     client_file!("js/session.js"),
     client_file!("js/stream.js"),
@@ -76,6 +83,7 @@ static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
 
 /// `/`. Its links are relative, so a base path needs its slash.
 pub async fn index(request: Request) -> Response {
+    sample_clips::draw_ahead();
     let path = client_path(&request);
     match path.ends_with('/') {
         true => SERVED[INDEX.0].respond(request.headers()).await,

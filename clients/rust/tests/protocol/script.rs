@@ -56,6 +56,15 @@ pub struct Request {
     pub body: Vec<u8>,
 }
 
+impl Request {
+    /// The value of a header; empty where there is none.
+    pub fn header(&self, name: &str) -> &str {
+        let mut lines = self.head.lines().filter_map(|line| line.split_once(": "));
+        let found = lines.find(|(other, _)| other.eq_ignore_ascii_case(name));
+        found.map_or("", |(_, value)| value)
+    }
+}
+
 /// The service. Each request has a connection of its own.
 pub struct Script {
     address: SocketAddr,
@@ -118,7 +127,8 @@ impl Script {
     }
 }
 
-async fn read(line: &mut TcpStream) -> Request {
+/// The request that comes over a connection.
+pub async fn read(line: &mut TcpStream) -> Request {
     let mut bytes = Vec::new();
     loop {
         let head = bytes.windows(4).position(|four| four == b"\r\n\r\n");

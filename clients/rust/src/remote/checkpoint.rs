@@ -10,18 +10,18 @@ use tokio::time::Instant;
 use uuid::Uuid;
 
 /// A service that is about to end may be the only one for a while: how long until the next try to go elsewhere.
-const TRIES_TO_MOVE: Duration = Duration::from_secs(1);
+const MOVE_EVERY: Duration = Duration::from_secs(1);
 
 impl Remote {
     /// Makes sure, after the answer to a frame, that the session can go on elsewhere.
-    pub(super) async fn look_after(&mut self, answer: &Answer) {
-        if let Some(checkpoint) = answer.checkpoint {
+    pub(super) async fn checkpoint(&mut self, answer: &Answer) {
+        if let Some(stored) = answer.checkpoint {
             // A store has the session up to there: any replica goes on with it.
-            self.kept.forget_until(checkpoint);
-        } else if self.snapshot_every == 0 {
-            self.kept.forget_until(answer.frame);
+            self.kept.forget_until(stored);
         } else if answer.draining && self.may_try_to_move() {
             self.move_on().await;
+        } else if self.snapshot_every == 0 {
+            self.kept.forget_until(answer.frame);
         } else {
             let since = |origin: &Origin| answer.frame.saturating_sub(origin.frame);
             let origin = self.kept.origin();
@@ -33,7 +33,7 @@ impl Remote {
 
     fn may_try_to_move(&self) -> bool {
         let tried = self.tried_to_move;
-        tried.is_none_or(|tried| tried.elapsed() >= TRIES_TO_MOVE)
+        tried.is_none_or(|tried| tried.elapsed() >= MOVE_EVERY)
     }
 
     /// Goes on elsewhere, since the service is about to end. If there is nothing else yet, it goes on here.
@@ -53,7 +53,7 @@ impl Remote {
             _ => None,
         };
         match created {
-            Some(Created { id, frame, .. }) => (self.id, self.at) = (id, frame),
+            Some(Created { id, frame, .. }) => (self.id, self.last_acknowledged) = (id, frame),
             None => self.transport.used = here,
         }
     }
