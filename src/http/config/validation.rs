@@ -22,13 +22,6 @@ impl Config {
         let semaphore = 1..=tokio::sync::Semaphore::MAX_PERMITS;
         let moment = Duration::from_millis(1)..=Duration::from_secs(365 * 24 * 3600);
         let uploads = self.max_body_bytes..=(4 << 40);
-        let is_origin = |text: &String| {
-            let host = text.split_once("://").map_or("", |(_, host)| host);
-            let plain = host
-                .bytes()
-                .all(|byte| byte.is_ascii_graphic() && byte != b'/');
-            text == "*" || (!host.is_empty() && plain)
-        };
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
         let year = "at most 1 year";
@@ -65,7 +58,7 @@ impl Config {
             ),
             (
                 "cors-origins",
-                self.cors_origins.iter().all(is_origin),
+                self.cors_origins.iter().all(|text| is_origin(text)),
                 "origins like https://example.org, or *",
             ),
             ("shutdown-delay", self.shutdown_delay <= *moment.end(), year),
@@ -94,6 +87,13 @@ impl Config {
             }),
         }
     }
+}
+
+/// Whether a text is an origin (`https://example.org`), or `*` for all.
+fn is_origin(text: &str) -> bool {
+    let host = text.split_once("://").map_or("", |(_, host)| host);
+    let plain = |byte: u8| byte.is_ascii_graphic() && byte != b'/';
+    text == "*" || (!host.is_empty() && host.bytes().all(plain))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::end::End;
 use super::fragments::MessageTooSlow;
-use super::frame_work::{Done, FrameWork, Given};
+use super::frame_work::{Done, FrameWork};
 use super::message::{FrameHeader, Hello, StreamAnswer};
 use super::upgrade::Socket;
 use super::waiting::ArrivedFrame;
