@@ -6,13 +6,13 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`sessions`] | the live sessions: look up, expire, admit work, replay; the store |
 //! | [`http`] | the interface: routes, problem documents, the OpenAPI document |
 //! | [`drawing`] | boxes and scores on a picture |
 //!
 //! | crate | holds |
 //! |---|---|
 //! | [`bagtrack_tracker`] | the paper, as a pure state machine: no async, no HTTP, no files, no clock |
+//! | [`bagtrack_sessions`] | the acts on sessions, without HTTP: their store and their scheduler |
 //! | [`bagtrack_ingest`] | JPEG, PNG and WebP files to frames, with limits that are checked before decoding |
 //! | [`bagtrack_sample`] | synthetic clips with exact ground truth |
 //!
@@ -22,4 +22,3 @@
 
 pub mod drawing;
 pub mod http;
-pub mod sessions;

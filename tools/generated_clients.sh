@@ -4,8 +4,10 @@
 #     tools/generated_clients.sh [PROGRAM]
 #
 # openapi-python-client and openapi-generator come from PyPI, TypeScript and openapi-typescript from npm; Java runs
-# openapi-generator. What cannot be had is left out, and a line says so. Kotlin is generated only: its libraries come from
-# Maven Central. Swift is compiled where swift is installed.
+# openapi-generator. The Go client needs the standard library alone. The Java client of the library `native` needs
+# Jackson, which is in openapi-generator's own jar, and Debian's libjakarta-annotation-api-java. What cannot be had is
+# left out, and a line says so. Kotlin, and Java's default library okhttp-gson, are generated only: their libraries come
+# from Maven Central. Swift is compiled where swift is installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 program=$(realpath "${1:-target/debug/bagtrack}")
@@ -80,6 +82,42 @@ if command -v npm >/dev/null &&
 else
     left_out "Node.js and npm" "compiling the TypeScript clients"
 fi
+
+tracks() {
+    PYTHONPATH=$here "$python" "$here/compiled.py" "$program" "$url" "$@"
+}
+
+if command -v go >/dev/null; then
+    generate go --additional-properties withGoMod=false,packageName=bagtrack,generateInterfaces=false
+    # Its tests need another module.
+    rm -rf "$out/go/test"
+    printf 'module bagtrack\n\ngo 1.19\n' >"$out/go/go.mod"
+    mkdir "$out/go/track"
+    cp "$here/main.go" "$out/go/track/"
+    (cd "$out/go" && GOPROXY=off GOTOOLCHAIN=local go build -o client ./track)
+    tracks "openapi-generator, Go" "$out/go/client"
+else
+    left_out "Go" "the Go client"
+fi
+
+annotations=/usr/share/java/jakarta-annotation-api.jar
+if command -v javac >/dev/null && [ -f "$annotations" ]; then
+    # As with TypeScript, a model that is only ever a form is imported.
+    generate java --library native --global-property skipFormModel=false \
+        --additional-properties openApiNullable=false,useJakartaEe=true,hideGenerationTimestamp=true
+    jar=$("$python" -c 'import openapi_generator_cli, pathlib
+print(next(pathlib.Path(openapi_generator_cli.__file__).parent.glob("*.jar")))')
+    mkdir "$out/java/built"
+    find "$out/java/src/main/java" -name '*.java' >"$out/java/sources"
+    javac -nowarn -Xlint:none -cp "$jar:$annotations" -d "$out/java/built" @"$out/java/sources" "$here/Main.java"
+    tracks "openapi-generator, Java (native)" java -cp "$out/java/built:$jar:$annotations" Main
+    mv "$out/java" "$out/java-native"
+else
+    left_out "javac or libjakarta-annotation-api-java" "the Java client"
+fi
+generate java
+grep --recursive --quiet 'CreatedSession createSession(.*File body,' "$out/java/src/main"
+left_out "okhttp from Maven Central" "compiling the Java client of the default library"
 
 # They are not compiled, but they must take frames as files, not as base64 in JSON.
 generate kotlin

@@ -25,10 +25,18 @@ done
 # The format of OCI images has no HEALTHCHECK.
 format=()
 [ "$builder" != podman ] || format=(--format docker)
-if [ -n "$builder" ]; then
-    "$builder" build "${format[@]}" --file docker/Dockerfile --tag "bagtrack:$version" \
+# Builds the image with this tag, with these options, and saves it.
+image() {
+    local tag=$1
+    shift
+    "$builder" build "${format[@]}" --file docker/Dockerfile --tag "bagtrack:$tag" "$@" \
         --build-arg "VERSION=$version" --build-arg "REVISION=$(git rev-parse HEAD)" .
-    "$builder" save "bagtrack:$version" | gzip >"$files/bagtrack-$version-image.tar.gz"
+    "$builder" save "bagtrack:$tag" | gzip >"$files/bagtrack-$tag-image.tar.gz"
+}
+if [ -n "$builder" ]; then
+    image "$version"
+    # Without ffmpeg.
+    image "$version-small" --target small
 else
     echo "Left out, for want of docker or podman, running: the image"
 fi

@@ -1,4 +1,4 @@
-// Drawing a box: by mouse, finger, pen or keyboard.
+// Drawing a box: by mouse, pen or keyboard, and by a finger once drawing is on: without it a finger scrolls the page.
 
 /** @typedef {import("./js/bagtrack.js").Box} Box */
 
@@ -12,8 +12,9 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 export class BoxDrawing {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {{start: () => boolean, change: (box: Box | undefined) => void, finish: (box: Box) => void}} told `start`
-   *   says whether a box may be drawn now.
+   * @param {{start: () => boolean, change: (box: Box | undefined) => void, finish: (box: Box) => void,
+   *   tap: () => void, arm: (isArmed: boolean) => void}} told `start` says whether a box may be drawn now; `tap`, that a
+   *   finger touched the picture while drawing was off.
    */
   constructor(canvas, told) {
     this.canvas = canvas;
@@ -22,11 +23,24 @@ export class BoxDrawing {
     this.from = undefined;
     /** @type {Box | undefined} */
     this.box = undefined;
+    /** Whether a finger draws. */
+    this.isArmed = false;
+    canvas.addEventListener("click", (event) => {
+      const isTouch = event instanceof PointerEvent && event.pointerType === "touch";
+      if (isTouch && !this.isArmed) this.told.tap();
+    });
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => this.cancel());
     canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** Lets a finger draw one box.
+   * @param {boolean} isArmed */
+  arm(isArmed) {
+    this.isArmed = isArmed;
+    this.told.arm(isArmed);
   }
 
   /** @param {PointerEvent} event */
@@ -41,6 +55,7 @@ export class BoxDrawing {
 
   /** @param {PointerEvent} event */
   down(event) {
+    if (event.pointerType === "touch" && !this.isArmed) return;
     if (event.button !== 0 || this.from || !this.told.start()) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.from = this.at(event);
@@ -73,6 +88,7 @@ export class BoxDrawing {
   /** @param {Box} box */
   finish(box) {
     this.box = undefined;
+    this.arm(false);
     this.told.finish(box);
   }
 

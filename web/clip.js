@@ -1,18 +1,8 @@
 // The sample clips, which the service draws.
 
 /**
- * @typedef {object} Picture A frame as it is uploaded and as it is shown.
- * @property {Blob} blob
- * @property {ImageBitmap} bitmap
- * @property {number} time Seconds from the beginning of the video.
- *
- * @typedef {object} Source Where frames come from.
- * @property {boolean} isLive Whether it goes on by itself, so that late frames are skipped.
- * @property {() => Promise<Picture>} first The first frame.
- * @property {(deliver: (picture: Picture) => void, end: () => void) => Promise<void>} start Delivers the frames after
- *   it.
- * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
- * @property {() => void} stop
+ * @typedef {import("./source.js").Picture} Picture
+ * @typedef {import("./source.js").Source} Source
  */
 
 const FRAMES_A_SECOND = 25;
@@ -27,6 +17,9 @@ export class SampleClip {
   constructor(name) {
     this.name = name;
     this.isLive = false;
+    this.size = { width: 0, height: 0 };
+    this.rate = FRAMES_A_SECOND;
+    this.skipped = 0;
     /** @type {Map<number, Promise<Picture>>} */
     this.fetched = new Map();
     this.index = 0;
@@ -40,6 +33,7 @@ export class SampleClip {
     const first = this.fetch(0);
     const clip = await (await fetch(`./sample/${this.name}/clip.json`)).json();
     this.frames = clip.truth.length;
+    this.size = { width: clip.width, height: clip.height };
     return first;
   }
 
@@ -53,7 +47,7 @@ export class SampleClip {
         const response = await fetch(`./sample/${this.name}/${index}.jpg`);
         if (!response.ok) throw new Error("The sample clip cannot be loaded.");
         const blob = await response.blob();
-        return { blob, bitmap: await createImageBitmap(blob), time: index / FRAMES_A_SECOND };
+        return { blob, image: await createImageBitmap(blob), time: index / FRAMES_A_SECOND, frame: index };
       } catch (error) {
         // The line may be back in a moment.
         if (attempt === ATTEMPTS) throw error;

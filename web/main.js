@@ -1,14 +1,16 @@
 // The page: what the buttons do, and what is shown.
 
 import { BoxDrawing } from "./box.js";
+import { Camera, openCamera } from "./camera.js";
 import { Chart, showVotes } from "./chart.js";
 import { SampleClip } from "./clip.js";
+import { openFile } from "./file.js";
 import { Client, Problem } from "./js/bagtrack.js";
 import { words } from "./problems.js";
+import { encodes, extension, makeVideo } from "./recording.js";
 import { Run } from "./run.js";
-import { asCsv, asJson, Recording, save } from "./save.js";
+import { asCsv, asJson, save } from "./save.js";
 import { Stage } from "./stage.js";
-import { openCamera, openFile } from "./video.js";
 
 /**
  * @template {HTMLElement} T
@@ -21,20 +23,29 @@ const picture = /** @type {HTMLCanvasElement} */ (get("picture"));
 const stage = new Stage(picture);
 const chart = new Chart(/** @type {HTMLCanvasElement} */ (get("chart")));
 const see = /** @type {HTMLInputElement} */ (get("see"));
-const record = /** @type {HTMLInputElement} */ (get("record"));
 /** What fails for longer is said. */
 const client = new Client(new URL(".", location.href), { patience: 1500 });
 const DRAW = "Draw a box around what to follow.";
+const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
+const FOLLOWING = "Following. Draw again to correct the box.";
+/** A status that held for fewer frames is not said. */
+const SAID_AFTER = 5;
 
 /** @type {Run | undefined} */
 let run;
 /** Whether the first box has been drawn. */
 let isFollowing = false;
-/** @type {Recording | undefined} */
-let recording;
+/** @type {Promise<import("./source.js").Picture> | undefined} What the camera saw as the drawing began. */
+let frozen;
+/** Whether there are results that were not saved. */
+let isUnsaved = false;
+let hasKey = false;
 /** Counts the choices: one that is overtaken by another is dropped. */
 let choice = 0;
 let lastStatus = "";
+let saidStatus = "";
+/** For how many frames the status has been the same. */
+let held = 0;
 /** @type {(() => void) | undefined} What failed for want of a key. */
 let again;
 
@@ -53,45 +64,56 @@ function fail(error) {
     get("key-form").hidden = false;
     get("key").focus();
   }
-  say(words(error), true);
+  say(words(error, hasKey), true);
   finished();
 }
 
 /** Shows the first frame of a source and asks for a box.
- * @param {() => Promise<import("./clip.js").Source>} open */
+ * @param {() => Promise<import("./source.js").Source>} open */
 async function choose(open) {
   const own = (choice += 1);
   run?.stop();
   run = undefined;
   isFollowing = false;
-  recording = undefined;
+  frozen = undefined;
+  drawing.arm(false);
   say("Opening…");
   try {
     const source = await open();
     const first = await source.first();
     if (own !== choice) return source.stop();
-    run = new Run(client, source, first, { answer: answered, fail, line, end: ended });
+    run = new Run(client, source, first, { answer: answered, fail, line, anew, end: ended });
     run.sees = see.checked;
+    isUnsaved = false;
     for (const id of ["stage", "keys", "controls"]) get(id).hidden = false;
     for (const id of ["figures", "curve", "results", "seen"]) get(id).hidden = true;
     stage.draw(undefined);
-    stage.show(first.bitmap);
+    stage.show(first.image);
+    preview();
     picture.scrollIntoView({ block: "nearest" });
-    say(DRAW);
+    say(TAP + DRAW);
   } catch (error) {
     if (own === choice) fail(error);
   }
 }
 
-new BoxDrawing(picture, {
+/** Shows what the camera sees, until a box is drawn. */
+function preview() {
+  if (run?.source instanceof Camera) run.source.preview((image) => stage.show(image));
+}
+
+const drawing = new BoxDrawing(picture, {
   start() {
     if (!run || run.isOver) return false;
     if (isFollowing) run.pause(true);
+    else if (run.source.isLive) freeze(run);
     return true;
   },
   change(box) {
     stage.draw(box);
-    if (!box && isFollowing) run?.pause(isPaused);
+    if (box) return;
+    if (isFollowing) run?.pause(isPaused);
+    else preview();
   },
   finish(box) {
     stage.draw(undefined);
@@ -101,7 +123,21 @@ new BoxDrawing(picture, {
     run.pause(isPaused);
     say("The box is corrected.");
   },
+  tap() {
+    if (run && !run.isOver) say(`${TAP}${isFollowing ? "Then draw the box anew." : DRAW}`);
+  },
+  arm(isArmed) {
+    picture.classList.toggle("armed", isArmed);
+    get("draw").setAttribute("aria-pressed", String(isArmed));
+  },
 });
+
+/** Takes the picture that the camera sees now.
+ * @param {Run} own */
+function freeze(own) {
+  frozen = own.source.first();
+  frozen.then(({ image }) => !isFollowing && stage.show(image)).catch(fail);
+}
 
 /**
  * @param {Run} own
@@ -109,19 +145,16 @@ new BoxDrawing(picture, {
  */
 async function follow(own, box) {
   isFollowing = true;
-  lastStatus = "";
+  lastStatus = saidStatus = "tracking";
   setPaused(false);
   for (const id of ["figures", "curve", "results"]) get(id).hidden = false;
   for (const id of ["pause", "stop"]) /** @type {HTMLButtonElement} */ (get(id)).disabled = false;
   stage.copyPatch(/** @type {HTMLCanvasElement} */ (get("first-patch")), box);
-  if (record.checked && Recording.isPossible()) {
-    recording = new Recording(picture);
-    /** @type {HTMLButtonElement} */ (get("save-video")).disabled = false;
-  }
   again = () => follow(own, box);
   try {
+    if (frozen) own.picture = await frozen;
     await own.begin(box);
-    say("Following. Draw again to correct the box.");
+    say(FOLLOWING);
   } catch (error) {
     isFollowing = false;
     fail(error);
@@ -131,7 +164,7 @@ async function follow(own, box) {
 /** @type {import("./run.js").Told["answer"]} */
 function answered(shown, answer) {
   if (!run) return;
-  stage.show(shown.bitmap, answer);
+  stage.show(shown.image, answer);
   chart.show(run.rows);
   const set = (/** @type {string} */ id, /** @type {string} */ text) => (get(id).textContent = text);
   set("status", answer.status);
@@ -147,11 +180,19 @@ function answered(shown, answer) {
     showVotes(/** @type {HTMLCanvasElement} */ (get("votes")), answer.votes);
     if (answer.status !== "lost") stage.copyPatch(/** @type {HTMLCanvasElement} */ (get("patch")), answer.box);
   }
-  if (answer.status !== lastStatus) {
-    if (answer.status === "lost") say("The target is lost. Draw a box to show where it is, or wait for it.");
-    else if (lastStatus === "lost") say("Found again.");
-    lastStatus = answer.status;
-  }
+  isUnsaved = run.rows.length > 1;
+  held = answer.status === lastStatus ? held + 1 : 1;
+  lastStatus = answer.status;
+  if (answer.status !== saidStatus && (held >= SAID_AFTER || answer.status === "lost")) sayStatus(answer.status);
+}
+
+/** @param {"tracking" | "uncertain" | "lost"} status */
+function sayStatus(status) {
+  if (status === "lost") say("The target is lost. Draw a box to show where it is, or wait for it.");
+  else if (saidStatus === "lost") say("Found again. Draw again to correct the box.");
+  else if (status === "uncertain") say("The box may be off. Draw again to correct it.");
+  else say(FOLLOWING);
+  saidStatus = status;
 }
 
 let bagShownAt = 0;
@@ -177,6 +218,10 @@ function line(isUp) {
   else if (get("message").classList.contains("bad")) say("The line is back.");
 }
 
+function anew() {
+  say("The service had lost the session. It goes on from the last box: draw again if it is off.");
+}
+
 function ended() {
   say("The video has ended. Save the results, or choose another one.");
   run?.stop();
@@ -197,13 +242,30 @@ function setPaused(paused) {
 
 get("card").addEventListener("click", () => choose(async () => new SampleClip("card")));
 get("leaves").addEventListener("click", () => choose(async () => new SampleClip("leaves")));
-get("camera").addEventListener("click", () => choose(openCamera));
+get("camera").addEventListener("click", () => choose(() => openCamera(get("stage"))));
 get("file").addEventListener("change", () => {
   const input = /** @type {HTMLInputElement} */ (get("file"));
-  const file = input.files?.[0];
-  if (file) choose(() => openFile(file));
+  take(input.files?.[0]);
   input.value = "";
 });
+
+/** @param {File | undefined} file */
+function take(file) {
+  if (file) choose(() => openFile(file, get("stage")));
+}
+
+for (const kind of ["dragover", "dragleave", "drop"]) {
+  addEventListener(kind, (event) => {
+    // Without this the browser leaves the page for the file.
+    event.preventDefault();
+    document.body.classList.toggle("drop", kind === "dragover");
+    if (kind === "drop") take(/** @type {DragEvent} */ (event).dataTransfer?.files[0]);
+  });
+}
+addEventListener("beforeunload", (event) => {
+  if (isUnsaved) event.preventDefault();
+});
+get("draw").addEventListener("click", () => drawing.arm(!drawing.isArmed));
 get("pause").addEventListener("click", () => {
   setPaused(!isPaused);
   run?.pause(isPaused);
@@ -220,12 +282,44 @@ see.addEventListener("change", () => {
 get("key-form").addEventListener("submit", (event) => {
   event.preventDefault();
   client.key = /** @type {HTMLInputElement} */ (get("key")).value;
+  hasKey = true;
   get("key-form").hidden = true;
   say("");
   again?.();
 });
-get("save-csv").addEventListener("click", () => run && save(asCsv(run.rows), "boxes.csv"));
-get("save-json").addEventListener("click", () => run && save(asJson(run.rows), "boxes.json"));
-get("save-video").addEventListener("click", async () => recording && save(await recording.finish(), "boxes.webm"));
-if (!Recording.isPossible()) record.disabled = true;
+
+/**
+ * @param {(own: Run) => Blob | Promise<Blob>} make
+ * @param {string} kind
+ */
+async function saveAs(make, kind) {
+  const own = run;
+  if (!own || own.rows.length === 0) return;
+  save(await make(own), own, kind);
+  isUnsaved = false;
+}
+
+get("save-csv").addEventListener("click", () => saveAs(asCsv, "csv"));
+get("save-json").addEventListener("click", () => saveAs(asJson, "json"));
+get("save-video").addEventListener("click", async () => {
+  const button = /** @type {HTMLButtonElement} */ (get("save-video"));
+  const label = button.textContent;
+  button.disabled = true;
+  const tell = (/** @type {number} */ done, /** @type {number} */ of) => {
+    button.textContent = `Making the video: ${Math.floor((100 * done) / of)} %`;
+  };
+  try {
+    await saveAs((own) => makeVideo(own, tell), extension);
+    const [kept, of] = [run?.frames.size ?? 0, run?.rows.length ?? 0];
+    if (kept < of) say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
+  } catch (error) {
+    say(words(error, hasKey), true);
+  }
+  button.textContent = label;
+  button.disabled = false;
+});
+if (!encodes) {
+  get("save-video").textContent = "Video (Matroska)";
+  get("no-encoder").hidden = false;
+}
 for (const host of document.querySelectorAll(".host")) host.textContent = new URL(".", location.href).href.slice(0, -1);

@@ -6,8 +6,8 @@ import { Problem } from "./js/bagtrack.js";
 const WORDS = {
   unreachable: "The service cannot be reached. Is it still running?",
   unauthorized: "The service does not know this key.",
-  "session-expired": "The session has expired: no frame came for too long. Choose the video again.",
-  "session-not-found": "The session has ended. Choose the video again.",
+  "session-expired": "The session has expired: no frame came for too long. Choose the video or the camera again.",
+  "session-not-found": "The service has lost the session. Choose the video or the camera again.",
   "queue-full": "The service is busy. Try again in a moment.",
   "too-many-sessions": "The service is busy: it follows as many targets as it can. Try again in a moment.",
   "quota-exceeded": "You have as many sessions or frames under way as one client may. Try again in a moment.",
@@ -16,15 +16,22 @@ const WORDS = {
   "not-ready": "The service is about to end. Try again in a moment.",
   NotAllowedError: "The camera was refused. Allow it in the browser's address bar, or choose a video file.",
   NotFoundError: "There is no camera. Choose a video file.",
-  NotReadableError: "Another program has the camera.",
-  NotSupportedError: "This browser cannot play the file.",
+  NotReadableError: "The camera has stopped, or another program has it.",
+  SecurityError:
+    "Browsers give the camera to pages over https and from localhost only, and this page came over plain http. Open it " +
+    "over https, or choose a video file.",
+  NotSupportedError:
+    "This browser cannot play the file. MP4 (H.264) and WebM play in all; `bagtrack track` reads many more formats.",
+  EncodingError: "The rest of the file cannot be played. The results up to here can be saved.",
 };
 
 /**
  * @param {unknown} error
+ * @param {boolean} hasKey Whether a key was given.
  * @returns {string}
  */
-export function words(error) {
+export function words(error, hasKey) {
+  if (error instanceof Problem && error.slug === "unauthorized" && !hasKey) return "This service asks for an API key.";
   if (error instanceof Problem) return WORDS[error.slug] ?? error.message;
   if (error instanceof Error) return WORDS[error.name] ?? error.message;
   return String(error);

@@ -1,73 +1,57 @@
 // Saving results.
 
-/** @typedef {import("./run.js").Row} Row */
+/** @typedef {import("./run.js").Run} Run */
 
-const COLUMNS = /** @type {const} */ (["frame", "time", "x", "y", "width", "height", "score", "status"]);
-/** Most bytes of a recording; then it stops. */
-const MOST_RECORDED = 300 << 20;
+/** What is said of a video. In a CSV it stands in every row, so that spreadsheets and programs read the table as it is.
+ * @param {Run} run */
+function about({ source }) {
+  const rate = source.rate && Number(source.rate.toFixed(3));
+  return { video: source.name, video_width: source.size.width, video_height: source.size.height, frame_rate: rate };
+}
 
-/** @param {Row[]} rows */
-function flat(rows) {
-  return rows.map(({ frame, time, box, score, status }) => ({ frame, time, ...box, score, status }));
+/** @param {Run} run */
+function flat({ rows }) {
+  return rows.map(({ frame, time, box: { x, y, width, height }, score, status }) => {
+    return { frame, time, x, y, width, height, score, status };
+  });
+}
+
+/** A field of a CSV (RFC 4180).
+ * @param {string | number | undefined} value */
+function field(value = "") {
+  const text = String(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
 /**
- * @param {Row[]} rows
+ * @param {Run} run
  * @returns {Blob}
  */
-export function asCsv(rows) {
-  const lines = flat(rows).map((row) => COLUMNS.map((name) => row[name]).join(","));
-  return new Blob([`${[COLUMNS.join(","), ...lines].join("\n")}\n`], { type: "text/csv" });
+export function asCsv(run) {
+  const rows = flat(run).map((row) => ({ ...row, ...about(run) }));
+  const lines = [Object.keys(rows[0]), ...rows.map(Object.values)].map((values) => values.map(field).join(","));
+  return new Blob([`${lines.join("\n")}\n`], { type: "text/csv" });
 }
 
 /**
- * @param {Row[]} rows
+ * @param {Run} run
  * @returns {Blob}
  */
-export function asJson(rows) {
-  return new Blob([`${JSON.stringify(flat(rows), undefined, 1)}\n`], { type: "application/json" });
+export function asJson(run) {
+  const { video, ...size } = about(run);
+  const document = { video, ...size, skipped: run.skipped, boxes: flat(run) };
+  return new Blob([`${JSON.stringify(document, undefined, 1)}\n`], { type: "application/json" });
 }
 
 /**
  * @param {Blob} blob
- * @param {string} name
+ * @param {Run} run
+ * @param {string} extension
  */
-export function save(blob, name) {
+export function save(blob, run, extension) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
-  link.download = name;
+  link.download = `${run.source.name.replace(/\.[^.]*$/, "")}-boxes.${extension}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
-/** Records what a canvas shows, as WebM. */
-export class Recording {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
-    /** @type {Blob[]} */
-    this.pieces = [];
-    let bytes = 0;
-    this.recorder = new MediaRecorder(canvas.captureStream(25), { mimeType: "video/webm" });
-    this.recorder.ondataavailable = ({ data }) => {
-      this.pieces.push(data);
-      bytes += data.size;
-      if (bytes > MOST_RECORDED) this.recorder.stop();
-    };
-    this.recorder.start(1000);
-  }
-
-  static isPossible() {
-    return typeof MediaRecorder !== "undefined" && MediaRecorder.isTypeSupported("video/webm");
-  }
-
-  /** The recording up to now.
-   * @returns {Promise<Blob>} */
-  finish() {
-    const whole = () => new Blob(this.pieces, { type: "video/webm" });
-    if (this.recorder.state === "inactive") return Promise.resolve(whole());
-    return new Promise((resolve) => {
-      this.recorder.onstop = () => resolve(whole());
-      this.recorder.stop();
-    });
-  }
 }

@@ -10,8 +10,8 @@ export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    /** @type {ImageBitmap | undefined} The picture that is shown. */
-    this.bitmap = undefined;
+    /** @type {ImageBitmap | HTMLCanvasElement | undefined} The picture that is shown. */
+    this.image = undefined;
     /** @type {import("./js/bagtrack.js").StreamAnswer | undefined} */
     this.answer = undefined;
     /** @type {Box | undefined} The box that is being drawn. */
@@ -19,16 +19,17 @@ export class Stage {
   }
 
   /**
-   * @param {ImageBitmap} bitmap
+   * @param {ImageBitmap | HTMLCanvasElement} image
    * @param {import("./js/bagtrack.js").StreamAnswer} [answer]
    */
-  show(bitmap, answer) {
-    if (this.bitmap !== bitmap) this.bitmap?.close();
-    this.bitmap = bitmap;
+  show(image, answer) {
+    const { canvas } = this;
+    if (this.image && this.image !== image && "close" in this.image) this.image.close();
+    this.image = image;
     this.answer = answer;
-    if (this.canvas.width !== bitmap.width || this.canvas.height !== bitmap.height) {
-      this.canvas.width = bitmap.width;
-      this.canvas.height = bitmap.height;
+    if (canvas.width !== image.width || canvas.height !== image.height) {
+      [canvas.width, canvas.height] = [image.width, image.height];
+      canvas.style.setProperty("--aspect", String(image.width / image.height));
     }
     this.paint();
   }
@@ -40,31 +41,14 @@ export class Stage {
   }
 
   paint() {
-    if (!this.bitmap) return;
-    this.context.drawImage(this.bitmap, 0, 0);
+    if (!this.image) return;
+    this.context.drawImage(this.image, 0, 0);
     if (this.drawn) {
-      this.frame(this.drawn, "drawn", true);
+      paintBox(this.context, this.drawn, "drawn", true);
     } else if (this.answer) {
       this.dots(this.answer.particles ?? []);
-      this.frame(this.answer.box, this.answer.status, this.answer.status === "lost");
+      paintBox(this.context, this.answer.box, this.answer.status, this.answer.status === "lost");
     }
-  }
-
-  /**
-   * @param {Box} box
-   * @param {string} color
-   * @param {boolean} isDashed
-   */
-  frame({ x, y, width, height }, color, isDashed) {
-    const { context } = this;
-    const unit = this.canvas.width / 320;
-    context.setLineDash(isDashed ? [5 * unit, 3 * unit] : []);
-    for (const [line, style] of /** @type {const} */ ([[2.75, "#000000aa"], [1.25, COLORS[color]]])) {
-      context.lineWidth = line * unit;
-      context.strokeStyle = style;
-      context.strokeRect(x, y, width, height);
-    }
-    context.setLineDash([]);
   }
 
   /** @param {number[][]} particles Likeliest first. */
@@ -85,12 +69,29 @@ export class Stage {
    * @param {HTMLCanvasElement} target
    * @param {Box} box */
   copyPatch(target, box) {
-    if (!this.bitmap || !(box.width > 0 && box.height > 0)) return;
+    if (!this.image || !(box.width > 0 && box.height > 0)) return;
     target.width = target.height = 112;
     const scale = target.width / Math.max(box.width, box.height);
     const [width, height] = [box.width * scale, box.height * scale];
     const left = (target.width - width) / 2;
     const top = (target.height - height) / 2;
-    target.getContext("2d")?.drawImage(this.bitmap, box.x, box.y, box.width, box.height, left, top, width, height);
+    target.getContext("2d")?.drawImage(this.image, box.x, box.y, box.width, box.height, left, top, width, height);
   }
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Box} box
+ * @param {string} color
+ * @param {boolean} isDashed
+ */
+export function paintBox(context, { x, y, width, height }, color, isDashed) {
+  const unit = context.canvas.width / 320;
+  context.setLineDash(isDashed ? [5 * unit, 3 * unit] : []);
+  for (const [line, style] of /** @type {const} */ ([[2.75, "#000000aa"], [1.25, COLORS[color]]])) {
+    context.lineWidth = line * unit;
+    context.strokeStyle = style;
+    context.strokeRect(x, y, width, height);
+  }
+  context.setLineDash([]);
 }

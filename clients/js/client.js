@@ -1,5 +1,6 @@
 // A service: it opens sessions.
 
+import { MOST_KEPT, restoring } from "./kept.js";
 import { Session, boxText } from "./session.js";
 import { Transport } from "./transport.js";
 
@@ -12,8 +13,6 @@ import { Transport } from "./transport.js";
  * @property {Record<string, unknown>} [parameters] Parameters that are set otherwise than in the preset.
  * @property {AbortSignal} [signal]
  */
-
-const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 
 /** A random UUID. Pages that do not come over HTTPS have no `crypto.randomUUID`. */
 function newId() {
@@ -30,10 +29,13 @@ export class Client {
    * @param {object} [options]
    * @param {string} [options.key] An API key or a session token, where the service has keys.
    * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
+   * @param {number} [options.snapshotEvery] Frames after which a session takes a snapshot, to go on after the service has
+   *   lost it (30). At 0 it takes none, and such a session has ended.
    * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
    */
   constructor(url, options = {}) {
     this.transport = new Transport(url, options.key ?? "", options.patience ?? 20_000);
+    this.snapshotEvery = Math.min(options.snapshotEvery ?? 30, MOST_KEPT / 2);
     this.WebSocket = options.WebSocket ?? globalThis.WebSocket;
   }
 
@@ -51,7 +53,9 @@ export class Client {
    */
   async open(frame, box, { preset, seed, parameters, signal } = {}) {
     const json = parameters && JSON.stringify(parameters);
-    const query = { preset, seed, parameters: json, box: boxText(box) };
+    // The same boxes come again only with the same seed.
+    const drawn = seed ?? crypto.getRandomValues(new Uint32Array(1))[0];
+    const query = { box: boxText(box), preset, seed: drawn, parameters: json };
     return this.create({ query, body: frame, type: "application/octet-stream", signal });
   }
 
@@ -63,11 +67,12 @@ export class Client {
    * @returns {Promise<Session>}
    */
   restore(snapshot, signal, patience) {
-    return this.create({ body: snapshot, type: SNAPSHOT, signal, patience });
+    return this.create({ ...restoring(snapshot), signal, patience });
   }
 
   /**
-   * A session that is open already, such as one that a page was given a token for.
+   * A session that is open already, such as one that a page was given a token for. When the service loses it, it has
+   * ended: only a session that this client has opened goes on.
    * @param {string} id
    * @returns {Promise<Session>}
    */
@@ -81,6 +86,8 @@ export class Client {
   async create(request) {
     const response = await this.transport.call("PUT", `sessions/${newId()}`, request);
     const { id, frame, box } = await response.json();
-    return new Session(this, id, frame, box, response.headers);
+    const { query, body, type } = request;
+    const origin = this.snapshotEvery > 0 ? { frame, request: { query, body, type } } : undefined;
+    return new Session(this, id, frame, box, response.headers, origin, true);
   }
 }

@@ -13,12 +13,17 @@ export class Problem extends Error {
     super(document.detail ?? document.title ?? "The service cannot be reached.");
     this.name = "Problem";
     /** The kind: the last part of the type, such as `session-not-found`; `unreachable` where there was no answer. */
-    this.slug = (document.type ?? (document.status ? "" : "unreachable")).split(":").pop() ?? "";
+    this.slug = (document.type ?? (document.status ? "" : "unreachable")).split(/[#:]/).pop() ?? "";
     /** The status of the answer; 0 where there was none. */
     this.status = document.status ?? 0;
     /** With a wrong frame number: the number of the next frame. */
     this.expectedFrame = document.expected_frame;
     this.retryAfter = retryAfter;
+  }
+
+  /** Whether the service does not have the session any more. */
+  get isGone() {
+    return this.status === 404 || this.status === 410;
   }
 
   /** Whether the same request may succeed later. */

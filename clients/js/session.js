@@ -1,7 +1,10 @@
 // A session: frames go in, boxes come back.
 
+import { Backoff } from "./backoff.js";
+import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
+import { pause } from "./transport.js";
 
 /**
  * @typedef {object} Box In pixels of the uploaded frame; it may reach over the edge.
@@ -25,13 +28,16 @@ import { FrameStream } from "./stream.js";
  * @property {string} expires_at
  *
  * @typedef {import("./client.js").Frame} Frame
- * @typedef {{number: number, count: number, make: (number: number) => Promise<Response>}} Sent
+ *
+ * @typedef {object} Sent A request with the next frames.
+ * @property {Frame[]} frames
+ * @property {Box} [box] Where the user corrects it.
+ * @property {(number: number) => Promise<Response>} make
+ * @property {AbortSignal} [signal]
  */
 
-/** Most requests that are kept until the store has their frames. */
-const MOST_KEPT = 256;
 /** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
-const TRIES_TO_MOVE = 1000;
+const MOVE_EVERY = 1000;
 
 /** @param {Box} box */
 export function boxText({ x, y, width, height }) {
@@ -45,33 +51,40 @@ export class Session {
    * @param {number} frame The number of its last frame.
    * @param {Box} box The box of that frame.
    * @param {Headers} headers Of the answer that told so.
+   * @param {import("./kept.js").Origin} [origin] What opens it again.
+   * @param {boolean} [isOwn] Whether this client has opened it.
    */
-  constructor(client, id, frame, box, headers) {
+  constructor(client, id, frame, box, headers, origin, isOwn = false) {
     this.client = client;
     this.id = id;
     this.frame = frame;
     this.box = box;
+    this.isOwn = isOwn;
+    /** The last frame that the service has, as far as is known. */
+    this.lastAcknowledged = frame;
     /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     this.isDraining = false;
     /** When that was tried last. */
     this.triedToMove = 0;
-    /** @type {Sent[]} What a service with a store may ask for again. */
-    this.kept = [];
+    /** What the service may ask for again. */
+    this.kept = new Kept(origin);
     /** @type {Promise<unknown>} The requests before. */
     this.before = Promise.resolve();
     /** @type {FrameStream | undefined} */
     this.open = undefined;
-    this.note(headers);
+    this.isDraining = headers.get("draining") === "true";
   }
 
   /**
-   * Sends the next frame. Calls are made one after the other, in the order of `track`.
+   * Sends the next frame. Calls are made one after the other, in the order of `track`. A frame that got no answer, or
+   * whose call was aborted, is kept: the next call sends it before its own.
    * @param {Frame} frame
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer>}
    */
   track(frame, signal) {
-    return this.next(1, (number) => this.post("POST", "frames", { frame: number }, frame, signal));
+    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, frame, signal);
+    return this.next({ frames: [frame], make, signal });
   }
 
   /**
@@ -85,7 +98,7 @@ export class Session {
     const body = new FormData();
     for (const frame of frames) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
     const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, body, signal);
-    const answer = await this.next(frames.length, make);
+    const answer = await this.next({ frames: [...frames], make, signal });
     return answer.answers ?? [answer];
   }
 
@@ -97,8 +110,8 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   correct(frame, box, signal) {
-    const text = boxText(box);
-    return this.next(1, (number) => this.post("PUT", "target", { frame: number, box: text }, frame, signal));
+    const make = (/** @type {number} */ number) => this.put(number, frame, box, signal);
+    return this.next({ frames: [frame], box, make, signal });
   }
 
   /** The session's state; the service does not count this as a frame.
@@ -110,7 +123,8 @@ export class Session {
   /** The whole session as bytes, for `client.restore`.
    * @returns {Promise<Uint8Array<ArrayBuffer>>} */
   async snapshot() {
-    return new Uint8Array(await (await this.call("GET", "/snapshot")).arrayBuffer());
+    const taken = await this.deliver(this.frame + 1, () => this.call("GET", "/snapshot"));
+    return new Uint8Array(await taken.arrayBuffer());
   }
 
   /** A picture (PNG) of what the tracker keeps of the target.
@@ -137,10 +151,12 @@ export class Session {
   hold(stream) {
     if (stream && this.open) throw new Error("The session has a stream; close it first.");
     this.open = stream;
+    this.lastAcknowledged = this.frame;
   }
 
   /** Ends the session. */
   async end() {
+    this.kept = new Kept();
     try {
       await this.call("DELETE", "");
     } catch (error) {
@@ -172,60 +188,160 @@ export class Session {
   }
 
   /**
-   * Makes a request with the next frames after those before.
-   * @param {number} count
-   * @param {Sent["make"]} make
+   * @param {number} number
+   * @param {Frame} frame
+   * @param {Box} box
+   * @param {AbortSignal} [signal]
    */
-  next(count, make) {
+  put(number, frame, box, signal) {
+    return this.post("PUT", "target", { frame: number, box: boxText(box) }, frame, signal);
+  }
+
+  /**
+   * Makes a request with the next frames after those before.
+   * @param {Sent} sent
+   */
+  next(sent) {
     if (this.open) return Promise.reject(new Error("The session has a stream: send the frames there, or close it."));
-    const made = this.before.then(() => this.send(count, make));
+    const made = this.before.then(() => this.send(sent));
     this.before = made.catch(() => undefined);
     return made;
   }
 
-  /**
-   * @param {number} count
-   * @param {Sent["make"]} make
-   */
-  async send(count, make) {
-    const sent = { number: this.frame + 1, count, make };
-    const response = await make(sent.number).catch((error) => this.resend(error, sent));
-    const answer = await response.json();
-    this.frame = answer.frame;
-    this.box = answer.box;
-    this.kept.push(sent);
-    this.note(response.headers);
-    // With a store, any replica has the session.
-    const isAlone = this.isDraining && !response.headers.has("checkpoint");
-    if (isAlone && Date.now() - this.triedToMove >= TRIES_TO_MOVE) await this.moveOn();
-    return answer;
+  /** @param {Sent} sent */
+  async send({ frames, box, make, signal }) {
+    signal?.throwIfAborted();
+    const number = (this.kept.last ?? this.frame) + 1;
+    // From here on they count: without an answer they are sent again before the next ones.
+    frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
+    try {
+      const response = await this.deliver(number, make);
+      const answer = await response.json();
+      this.frame = answer.frame;
+      this.box = answer.box;
+      this.lastAcknowledged = Math.max(this.lastAcknowledged, this.frame);
+      this.isDraining ||= response.headers.get("draining") === "true";
+      await this.checkpoint(response.headers.get("checkpoint"));
+      return answer;
+    } catch (error) {
+      const isRefused = error instanceof Problem && !error.isTemporary;
+      if (isRefused) this.kept.forgetAfter(Math.max(this.lastAcknowledged, this.frame));
+      throw error;
+    }
+  }
+
+  /** Makes sure, after an answer, that the session can go on elsewhere.
+   * @param {string | null} stored The last frame that a store has. */
+  async checkpoint(stored) {
+    // With a store, any replica has the session up to there.
+    if (stored !== null) this.kept.forgetUntil(Number(stored));
+    else if (this.isDraining && Date.now() - this.triedToMove >= MOVE_EVERY) await this.move();
+    else if (this.isSnapshotDue) await this.renewOrigin();
+    else if (!this.takesSnapshots) this.kept.forgetUntil(this.frame);
+  }
+
+  get takesSnapshots() {
+    return this.isOwn && this.client.snapshotEvery > 0;
+  }
+
+  get isSnapshotDue() {
+    const { origin } = this.kept;
+    return this.takesSnapshots && (!origin || this.frame - origin.frame >= this.client.snapshotEvery);
+  }
+
+  /** A snapshot of now or later; nothing where there is none for the moment.
+   * @returns {Promise<import("./kept.js").Origin | undefined>} */
+  async takeOrigin() {
+    const { transport } = this.client;
+    const { id, frame } = this;
+    try {
+      const taken = await transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {});
+      return { frame, request: restoring(await taken.arrayBuffer()) };
+    } catch {
+      return undefined;
+    }
+  }
+
+  /** Takes a snapshot; without it the older one and more frames are kept. */
+  async renewOrigin() {
+    const origin = await this.takeOrigin();
+    if (origin) this.kept.renew(origin);
+    return origin;
   }
 
   /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
-  async moveOn() {
+  async move() {
     this.triedToMove = Date.now();
-    const moved = await this.snapshot().then((bytes) => this.client.restore(bytes, undefined, 0)).catch(() => undefined);
-    if (moved) [this.id, this.isDraining] = [moved.id, moved.isDraining];
+    const origin = await this.renewOrigin();
+    if (!origin) return;
+    const moved = await this.client.create({ ...origin.request, patience: 0 }).catch(() => undefined);
+    if (moved) [this.id, this.lastAcknowledged, this.isDraining] = [moved.id, moved.frame, moved.isDraining];
   }
 
   /**
-   * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
-   * @param {unknown} error
-   * @param {Sent} sent
+   * Makes a call for which the service must have the frames before one, and sends those that it does not have.
+   * @param {number} number The first frame that the call does not need.
+   * @param {(number: number) => Promise<Response>} call
    */
-  async resend(error, sent) {
-    const expected = error instanceof Problem ? error.expectedFrame : undefined;
-    const first = this.kept.findIndex(({ number }) => number === expected);
-    if (first < 0) throw error;
-    for (const { number, make } of this.kept.slice(first)) await make(number);
-    return sent.make(sent.number);
+  async deliver(number, call) {
+    const backoff = new Backoff(this.client.transport.patience);
+    for (let tries = 0; ; tries += 1) {
+      try {
+        while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1);
+        return await call(number);
+      } catch (error) {
+        if (!this.canRecover(error, number)) throw error;
+        // Where every replica loses the session again, this ends with the time for retries.
+        const pausing = tries === 0 ? 0 : backoff.next();
+        if (pausing === undefined) throw error;
+        if (pausing > 0) await pause(pausing);
+        if (error.isGone) this.lastAcknowledged = await this.reopen(error);
+        else this.lastAcknowledged = Number(error.expectedFrame) - 1;
+      }
+    }
   }
 
-  /** @param {Headers} headers */
-  note(headers) {
-    this.isDraining ||= headers.get("draining") === "true";
-    // Without a store there is nothing to go on with.
-    const checkpoint = Number(headers.get("checkpoint") ?? Infinity);
-    this.kept = this.kept.filter(({ number, count }) => number + count - 1 > checkpoint).slice(-MOST_KEPT);
+  /** @param {number} number A frame that the service does not have. */
+  async resend(number) {
+    const kept = this.kept.find(number);
+    if (!kept) throw new Error(`The service needs frame ${number} again, which is not kept any more.`);
+    if (kept.box) await this.put(number, kept.frame, kept.box);
+    else await this.post("POST", "frames", { frame: number }, kept.frame);
+    this.lastAcknowledged = number;
+  }
+
+  /**
+   * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
+   * @param {unknown} error
+   * @param {number} number The first frame that the call does not need.
+   * @returns {error is Problem}
+   */
+  canRecover(error, number) {
+    if (!(error instanceof Problem)) return false;
+    const { expectedFrame, isGone } = error;
+    if (isGone || expectedFrame === undefined) return isGone;
+    const sent = this.lastAcknowledged + 1;
+    if (expectedFrame < sent) return this.kept.find(expectedFrame) !== undefined;
+    return sent < expectedFrame && expectedFrame <= number;
+  }
+
+  /**
+   * Opens the session again after the service has lost it, under another id.
+   * @param {Problem} lost What told so.
+   * @returns {Promise<number>} The last frame that it has then.
+   */
+  async reopen(lost) {
+    const { origin } = this.kept;
+    if (!origin) throw lost;
+    try {
+      const opened = await this.client.create(origin.request);
+      [this.id, this.isDraining] = [opened.id, opened.isDraining];
+      return opened.frame;
+    } catch (error) {
+      // Such as a service with other keys, which does not take the snapshot.
+      if (!(error instanceof Problem) || error.isTemporary) throw error;
+      lost.cause = error;
+      throw lost;
+    }
   }
 }

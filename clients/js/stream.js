@@ -1,4 +1,5 @@
-// A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice.
+// A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice. A session
+// that the service has lost is opened again.
 
 import { Problem } from "./problem.js";
 import { pause } from "./transport.js";
@@ -23,8 +24,6 @@ import { pause } from "./transport.js";
  * @property {(problem: unknown) => void} reject
  */
 
-/** Most frames that are kept until the store has them. */
-const MOST_KEPT = 256;
 const FIRST_PAUSE = 200;
 const LONGEST_PAUSE = 5000;
 /** Close codes from here on are this and an HTTP status: the service closed the stream for good. */
@@ -45,12 +44,10 @@ export class FrameStream {
     this.onLine = options.onLine ?? (() => undefined);
     /** @type {Waiting[]} Oldest first. */
     this.waiting = [];
-    /** @type {(Waiting & {number: number})[]} Answered frames that a service with a store may ask for again. */
-    this.kept = [];
     /** How many of those that wait are on their way. */
     this.sent = 0;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
-    this.misnumbered = 0;
+    this.outOfOrder = 0;
     /** @type {WebSocket | undefined} */
     this.socket = undefined;
     this.isUp = false;
@@ -60,11 +57,17 @@ export class FrameStream {
     this.downSince = Date.now();
     /** @type {Problem | undefined} */
     this.lastProblem = undefined;
+    /** @type {Problem | undefined} The service has lost the session; it is opened again with the next frame. */
+    this.lost = undefined;
+    /** @type {{origin: import("./kept.js").Origin, until: number} | undefined} A snapshot of a frame up to `until`. */
+    this.newer = undefined;
+    this.isRenewing = false;
     /** @type {(problem: Error | undefined) => void} */
-    this.tellEnd = () => undefined;
+    this.resolveEnded = () => undefined;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
-    this.ended = new Promise((resolve) => (this.tellEnd = resolve));
+    this.ended = new Promise((resolve) => (this.resolveEnded = resolve));
     session.hold(this);
+    this.resendFrom(session.frame + 1);
     this.connect();
   }
 
@@ -82,17 +85,18 @@ export class FrameStream {
       // Of live frames that cannot be sent yet, the newest is kept.
       if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
       this.waiting.push({ frame, header: { box, see }, resolve, reject });
-      this.transmit();
+      if (this.lost) this.reopen(this.lost);
+      else this.transmit();
     });
   }
 
-  /** Ends the stream; the session goes on. Frames without an answer are given up. */
+  /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
   close() {
     this.end(undefined);
   }
 
   transmit() {
-    while (this.isUp && !this.misnumbered && this.sent < Math.min(this.waiting.length, this.window)) {
+    while (this.isUp && !this.outOfOrder && this.sent < Math.min(this.waiting.length, this.window)) {
       const { frame, header } = this.waiting[this.sent];
       const number = this.live ? undefined : this.session.frame + 1 + this.sent;
       this.sent += 1;
@@ -105,21 +109,38 @@ export class FrameStream {
   receive(message) {
     if (message.next !== undefined) return this.resume(message.next);
     if (message.type) return this.refused(new Problem(message));
-    for (let count = message.skipped ?? 0; count > 0; count -= 1) this.take()?.resolve(undefined);
+    for (let count = message.skipped ?? 0; count > 0; count -= 1) this.acknowledge()?.resolve(undefined);
     this.session.frame = message.frame;
     this.session.box = message.box;
     this.session.isDraining ||= message.draining === true;
-    const answered = this.take();
-    if (answered) this.kept.push({ ...answered, number: message.frame, resolve: () => undefined });
-    // Without a store there is nothing to go on with.
-    const checkpoint = message.checkpoint ?? Infinity;
-    this.kept = this.kept.filter(({ number }) => number > checkpoint).slice(-MOST_KEPT);
+    const answered = this.acknowledge();
+    if (answered) this.session.kept.put({ number: message.frame, frame: answered.frame, box: answered.header.box });
+    this.checkpoint(message.checkpoint);
     answered?.resolve(message);
     this.transmit();
   }
 
-  /** The oldest frame on its way. */
-  take() {
+  /** Makes sure, after an answer, that the session can be opened again.
+   * @param {number | undefined} stored The last frame that a store has. */
+  async checkpoint(stored) {
+    const { session } = this;
+    if (stored !== undefined) return session.kept.forgetUntil(stored);
+    if (this.newer && session.frame >= this.newer.until) {
+      session.kept.renew(this.newer.origin);
+      this.newer = undefined;
+    }
+    if (!session.takesSnapshots) return session.kept.forgetUntil(session.frame);
+    if (!session.isSnapshotDue || this.newer || this.isRenewing) return;
+    this.isRenewing = true;
+    const { id } = session;
+    const origin = await session.takeOrigin();
+    this.isRenewing = false;
+    // Frames go on meanwhile. Those that the snapshot may have must be answered before it is of use.
+    if (origin && session.id === id) this.newer = { origin, until: session.frame + this.sent };
+  }
+
+  /** Takes the oldest frame on its way, which has an answer. */
+  acknowledge() {
     if (this.sent === 0) return undefined;
     this.sent -= 1;
     return this.waiting.shift();
@@ -128,13 +149,14 @@ export class FrameStream {
   /** @param {Problem} problem */
   refused(problem) {
     this.lastProblem = problem;
-    if (this.misnumbered > 0) {
-      this.misnumbered -= 1;
+    if (problem.isGone) return this.gone(problem);
+    if (this.outOfOrder > 0) {
+      this.outOfOrder -= 1;
       // All have come back: they are sent again with the numbers that they have now.
-      if (this.misnumbered === 0) this.sent = 0;
+      if (this.outOfOrder === 0) this.sent = 0;
     } else {
-      this.take()?.reject(problem);
-      if (!this.live) this.misnumbered = this.sent;
+      this.acknowledge()?.reject(problem);
+      if (!this.live) this.outOfOrder = this.sent;
     }
     this.transmit();
   }
@@ -150,22 +172,59 @@ export class FrameStream {
     // Which of several live frames were skipped is not known, and newer ones come.
     if (this.live) this.waiting.splice(0, this.sent - known).forEach((skipped) => skipped.resolve(undefined));
     this.sent = known;
-    this.misnumbered = 0;
+    this.outOfOrder = 0;
     this.isUp = true;
     this.wait = FIRST_PAUSE;
     this.onLine(true);
     this.transmit();
   }
 
-  /** A replica has gone, and the store has no frames from `next` on: they are sent again before those that wait.
+  /** The service has no frames from `next` on any more: they are sent again before those that wait.
    * @param {number} next */
-  goBack(next) {
-    if (next > this.session.frame) return;
-    const lost = this.live ? [] : this.kept.filter(({ number }) => number >= next);
-    this.waiting.unshift(...lost);
-    this.kept = this.kept.filter(({ number }) => number < next);
-    this.session.frame = next - 1;
-    this.sent = 0;
+  resendFrom(next) {
+    const { kept, frame } = this.session;
+    if (next <= frame && !this.live && !kept.find(next)) {
+      const detail = `The service needs frame ${next} again, which is not kept any more.`;
+      return this.end(new Problem({ type: "frame-out-of-order", status: 409, detail, expected_frame: next }));
+    }
+    const again = this.live ? [] : kept.after(next - 1);
+    const nobody = () => undefined;
+    this.waiting.unshift(...again.map(({ frame, box }) => ({ frame, header: { box }, resolve: nobody, reject: nobody })));
+    kept.forgetAfter(next - 1);
+    this.session.frame = Math.min(frame, next - 1);
+    if (next <= frame) this.sent = 0;
+  }
+
+  /** The service has lost the session.
+   * @param {Problem} problem */
+  gone(problem) {
+    const { socket } = this;
+    this.socket = undefined;
+    socket?.close();
+    if (this.isEnded || !this.session.kept.origin) return this.end(problem);
+    this.breakLine();
+    this.newer = undefined;
+    this.lost = problem;
+    // Without a frame that waits it need not be held at the service.
+    if (this.waiting.length > 0) return this.reopen(problem);
+    this.onLine(true);
+  }
+
+  /** Opens the session again, and the stream with it.
+   * @param {Problem} problem What told that the service has lost it. */
+  async reopen(problem) {
+    this.lost = undefined;
+    try {
+      const at = await this.session.reopen(problem);
+      if (this.isEnded) return;
+      this.sent = 0;
+      this.outOfOrder = 0;
+      this.resendFrom(at + 1);
+      await this.connect();
+    } catch (error) {
+      if (error instanceof Problem && error.isTemporary) return this.closed(ABNORMAL);
+      this.end(/** @type {Error} */ (error));
+    }
   }
 
   async connect() {
@@ -177,7 +236,9 @@ export class FrameStream {
       url.protocol = url.protocol.replace("http", "ws");
       const socket = new client.WebSocket(url, token ? ["bagtrack", token] : ["bagtrack"]);
       this.socket = socket;
-      socket.onmessage = (event) => this.receive(JSON.parse(event.data));
+      socket.onmessage = (event) => {
+        if (this.socket === socket) this.receive(JSON.parse(event.data));
+      };
       const down = (/** @type {number} */ code) => {
         if (this.socket !== socket) return;
         this.socket = undefined;
@@ -207,12 +268,8 @@ export class FrameStream {
    */
   async closed(code) {
     if (this.isEnded) return;
-    if (code > OF_STATUS) return this.end(this.reason(code - OF_STATUS));
-    if (this.isUp) {
-      this.isUp = false;
-      this.downSince = Date.now();
-      this.onLine(false);
-    }
+    if (code > OF_STATUS) return this.refusedFor(this.reason(code - OF_STATUS));
+    this.breakLine();
     await pause(this.wait);
     this.wait = Math.min(2 * this.wait, LONGEST_PAUSE);
     // A page is not told why a stream cannot be opened; this call tells.
@@ -220,13 +277,27 @@ export class FrameStream {
     const url = transport.at(`sessions/${this.session.id}`);
     const seen = await transport.attempt("GET", url, {}).then((response) => response.json()).catch((error) => error);
     const isLate = Date.now() - this.downSince > this.patience;
-    if (seen instanceof Error) {
-      const isOver = isLate || !(seen instanceof Problem && seen.isTemporary);
-      return isOver ? this.end(seen) : this.closed(code);
-    }
     if (this.isEnded) return;
-    this.goBack(seen.frames);
+    if (seen instanceof Error) {
+      const isTemporary = seen instanceof Problem && seen.isTemporary;
+      return isTemporary && !isLate ? this.closed(code) : this.refusedFor(seen);
+    }
+    this.resendFrom(seen.frames);
     await this.connect();
+  }
+
+  breakLine() {
+    if (!this.isUp) return;
+    this.isUp = false;
+    this.downSince = Date.now();
+    this.onLine(false);
+  }
+
+  /** The service does not take this stream.
+   * @param {Error} problem */
+  refusedFor(problem) {
+    if (problem instanceof Problem && problem.isGone) this.gone(problem);
+    else this.end(problem);
   }
 
   /** @param {number} status */
@@ -244,7 +315,11 @@ export class FrameStream {
     this.socket?.close();
     this.session.hold(undefined);
     const left = this.waiting.splice(0);
+    // The service may have these: they count, so a post or the next stream sends them again before its own.
+    const { kept, frame: last } = this.session;
+    const sent = this.live || this.outOfOrder ? [] : left.slice(0, this.sent);
+    sent.forEach(({ frame, header }, index) => kept.put({ number: last + 1 + index, frame, box: header.box }));
     left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
-    this.tellEnd(problem);
+    this.resolveEnded(problem);
   }
 }

@@ -1,9 +1,8 @@
 // Calls over HTTP: a call that fails for a moment is made again.
 
+import { Backoff } from "./backoff.js";
 import { Problem } from "./problem.js";
 
-const FIRST_PAUSE = 100;
-const LONGEST_PAUSE = 5000;
 /** The connection is taken for dead when there is no answer for so long. */
 const ATTEMPT = 30_000;
 
@@ -69,16 +68,21 @@ export class Transport {
    * @returns {Promise<Response>} A good answer.
    */
   async call(method, path, request = {}) {
-    const late = Date.now() + (request.patience ?? this.patience);
-    for (let wait = FIRST_PAUSE; ; wait = Math.min(2 * wait, LONGEST_PAUSE)) {
+    const patience = request.patience ?? this.patience;
+    const backoff = new Backoff(patience);
+    // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
+    let hasBroken = patience === 0;
+    for (;;) {
       try {
         return await this.attempt(method, this.at(path, request.query), request);
       } catch (error) {
         if (!(error instanceof Problem) || !error.isTemporary) throw error;
-        // Clients that were cut off together do not come back together.
-        const own = wait * (0.5 + Math.random() / 2);
-        const pausing = Math.max(own, 1000 * (error.retryAfter ?? 0));
-        if (Date.now() + pausing > late) throw error;
+        if (error.status === 0 && !hasBroken) {
+          hasBroken = true;
+          continue;
+        }
+        const pausing = backoff.next(1000 * (error.retryAfter ?? 0));
+        if (pausing === undefined) throw error;
         await pause(pausing, request.signal);
       }
     }
@@ -100,7 +104,8 @@ export class Transport {
     const timer = setTimeout(() => attempt.abort(), ATTEMPT);
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
-      if (response.ok) return response;
+      // Read to its end here, where a line that breaks on the way is a failure to be tried again.
+      if (response.ok) return new Response(response.status === 204 ? null : await response.arrayBuffer(), response);
       const problem = await response.json().catch(() => ({ title: response.statusText }));
       const seconds = Number(response.headers.get("retry-after") ?? undefined);
       throw new Problem({ ...problem, status: response.status }, Number.isFinite(seconds) ? seconds : undefined);

@@ -4,7 +4,7 @@ use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use axum::Router;
 use bagtrack::http::{Application, Config};
-use bagtrack::sessions::{MacKeys, MAC_BYTES, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack_sessions::{MacKeys, MAC_BYTES, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
 use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;
 use flate2::Compression;

@@ -1,14 +1,16 @@
 """Follows an object through frames: in process (`Tracker`), or with a bagtrack service (`Client`, `AsyncClient`).
 
 All three have one interface, which users of OpenCV's trackers know: `init(frame, box)`, then `update(frame)` for each
-frame, which gives `(ok, box)`. Boxes are (x, y, width, height) in pixels of the frame, floats, 0-based.
+frame, which gives `(ok, box)`. Boxes are (x, y, width, height) in pixels of the frame, floats, 0-based. The module
+`bagtrack.cv` has OpenCV's interface to the letter.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bagtrack._native import Tracker
+from bagtrack import cv
+from bagtrack._native import Tracker, __version__
 from bagtrack.answer import Answer, Box, Status
 from bagtrack.errors import ServiceError, ServiceUnavailable
 
@@ -25,6 +27,8 @@ __all__ = [
     "ServiceUnavailable",
     "Status",
     "Tracker",
+    "__version__",
+    "cv",
 ]
 
 

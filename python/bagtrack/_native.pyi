@@ -5,18 +5,23 @@ import numpy.typing as npt
 
 from bagtrack.answer import Box, BoxLike, Status
 
+__version__: str
+"""The version of the package."""
+
 class Tracker:
     """Follows one object through frames, in this process.
 
     A frame is an array of uint8: height x width (gray), or height x width x 3 (BGR, as OpenCV reads images). A box is
     (x, y, width, height) in pixels, 0-based, and may reach over the edge. While the tracker works, other threads run.
-    An error changes nothing: `ValueError` where a frame, a box or a parameter cannot be used.
+    An error changes nothing: `ValueError` where a frame, a box or a parameter cannot be used. Pickle, `copy.copy` and
+    `copy.deepcopy` make trackers that go on bit for bit, as `save` and `load` do.
     """
 
-    def __init__(self, preset: str = "robust", seed: int | None = None, **params: Any) -> None:
-        """`preset` is "robust", or "paper" for the equations as printed. The same seed and frames give the same boxes;
-        without one it is drawn from Python's `random`. `params` sets single parameters of the preset: `params` of a
-        tracker lists them, docs.rs and the service's OpenAPI document describe them.
+    def __init__(self, preset: str = "robust", seed: int | None = 0, **params: Any) -> None:
+        """`preset` is "robust", or "paper" for the equations as printed. The same seed and frames give the same boxes,
+        bit for bit on one kind of machine; with None it is drawn from Python's `random`. `params` sets single
+        parameters of the preset: `params` of a tracker lists them, docs.rs and the service's OpenAPI document describe
+        them.
         """
 
     def init(self, frame: npt.NDArray[np.uint8], box: BoxLike) -> None:
@@ -53,6 +58,10 @@ class Tracker:
     @property
     def frame(self) -> int:
         """The number of the last frame; the first is 0."""
+
+    @property
+    def frame_size(self) -> tuple[int, int]:
+        """Width and height of the frames."""
 
     @property
     def params(self) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from bagtrack.answer import Answer, Box, BoxLike
 from bagtrack.base_client import BaseClient, request_of
 from bagtrack.encoding import Frame
 from bagtrack.session import SNAPSHOT, four_numbers
-from bagtrack.steps import LineBroken, NextService, Pause, Reply, Request, Steps
-from bagtrack.stream import Give, NextFrame, Stream
+from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Run, Steps
+from bagtrack.stream import NextFrame, Stream, Yield
 
 T = TypeVar("T")
 
@@ -57,27 +57,22 @@ class AsyncClient(BaseClient):
 
         source = frames if isinstance(frames, AsyncIterable) else each(frames)
         source = source.__aiter__()
-        steps = Stream(self._session, window).run()
+        run = Run(Stream(self._session, window).run())
         socket = AsyncSocket(self._services, self._headers, self._timeout)
-        result: Any = None
+        step = run.next()
         try:
-            while True:
-                try:
-                    step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
-                except StopIteration:
-                    return
-                result = None
-                if isinstance(step, Give):
+            while step is not None:
+                result: Any = None
+                if isinstance(step, Yield):
                     yield step.answer
                 elif isinstance(step, NextFrame):
                     frame = await anext(source, None)
                     result = None if frame is None else self._encode(frame)
+                elif AsyncSocket.performs(step):
+                    result = await socket.perform(step)
                 else:
-                    try:
-                        performs = AsyncSocket.performs(step)
-                        result = await (socket.perform(step) if performs else self._perform(step))
-                    except LineBroken as broken:
-                        result = broken
+                    result = await self._perform(step)
+                step = run.next(result)
         finally:
             await socket.close()
 
@@ -97,29 +92,27 @@ class AsyncClient(BaseClient):
         await self.close()
 
     async def _run(self, steps: Steps[T]) -> T:
-        result: Any = None
-        while True:
-            try:
-                step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
-            except StopIteration as end:
-                return end.value  # type: ignore[no-any-return]
-            try:
-                result = await self._perform(step)
-            except LineBroken as broken:
-                result = broken
+        run = Run(steps)
+        step = run.next()
+        while step is not None:
+            step = run.next(await self._perform(step))
+        return run.value
 
-    async def _perform(self, step: Any) -> Optional[Reply]:
+    async def _perform(self, step: Any) -> Union[Reply, ConnectionLost, None]:
         if isinstance(step, Pause):
             await asyncio.sleep(step.seconds)
             return None
         if isinstance(step, NextService):
             self._services.next()
             return None
+        if isinstance(step, PreviousService):
+            self._services.previous()
+            return None
         assert isinstance(step, Request)
         try:
             reply = await self._http.request(**request_of(step, self._services))
         except httpx.TransportError as error:
-            raise LineBroken(str(error) or type(error).__name__) from error
+            return ConnectionLost(str(error) or type(error).__name__)
         return transport.reply(reply.status_code, reply.headers, reply.content)
 
 

@@ -12,8 +12,8 @@ from bagtrack.answer import Answer, Box, BoxLike
 from bagtrack.base_client import BaseClient, request_of
 from bagtrack.encoding import Frame
 from bagtrack.session import SNAPSHOT, four_numbers
-from bagtrack.steps import LineBroken, NextService, Pause, Reply, Request, Steps
-from bagtrack.stream import Give, NextFrame, Stream
+from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Run, Steps
+from bagtrack.stream import NextFrame, Stream, Yield
 
 T = TypeVar("T")
 
@@ -58,26 +58,22 @@ class Client(BaseClient):
         from bagtrack.sockets import Socket
 
         source = iter(frames)
-        steps = Stream(self._session, window).run()
+        run = Run(Stream(self._session, window).run())
         socket = Socket(self._services, self._headers, self._timeout)
-        result: Any = None
+        step = run.next()
         try:
-            while True:
-                try:
-                    step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
-                except StopIteration:
-                    return
-                result = None
-                if isinstance(step, Give):
+            while step is not None:
+                result: Any = None
+                if isinstance(step, Yield):
                     yield step.answer
                 elif isinstance(step, NextFrame):
                     frame = next(source, None)
                     result = None if frame is None else self._encode(frame)
+                elif Socket.performs(step):
+                    result = socket.perform(step)
                 else:
-                    try:
-                        result = socket.perform(step) if Socket.performs(step) else self._perform(step)
-                    except LineBroken as broken:
-                        result = broken
+                    result = self._perform(step)
+                step = run.next(result)
         finally:
             socket.close()
 
@@ -97,27 +93,25 @@ class Client(BaseClient):
         self.close()
 
     def _run(self, steps: Steps[T]) -> T:
-        result: Any = None
-        while True:
-            try:
-                step = steps.throw(result) if isinstance(result, LineBroken) else steps.send(result)
-            except StopIteration as end:
-                return end.value  # type: ignore[no-any-return]
-            try:
-                result = self._perform(step)
-            except LineBroken as broken:
-                result = broken
+        run = Run(steps)
+        step = run.next()
+        while step is not None:
+            step = run.next(self._perform(step))
+        return run.value
 
-    def _perform(self, step: Any) -> Optional[Reply]:
+    def _perform(self, step: Any) -> Union[Reply, ConnectionLost, None]:
         if isinstance(step, Pause):
             time.sleep(step.seconds)
             return None
         if isinstance(step, NextService):
             self._services.next()
             return None
+        if isinstance(step, PreviousService):
+            self._services.previous()
+            return None
         assert isinstance(step, Request)
         try:
             reply = self._http.request(**request_of(step, self._services))
         except httpx.TransportError as error:
-            raise LineBroken(str(error) or type(error).__name__) from error
+            return ConnectionLost(str(error) or type(error).__name__)
         return transport.reply(reply.status_code, reply.headers, reply.content)

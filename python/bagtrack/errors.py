@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
+
+TEMPORARY = (408, 429, 502, 503, 504)
+"""Statuses with which the same request may succeed later: of the service, and of proxies before it."""
 
 
 class ServiceError(Exception):
@@ -18,7 +22,12 @@ class ServiceError(Exception):
     @property
     def kind(self) -> str:
         """The kind of problem, like `invalid-box`; empty where the answer was no problem document."""
-        return str(self.problem.get("type", "")).rpartition(":")[2]
+        return re.split("[#:]", str(self.problem.get("type", "")))[-1]
+
+    @property
+    def is_temporary(self) -> bool:
+        """Whether the same request may succeed later."""
+        return self.status in TEMPORARY or self.kind == "not-in-order"
 
 
 class ServiceUnavailable(Exception):

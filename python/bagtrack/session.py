@@ -9,12 +9,16 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 from bagtrack.answer import Answer, Box, BoxLike, parse_box
+from bagtrack.backoff import Backoff
 from bagtrack.errors import ServiceError, ServiceUnavailable
-from bagtrack.steps import LineBroken, NextService, Pause, Reply, Request, Steps
+from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Steps
 
 SNAPSHOT = "application/vnd.bagtrack.snapshot"
 GONE = (404, 410)
-MAX_PAUSE = 5.0
+MOST_KEPT = 256
+"""Most frames that are kept."""
+MOVE_EVERY = 1.0
+"""A service that is about to end may be the only one for a while: seconds until the next try to go elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -50,28 +54,32 @@ def query_box(box: Box) -> str:
 
 
 class Session:
-    """Where a session stands, here and at the service. Its methods are generators of steps."""
+    """Where a session stands, here and at the service. Its methods are generators of steps.
+
+    docs/PROTOCOL.md says what is done when.
+    """
 
     def __init__(self, snapshot_every: int, retry_for: float) -> None:
-        self.snapshot_every = snapshot_every
+        self.snapshot_every = min(snapshot_every, MOST_KEPT // 2)
         self.retry_for = retry_for
         self.id: Optional[str] = None
         self.params: dict[str, Any] = {}
         self.answer: Optional[Answer] = None
         """The last answer that the caller has."""
-        self.at = -1
+        self.last_acknowledged = -1
         """The last frame that the service has, as far as is known."""
         self._origin: Optional[Origin] = None
+        """While there is one, all frames after it are kept."""
         self._uploads: dict[int, Upload] = {}
-        """The frames after the origin's, by their numbers."""
+        """Frames by their numbers, without gaps."""
         self._tried_to_move = float("-inf")
 
     def open(self, query: dict[str, str], body: bytes, media_type: str) -> Steps[None]:
         """Opens a session from a first frame or a snapshot; ends the one that there was."""
         yield from self.close()
         document = yield from self._create(query, body, media_type)
-        self._stand_at(document, query, body, media_type)
-        self.answer = Answer(self.at, parse_box(document["box"]), 1.0, "tracking")
+        self._reset_to(document, query, body, media_type)
+        self.answer = Answer(self.last_acknowledged, parse_box(document["box"]), 1.0, "tracking")
         if media_type == SNAPSHOT:
             reply = yield from self.call(Request("GET", self.path()))
             self.answer = Answer.parse(self._checked(reply).document["answer"])
@@ -79,14 +87,14 @@ class Session:
     def advance(self, body: bytes, box: Optional[Box] = None) -> Steps[Answer]:
         """Sends the next frame."""
         number = self.next_number()
-        self._uploads[number] = Upload(body, box)
+        self.keep(number, Upload(body, box))
         try:
             reply = yield from self.catch_up(number)
         except ServiceError:
             self.drop_refused()
             raise
         self.answer = Answer.parse(reply.document)
-        yield from self.look_after(reply)
+        yield from self.checkpoint(reply)
         return self.answer
 
     def next_number(self) -> int:
@@ -98,62 +106,98 @@ class Session:
 
     def catch_up(self, until: int) -> Steps[Reply]:
         """Brings the service up to frame `until`; the reply to that frame."""
+        backoff, is_first = Backoff(self.retry_for), True
         while True:
-            number = min(self.at + 1, until)
+            number = min(self.last_acknowledged + 1, until)
             upload = self._uploads.get(number)
             if upload is None:
-                raise ServiceUnavailable(f"the service asks for frame {number} again, which was not kept")
+                raise ServiceUnavailable(f"the service needs frame {number} again, which is not kept any more")
             reply = yield from self.call(self._post(number, upload))
-            if reply.status in GONE:
-                yield from self.restore()
-            elif reply.status == 409 and reply.document.get("expected_frame", number) < number:
-                self.at = reply.document["expected_frame"] - 1
-            else:
-                self._checked(reply)
-                self.at = max(self.at, number)
+            if reply.status < 400:
+                self.last_acknowledged = max(self.last_acknowledged, number)
                 if number == until:
                     return reply
+                continue
+            problem = ServiceError(reply.status, reply.document)
+            expected = reply.document.get("expected_frame", number)
+            if reply.status not in GONE and not self._has_from(expected, number, until):
+                raise problem
+            if not is_first:
+                # Where every replica loses the session again, this ends with the time for retries.
+                pause = backoff.next()
+                if pause is None:
+                    raise problem
+                yield Pause(pause)
+            is_first = False
+            if reply.status in GONE:
+                yield from self.restore(problem)
+            else:
+                self.last_acknowledged = expected - 1
 
-    def restore(self) -> Steps[None]:
-        """Opens the session again after the service has lost it."""
+    def _has_from(self, expected: int, number: int, until: int) -> bool:
+        """Whether the client can go on with the frame that the service expects in place of `number`."""
+        if expected < number:
+            return expected in self._uploads
+        # The service has frames already that were sent again.
+        return number < expected <= until
+
+    def resend_from(self, number: int, problem: ServiceError) -> None:
+        """The service has no frames from this one on; it is sent next. Raises the problem where it is not kept."""
+        if number not in self._uploads:
+            raise problem
+        self.last_acknowledged = number - 1
+
+    def restore(self, lost: ServiceError) -> Steps[None]:
+        """Opens the session again after the service has lost it, as the problem says, which is raised otherwise."""
+        if self._origin is None:
+            raise lost
         origin = self._origin
-        answered = self.answer.frame if self.answer else 0
-        if origin is None or any(number not in self._uploads for number in range(origin.frame + 1, answered + 1)):
-            raise ServiceUnavailable("the service has lost the session, and what opens it again was not kept")
-        document = yield from self._create(origin.query, origin.body, origin.media_type)
-        self.id, self.at = document["id"], document["frame"]
+        try:
+            document = yield from self._create(origin.query, origin.body, origin.media_type)
+        except ServiceError as refused:
+            # Such as a service with other keys, which does not take the snapshot.
+            raise lost from refused
+        self.id, self.last_acknowledged = document["id"], document["frame"]
 
-    def look_after(self, reply: Reply) -> Steps[None]:
+    def checkpoint(self, reply: Reply) -> Steps[None]:
         """Makes sure, after the reply to a frame, that the session can go on elsewhere."""
         number = self.answer.frame if self.answer else 0
-        checkpoint = reply.headers.get("checkpoint")
-        if checkpoint is not None:
+        stored = reply.headers.get("checkpoint")
+        if stored is not None:
             # A store has the session up to there: any replica goes on with it.
-            self._forget(int(checkpoint))
-            return
-        if reply.is_draining and time.monotonic() - self._tried_to_move > 1.0:
+            self._forget(int(stored))
+        elif reply.is_draining and self._may_try_to_move():
             yield from self._move()
         elif self.snapshot_every == 0:
             self._forget(number)
-        elif self._origin is not None and number - self._origin.frame >= self.snapshot_every:
+        elif self._is_snapshot_due(number):
             yield from self._renew_origin(number)
 
-    def wants_care(self, document: dict[str, Any]) -> bool:
-        """Whether, after this answer of a stream, `look_after` has something to do."""
-        if "checkpoint" in document or self.snapshot_every == 0:
-            self._forget(document.get("checkpoint", document["frame"]))
+    def needs_checkpoint(self, document: dict[str, Any]) -> bool:
+        """Whether, after this answer of a stream, `checkpoint` has something to send."""
+        if "checkpoint" in document:
+            self._forget(document["checkpoint"])
             return False
-        waited = time.monotonic() - self._tried_to_move > 1.0
-        is_due = self._origin is not None and document["frame"] - self._origin.frame >= self.snapshot_every
-        return is_due or (bool(document.get("draining")) and waited)
+        if document.get("draining") and self._may_try_to_move():
+            return True
+        if self.snapshot_every == 0:
+            self._forget(document["frame"])
+            return False
+        return self._is_snapshot_due(document["frame"])
+
+    def _may_try_to_move(self) -> bool:
+        return time.monotonic() - self._tried_to_move >= MOVE_EVERY
+
+    def _is_snapshot_due(self, number: int) -> bool:
+        return self._origin is None or number - self._origin.frame >= self.snapshot_every
 
     def save(self) -> Steps[bytes]:
         """The service's snapshot of the session."""
         self.next_number()
         reply = yield from self.call(Request("GET", self.path("/snapshot")))
         if reply.status in GONE:
-            yield from self.restore()
-            if self.answer and self.at < self.answer.frame:
+            yield from self.restore(ServiceError(reply.status, reply.document))
+            if self.answer and self.last_acknowledged < self.answer.frame:
                 yield from self.catch_up(self.answer.frame)
             reply = yield from self.call(Request("GET", self.path("/snapshot")))
         return self._checked(reply).body
@@ -166,7 +210,7 @@ class Session:
         self.id, self.answer, self._origin, self._uploads = None, None, None, {}
         try:
             yield Request("DELETE", path)
-        except LineBroken:
+        except ConnectionLost:
             # It expires.
             pass
 
@@ -175,8 +219,11 @@ class Session:
         return f"/sessions/{self.id}{below}"
 
     def keep(self, number: int, upload: Upload) -> None:
-        """Keeps a frame that is sent over a stream."""
+        """Keeps the next frame. The oldest goes where there are too many."""
         self._uploads[number] = upload
+        if len(self._uploads) > MOST_KEPT:
+            del self._uploads[min(self._uploads)]
+            self._origin = None
 
     def kept(self, number: int) -> Optional[Upload]:
         """A frame that was kept."""
@@ -184,30 +231,33 @@ class Session:
 
     def drop_refused(self) -> None:
         """Forgets the frames that the service has not taken."""
-        last = max(self.at, self.answer.frame if self.answer else 0)
+        last = max(self.last_acknowledged, self.answer.frame if self.answer else 0)
         self._uploads = {number: it for number, it in self._uploads.items() if number <= last}
 
     def call(self, request: Request) -> Steps[Reply]:
         """The reply to a request that may be sent several times. Waits where the service asks for it."""
-        begin, tries = time.monotonic(), 0
+        backoff = Backoff(self.retry_for)
+        # A line that was idle for long breaks at its next use: the first time nothing is meant by it.
+        has_broken = self.retry_for == 0
         while True:
-            tries += 1
-            pause = min(0.05 * 2.0**tries, MAX_PAUSE)
+            asked = 0.0
             try:
                 reply: Reply = yield request
-                if reply.status not in (429, 502, 503, 504):
+                problem = ServiceError(reply.status, reply.document)
+                if not problem.is_temporary:
                     return reply
-                reason: Exception = ServiceError(reply.status, reply.document)
-                pause = _retry_after(reply, pause)
-                if reply.document.get("type", "").endswith(":not-ready"):
+                reason: Exception = problem
+                asked = reply.retry_after
+                if problem.kind == "not-ready":
                     yield NextService()
-            except LineBroken as error:
-                reason = error
-                # A line that was idle for long breaks at its next use: the first time nothing is meant by it.
-                if tries == 1:
+            except ConnectionLost as lost:
+                reason = lost
+                if not has_broken:
+                    has_broken = True
                     continue
                 yield NextService()
-            if time.monotonic() + pause - begin > self.retry_for:
+            pause = backoff.next(asked)
+            if pause is None:
                 raise ServiceUnavailable(f"no answer within {self.retry_for:g} s: {reason}") from reason
             yield Pause(pause)
 
@@ -217,12 +267,14 @@ class Session:
         document: dict[str, Any] = self._checked(reply).document
         return document
 
-    def _stand_at(self, document: dict[str, Any], query: dict[str, str], body: bytes, media_type: str) -> None:
-        self.id, self.at, self.params = document["id"], document["frame"], document["parameters"]
+    def _reset_to(self, document: dict[str, Any], query: dict[str, str], body: bytes, media_type: str) -> None:
+        self.id, self.params = document["id"], document["parameters"]
+        self.last_acknowledged = document["frame"]
         if media_type != SNAPSHOT:
             # The same boxes come again only with the seed that was drawn.
             query = {**query, "seed": str(self.params["seed"])}
-        self._origin = Origin(self.at, query, body, media_type)
+        origin = Origin(self.last_acknowledged, query, body, media_type)
+        self._origin = origin if self.snapshot_every > 0 else None
         self._uploads = {}
 
     def _post(self, number: int, upload: Upload) -> Request:
@@ -231,36 +283,41 @@ class Session:
             return Request("POST", self.path("/frames"), query, upload.body)
         return Request("PUT", self.path("/target"), {**query, "box": query_box(upload.box)}, upload.body)
 
-    def _renew_origin(self, number: int) -> Steps[bool]:
+    def _renew_origin(self, number: int) -> Steps[Optional[Origin]]:
         """Takes a snapshot, of frame `number` or a later one; without it the older one and more frames are kept."""
         try:
             reply = yield Request("GET", self.path("/snapshot"))
-        except LineBroken:
-            return False
+        except ConnectionLost:
+            return None
         if reply.status != 200:
-            return False
-        self._origin = Origin(number, {}, reply.body, SNAPSHOT)
+            return None
+        origin = Origin(number, {}, reply.body, SNAPSHOT)
         self._forget(number)
-        return True
+        self._origin = origin
+        return origin
 
     def _move(self) -> Steps[None]:
         """Goes on elsewhere, since the service is about to end. If there is nothing else yet, it goes on here."""
         self._tried_to_move = time.monotonic()
-        number = self.answer.frame if self.answer else 0
-        if not (yield from self._renew_origin(number)) or self._origin is None:
+        origin = yield from self._renew_origin(self.answer.frame if self.answer else 0)
+        if origin is None:
             return
         yield NextService()
-        origin = self._origin
         try:
             path = f"/sessions/{uuid.uuid4()}"
             reply = yield Request("PUT", path, origin.query, origin.body, origin.media_type)
-        except LineBroken:
-            return
-        if reply.status == 201:
-            self.id, self.at = reply.document["id"], reply.document["frame"]
+        except ConnectionLost:
+            reply = None
+        if reply is not None and reply.status in (200, 201):
+            self.id, self.last_acknowledged = reply.document["id"], reply.document["frame"]
+        else:
+            yield PreviousService()
 
     def _forget(self, until: int) -> None:
+        """Forgets the frames up to this one, which the service does not ask for again."""
         self._uploads = {number: it for number, it in self._uploads.items() if number > until}
+        if self._origin is not None and self._origin.frame < until:
+            self._origin = None
 
     @staticmethod
     def _checked(reply: Reply) -> Reply:
@@ -277,10 +334,3 @@ def settings(preset: str, seed: Optional[int], params: dict[str, Any]) -> dict[s
     if params:
         query["parameters"] = json.dumps(params)
     return query
-
-
-def _retry_after(reply: Reply, otherwise: float) -> float:
-    try:
-        return max(float(reply.headers["retry-after"]), 0.0)
-    except (KeyError, ValueError):
-        return otherwise

@@ -11,7 +11,7 @@ import websockets.sync.client
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
 from bagtrack import transport
-from bagtrack.steps import LineBroken
+from bagtrack.steps import ConnectionLost
 from bagtrack.stream import Connect, Disconnect, Receive, Send
 from bagtrack.transport import Services
 
@@ -44,16 +44,16 @@ class BaseSocket:
     def _document(message: Union[str, bytes]) -> dict[str, Any]:
         document = transport.parse(message)
         if not isinstance(document, dict) or not document:
-            raise LineBroken(f"the service sent a message that is no JSON object: {message!r}")
+            raise ConnectionLost(f"the service sent a message that is no JSON object: {message!r}")
         return document
 
     @staticmethod
-    def _broken(error: BaseException) -> LineBroken:
+    def _broken(error: BaseException) -> ConnectionLost:
         if isinstance(error, InvalidStatus):
             return transport.refused(error.response.status_code, error.response.body or b"{}")
         if isinstance(error, ConnectionClosed) and error.rcvd is not None:
             return transport.closed(error.rcvd.code, error.rcvd.reason)
-        return LineBroken(str(error) or type(error).__name__)
+        return ConnectionLost(str(error) or type(error).__name__)
 
 
 class Socket(BaseSocket):
@@ -62,8 +62,8 @@ class Socket(BaseSocket):
     _socket: Optional[websockets.sync.client.ClientConnection] = None
     _lifetime: Optional[ExitStack] = None
 
-    def perform(self, step: Any) -> Optional[dict[str, Any]]:
-        """Takes a step; the document that came, where it waits for one. `LineBroken`."""
+    def perform(self, step: Any) -> Union[dict[str, Any], ConnectionLost, None]:
+        """Takes a step; the document that came, where it waits for one."""
         try:
             if isinstance(step, Connect):
                 self._lifetime = ExitStack()
@@ -73,13 +73,15 @@ class Socket(BaseSocket):
             if isinstance(step, Disconnect):
                 self.close()
             elif self._socket is None:
-                raise LineBroken("the stream is not open")
+                raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 self._socket.send(step.message)
             else:
                 return self._document(self._socket.recv(self._timeout))
+        except ConnectionLost as lost:
+            return lost
         except FAILURES as error:
-            raise self._broken(error) from error
+            return self._broken(error)
         return None
 
     def close(self) -> None:
@@ -95,7 +97,7 @@ class AsyncSocket(BaseSocket):
 
     _socket: Optional[websockets.asyncio.client.ClientConnection] = None
 
-    async def perform(self, step: Any) -> Optional[dict[str, Any]]:
+    async def perform(self, step: Any) -> Union[dict[str, Any], ConnectionLost, None]:
         """As `Socket.perform`."""
         try:
             if isinstance(step, Connect):
@@ -104,13 +106,15 @@ class AsyncSocket(BaseSocket):
             if isinstance(step, Disconnect):
                 await self.close()
             elif self._socket is None:
-                raise LineBroken("the stream is not open")
+                raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 await self._socket.send(step.message)
             else:
                 return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
+        except ConnectionLost as lost:
+            return lost
         except FAILURES as error:
-            raise self._broken(error) from error
+            return self._broken(error)
         return None
 
     async def close(self) -> None:

@@ -1,13 +1,13 @@
 """What a session asks of the client that runs it.
 
 Sessions are generators that yield these steps and are sent their results; so one code serves blocking and asynchronous
-clients. A line that breaks is thrown into them as `LineBroken`.
+clients. A connection that is lost is thrown into them as `ConnectionLost`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Generator, Mapping, TypeVar, Union
+from typing import Any, Generator, Generic, Mapping, TypeVar, Union
 
 T = TypeVar("T")
 
@@ -39,6 +39,14 @@ class Reply:
         """Whether the service is about to end."""
         return self.headers.get("draining") == "true"
 
+    @property
+    def retry_after(self) -> float:
+        """After how many seconds trying again makes sense; 0 where that is not said."""
+        try:
+            return float(int(self.headers["retry-after"]))
+        except (KeyError, ValueError):
+            return 0.0
+
 
 @dataclass(frozen=True)
 class Pause:
@@ -52,7 +60,12 @@ class NextService:
     """Go on with the next of the client's addresses, where it has several."""
 
 
-class LineBroken(Exception):
+@dataclass(frozen=True)
+class PreviousService:
+    """Go back to the address before the last `NextService`."""
+
+
+class ConnectionLost(Exception):
     """No answer came. Where a stream was refused or closed with a reason, `status` is that of the problem."""
 
     def __init__(self, reason: str, status: int = 0, document: Any = None) -> None:
@@ -61,5 +74,24 @@ class LineBroken(Exception):
         self.document = document or {}
 
 
-Step = Union[Request, Pause, NextService]
+Step = Union[Request, Pause, NextService, PreviousService]
 Steps = Generator[Any, Any, T]
+
+
+class Run(Generic[T]):
+    """Runs steps: whoever holds it performs each one, and gives its result to `next`."""
+
+    def __init__(self, steps: Steps[T]) -> None:
+        self._steps = steps
+        self.value: T
+        """What came of the steps, after the last one."""
+
+    def next(self, result: Any = None) -> Any:
+        """The next step, after this result or `ConnectionLost`; None after the last one."""
+        try:
+            if isinstance(result, ConnectionLost):
+                return self._steps.throw(result)
+            return self._steps.send(result)
+        except StopIteration as end:
+            self.value = end.value
+            return None

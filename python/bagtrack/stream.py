@@ -9,7 +9,7 @@ from typing import Any, Optional
 from bagtrack.answer import Answer
 from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.session import GONE, Session, Upload
-from bagtrack.steps import LineBroken, NextService, Pause, Reply, Steps
+from bagtrack.steps import ConnectionLost, NextService, Pause, Reply, Steps
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class NextFrame:
 
 
 @dataclass(frozen=True)
-class Give:
+class Yield:
     """Give the caller an answer."""
 
     answer: Answer
@@ -69,7 +69,7 @@ class Stream:
                 yield from self._connect()
                 yield from self._exchange()
                 yield Disconnect()
-            except LineBroken as broken:
+            except ConnectionLost as broken:
                 yield Disconnect()
                 yield from self._mend(broken)
 
@@ -81,10 +81,10 @@ class Stream:
         hello = yield Connect(self._session.path("/stream"), first)
         # The answers to the frames before this one come of themselves.
         self._sent = hello["next"] - 1
-        self._session.at = self._sent
+        self._session.last_acknowledged = self._sent
 
     def _exchange(self) -> Steps[None]:
-        """Sends and receives, until the frames have ended or the session is to be looked after."""
+        """Sends and receives, until the frames have ended or the session needs a checkpoint."""
         session = self._session
         reply: Optional[Reply] = None
         while True:
@@ -103,7 +103,7 @@ class Stream:
                     return
                 # Nothing is on its way, so the snapshot is of the last answer.
                 before = session.id
-                yield from session.look_after(reply)
+                yield from session.checkpoint(reply)
                 reply = None
                 if session.id != before:
                     return
@@ -113,10 +113,10 @@ class Stream:
                 self._refuse(document)
             self._tries = 0
             session.answer = Answer.parse(document)
-            session.at = max(session.at, session.answer.frame)
-            if session.wants_care(document):
+            session.last_acknowledged = max(session.last_acknowledged, session.answer.frame)
+            if session.needs_checkpoint(document):
                 reply = as_reply(document)
-            yield Give(session.answer)
+            yield Yield(session.answer)
 
     def _next_upload(self) -> Steps[Optional[Upload]]:
         number = self._sent + 1
@@ -131,26 +131,27 @@ class Stream:
 
     def _refuse(self, problem: dict[str, Any]) -> None:
         if problem.get("status") in (429, 503):
-            raise LineBroken(problem.get("detail", ""), problem["status"])
+            raise ConnectionLost(problem.get("detail", ""), problem["status"])
         self._session.drop_refused()
         raise ServiceError(problem.get("status", 0), problem)
 
-    def _mend(self, broken: LineBroken) -> Steps[None]:
+    def _mend(self, broken: ConnectionLost) -> Steps[None]:
         """Makes the session ready for the next connection."""
         session, answered = self._session, self._answered()
         self._tries += 1
+        problem = ServiceError(broken.status, broken.document)
         if broken.status in GONE:
-            yield from session.restore()
-            if session.at < answered:
+            yield from session.restore(problem)
+            if session.last_acknowledged < answered:
                 yield from session.catch_up(answered)
             return
         if broken.status == 409 and broken.document.get("expected_frame", answered + 1) <= answered:
             # The service is at its last checkpoint.
-            session.at = broken.document["expected_frame"] - 1
+            session.resend_from(broken.document["expected_frame"], problem)
             yield from session.catch_up(answered)
             return
-        if broken.status and broken.status not in (429, 502, 503, 504):
-            raise ServiceError(broken.status, broken.document)
+        if broken.status and not problem.is_temporary:
+            raise problem
         if self._tries > 1:
             yield NextService()
         pause = min(0.05 * 2.0**self._tries, 2.0)

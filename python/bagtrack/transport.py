@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Mapping, Sequence, Union
 
-from bagtrack.steps import LineBroken, Reply
+from bagtrack.steps import ConnectionLost, Reply
 
 
 class Services:
@@ -31,6 +31,10 @@ class Services:
         """Goes on to the next address."""
         self._used = (self._used + 1) % len(self._urls)
 
+    def previous(self) -> None:
+        """Goes back to the address before."""
+        self._used = (self._used - 1) % len(self._urls)
+
 
 def authorization(api_key: Union[str, None]) -> dict[str, str]:
     """The headers that say who calls."""
@@ -51,15 +55,15 @@ def parse(text: Union[str, bytes, bytearray]) -> Any:
         return {}
 
 
-def refused(status: int, body: Union[bytes, bytearray]) -> LineBroken:
+def refused(status: int, body: Union[bytes, bytearray]) -> ConnectionLost:
     """A stream that was refused at its handshake."""
     document = parse(body)
-    return LineBroken(document.get("detail", f"the service answered {status}"), status, document)
+    return ConnectionLost(document.get("detail", f"the service answered {status}"), status, document)
 
 
-def closed(code: Union[int, None], reason: str) -> LineBroken:
+def closed(code: Union[int, None], reason: str) -> ConnectionLost:
     """A stream that was closed. The code is 4000 and the status of a problem, where there was one."""
     status = (code or 0) - 4000
     # 4409: another stream of the session has taken this one's place.
     is_problem = status > 0 and status != 409
-    return LineBroken(f"the stream was closed ({code} {reason})", status if is_problem else 0)
+    return ConnectionLost(f"the stream was closed ({code} {reason})", status if is_problem else 0)

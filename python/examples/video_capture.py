@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("video", help="a file, or the number of a camera")
     parser.add_argument("--box", type=numbers, help="x,y,width,height in the first frame; without it you draw it")
     parser.add_argument("--url", help="track with the service at this address, not in process")
-    parser.add_argument("--seed", type=int)
+    parser.add_argument("--seed", type=int, default=0, help="the same seed gives the same boxes")
     parser.add_argument("--out", help="write the video with its boxes into this file")
     options = parser.parse_args()
 

@@ -13,4 +13,9 @@ mod tracker;
 mod _native {
     #[pymodule_export]
     use super::tracker::PyTracker;
+
+    /// The version of the package.
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "that is what Python calls it")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 /// Seeds drawn here are below this, so that JSON numbers hold them exactly in every language.
 const SEED_END: u64 = 1 << 53;
 
-/// The parameters of `preset` with single ones set otherwise. Without any seed one is drawn from Python's `random`.
+/// The parameters of `preset` with single ones set otherwise. Where the seed is None, one is drawn from Python's `random`.
 ///
 /// # Errors
 /// There is no such preset or parameter, or a value is of the wrong type or out of its range.

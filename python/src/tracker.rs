@@ -6,7 +6,7 @@ use super::target::{Numbers, numbers, rect};
 use bagtrack_tracker::{Estimate, Params, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyType};
+use pyo3::types::{PyBytes, PyDict, PyTuple, PyType};
 use std::sync::{Mutex, MutexGuard};
 
 /// Follows one object through frames, in this process.
@@ -52,7 +52,7 @@ fn before_init() -> PyErr {
 #[pymethods]
 impl PyTracker {
     #[new]
-    #[pyo3(signature = (preset = "robust", seed = None, **params))]
+    #[pyo3(signature = (preset = "robust", seed = Some(0), **params))]
     fn new(
         py: Python<'_>,
         preset: &str,
@@ -131,6 +131,12 @@ impl PyTracker {
         Ok(self.estimate(py)?.frame)
     }
 
+    /// Width and height of the frames.
+    #[getter]
+    fn frame_size(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
+        self.change(py, |tracker| Ok(tracker.source_size()))
+    }
+
     /// All parameters by their names.
     #[getter]
     fn params(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
@@ -153,6 +159,26 @@ impl PyTracker {
             params: tracker.params().clone(),
             tracker: Mutex::new(Some(tracker)),
         })
+    }
+
+    /// What pickle and copy make another one with: `load` and a snapshot, or the parameters before `init`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let tracker = slf.get();
+        let is_begun = py.detach(|| Ok::<_, PyErr>(tracker.lock()?.is_some()))?;
+        match is_begun {
+            true => {
+                let snapshot = tracker.save(py)?;
+                let load = slf.get_type().getattr("load")?;
+                (load, (snapshot,)).into_pyobject(py)
+            }
+            false => {
+                let partial = py.import("functools")?.getattr("partial")?;
+                let params = by_name(&tracker.params, py)?;
+                let make = partial.call((slf.get_type(),), Some(params.bind(py)))?;
+                (make, PyTuple::empty(py)).into_pyobject(py)
+            }
+        }
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

@@ -72,6 +72,6 @@ def test_a_refusal_and_a_service_that_is_away_reach_cvat(
     call = Caller()
     refused = call(clip.files[0], [[5, 5, 5, 9]], [])
     assert refused.status_code == 422
-    assert json.loads(refused.body)["type"] == "urn:bagtrack:problem:invalid-box"
+    assert json.loads(refused.body)["type"] == "/docs/problems#invalid-box"
     server.kill()
     assert call(clip.files[0], [corners(clip.box)], []).status_code == 503

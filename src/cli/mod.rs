@@ -1,12 +1,18 @@
 //! The commands of the program, one file each.
 //!
-//! In: flags and environment variables, read by clap. Out: standard output, new folders, and an exit status: 0, or 1
-//! after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
+//! In: flags and environment variables, read by clap. Out: standard output, new files, and an exit status: 0; 1 after an
+//! error, which is one line on standard error; 2 from clap on wrong usage; 128 and the number of the signal that ended
+//! `track`.
 
-mod draw;
+mod address;
+#[cfg(feature = "tls")]
+mod any_certificate;
+mod completions;
 mod evaluate;
 #[cfg(feature = "otel")]
 mod export;
+mod formats;
+mod headings;
 mod health;
 mod log;
 mod open_files;
@@ -14,8 +20,6 @@ mod sample;
 mod serve;
 mod signals;
 mod track;
-mod track_frames;
-mod track_writer;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -53,31 +57,37 @@ enum Command {
     Sample(sample::Args),
     /// Ask a running service whether it is healthy.
     Health(health::Args),
+    /// Print what completes commands and flags in a shell.
+    Completions(completions::Args),
 }
 
-/// Reads the command line. The settings of the service are in the help of `serve` only, so that this one fits a screen.
+/// The commands. The settings of the service are in the help of `serve` only, so that the first help fits a screen.
+fn command() -> clap::Command {
+    let command = Cli::command().mut_args(|arg| arg.hide(true));
+    command
+        .mut_subcommand("serve", |serve| serve.mut_args(headings::put))
+        .after_help(AFTER)
+}
+
+/// Reads the command line.
 pub fn parse() -> Cli {
-    let command = Cli::command()
-        .mut_args(|arg| arg.hide(true))
-        .after_help(AFTER);
-    let matches = command.get_matches();
+    let matches = command().get_matches();
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 /// Runs the command.
 pub fn run(cli: Cli) -> ExitCode {
+    let done = |()| ExitCode::SUCCESS;
     let result = match cli.command.unwrap_or(Command::Serve(Box::new(cli.serve))) {
-        Command::Serve(args) => serve::run(*args),
+        Command::Serve(args) => serve::run(*args).map(done),
         Command::Track(args) => track::run(args),
-        Command::Eval(args) => evaluate::run(args),
-        Command::Sample(args) => sample::run(args),
-        Command::Health(args) => health::run(args),
+        Command::Eval(args) => evaluate::run(args).map(done),
+        Command::Sample(args) => sample::run(args).map(done),
+        Command::Health(args) => health::run(args).map(done),
+        Command::Completions(args) => completions::run(args, command()).map(done),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("bagtrack: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    result.unwrap_or_else(|error| {
+        eprintln!("bagtrack: {error}");
+        ExitCode::FAILURE
+    })
 }

@@ -3,11 +3,13 @@
 //! It ends with status 0 when all open requests have ended in time, and with 1 when some were cut off, or when a second
 //! signal ended it at once.
 
+use super::address::Addresses;
 use super::log::{Log, LogFormat};
 use super::open_files;
-use super::signals::{self, Signals};
-use bagtrack::http::{Application, Config, MemoryBound};
+use super::signals::{self, Reloaded, Signals};
+use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use std::error::Error;
+use std::net::SocketAddr;
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -39,14 +41,16 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
+    let base_path = config.base_path.clone();
     let application = Application::bind(config).await?;
-    let keys = application.api_keys();
+    let reloaded = Reloaded::of(&application);
     let mut signals = Signals::listen()?;
     let (mut first, again) = (signals.clone(), &mut signals);
     if no_auth && !listen.ip().is_loopback() {
         tracing::warn!("everybody who reaches this address may use the service (--no-auth)");
     }
-    tracing::info!("listening on http://{}", application.local_addr()?);
+    let (scheme, address) = (application.scheme(), application.local_addr()?);
+    tracing::info!("listening on {scheme}://{address}");
     let mib = |bytes: u64| bytes >> 20;
     tracing::info!(
         uploads = mib(bound.uploads),
@@ -56,8 +60,9 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
+    tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
-    let reloads = tokio::spawn(signals::reload_keys(keys));
+    let reloads = tokio::spawn(signals::reload(reloaded));
     let ended = tokio::select! {
         ended = application.serve(first.shutdown()) => ended,
         () = again.second_shutdown() => {
@@ -72,5 +77,21 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     match ended {
         true => Ok(()),
         false => Err("requests were cut off".into()),
+    }
+}
+
+/// Logs what to open in a browser.
+fn tell_addresses(scheme: &str, listen: SocketAddr, base_path: &BasePath) {
+    let Addresses { here, elsewhere } = Addresses::of(scheme, listen, base_path);
+    if let Some(url) = elsewhere {
+        tracing::info!("on other machines, open {url}");
+        if scheme == "http" {
+            tracing::info!(
+                "a phone's browser gives its camera to https only: see --tls-cert and docs/HTTPS.md"
+            );
+        }
+    }
+    if let Some(url) = here {
+        tracing::info!("open {url} in a browser");
     }
 }

@@ -1,6 +1,8 @@
-//! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads the API keys again.
+//! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads the API keys and the certificate again.
 
-use bagtrack::http::{ApiKeys, Shutdown};
+#[cfg(all(unix, feature = "tls"))]
+use bagtrack::http::Certificate;
+use bagtrack::http::{ApiKeys, Application, Shutdown};
 use std::io;
 use tokio::sync::watch;
 
@@ -43,31 +45,64 @@ impl Signals {
     }
 }
 
-/// Reads the API keys again on every SIGHUP.
+/// What is read again on a SIGHUP.
+#[derive(Debug, Clone)]
+pub struct Reloaded {
+    keys: ApiKeys,
+    #[cfg(all(unix, feature = "tls"))]
+    certificate: Option<Certificate>,
+}
+
+impl Reloaded {
+    /// Of this service.
+    pub fn of(application: &Application) -> Self {
+        Self {
+            keys: application.api_keys(),
+            #[cfg(all(unix, feature = "tls"))]
+            certificate: application.certificate(),
+        }
+    }
+
+    /// Each of them stays as it was where it cannot be read.
+    #[cfg(unix)]
+    fn reload(&self) {
+        match self.keys.reload() {
+            Ok(count) => tracing::info!(count, "API keys read again"),
+            Err(error) => tracing::error!(%error, "the API keys stay as they were"),
+        }
+        #[cfg(feature = "tls")]
+        if let Some(certificate) = &self.certificate {
+            match certificate.reload() {
+                Ok(()) => tracing::info!("certificate read again"),
+                Err(error) => tracing::error!(%error, "the certificate stays as it was"),
+            }
+        }
+    }
+}
+
+/// Reads the files of API keys and certificate again on every SIGHUP.
 #[cfg(unix)]
-pub async fn reload_keys(keys: ApiKeys) {
+pub async fn reload(reloaded: Reloaded) {
     use tokio::signal::unix::{SignalKind, signal};
     let mut hangups = match signal(SignalKind::hangup()) {
         Ok(hangups) => hangups,
         Err(error) => {
-            tracing::error!(%error, "cannot listen to SIGHUP: API keys are not read again");
+            tracing::error!(%error, "cannot listen to SIGHUP: API keys and certificate are not read again");
             return;
         }
     };
     while hangups.recv().await.is_some() {
-        let keys = keys.clone();
-        // The file may be on a slow file system.
-        match tokio::task::spawn_blocking(move || keys.reload()).await {
-            Ok(Ok(count)) => tracing::info!(count, "API keys read again"),
-            Ok(Err(error)) => tracing::error!(%error, "the API keys stay as they were"),
-            Err(error) => tracing::error!(%error, "the API keys stay as they were"),
+        let reloaded = reloaded.clone();
+        // The files may be on a slow file system.
+        if let Err(error) = tokio::task::spawn_blocking(move || reloaded.reload()).await {
+            tracing::error!(%error, "API keys and certificate stay as they were");
         }
     }
 }
 
 /// There is no such signal here.
 #[cfg(not(unix))]
-pub async fn reload_keys(_keys: ApiKeys) {}
+pub async fn reload(_reloaded: Reloaded) {}
 
 #[cfg(unix)]
 struct Source {

@@ -44,8 +44,12 @@ pub use config::limits::LimitsConfig;
 pub use config::memory_bound::MemoryBound;
 pub use config::service::Config;
 pub use config::store::StoreConfig;
+#[cfg(feature = "tls")]
+pub use config::tls::TlsConfig;
 pub use config::validation::ConfigError;
 pub use middleware::base_path::{BasePath, BasePathError};
+#[cfg(feature = "tls")]
+pub use net::certificate::{Certificate, CertificateError};
 pub use net::server::{Application, BindError, Shutdown};
 pub use openapi::document::document as openapi_document;
 pub use problems::kind::Kind as ProblemKind;

@@ -4,7 +4,7 @@ use crate::http::auth::layer::{authenticate, authenticate_metrics};
 use crate::http::auth::origin::check_origin;
 use crate::http::metrics::layer::count_request;
 use crate::http::middleware::answer_problems::{answer_problems, panic_response};
-use crate::http::middleware::base_path::mount;
+use crate::http::middleware::base_path::{client_path, mount};
 use crate::http::middleware::client_identity::identify;
 use crate::http::middleware::cors::cors;
 use crate::http::middleware::draining::mark_draining;
@@ -18,11 +18,13 @@ use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
+#[cfg(feature = "tls")]
+use crate::http::resources::https_only::to_https;
 use crate::http::state::AppState;
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
-use axum::http::HeaderValue;
+use axum::extract::{DefaultBodyLimit, Request};
 use axum::http::header::CACHE_CONTROL;
+use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -33,12 +35,24 @@ use tower_http::timeout::RequestBodyDeadlineLayer;
 /// The whole service. `extra` routes are served beside its own. They pass through the layers of all requests, and not
 /// through those of [`routes`], which say who may use the service.
 pub fn router(state: AppState, extra: Router) -> Router {
-    let config = &state.config;
     let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
-        .fallback(async || Problem::route_not_found())
-        .method_not_allowed_fallback(async || Problem::method_not_allowed())
+        .fallback(async |request: Request| Problem::no_route(&client_path(&request)))
+        .method_not_allowed_fallback(async || Problem::method_not_allowed());
+    mount(&state.config.base_path, with_layers(routes, &state))
+}
+
+/// What is served where TLS is expected, and is not spoken.
+#[cfg(feature = "tls")]
+pub fn https_only(state: &AppState) -> Router {
+    with_layers(Router::new().fallback(to_https), state)
+}
+
+/// The layers that every request passes through.
+fn with_layers(routes: Router, state: &AppState) -> Router {
+    let config = &state.config;
+    routes
         // The last layer is the first to see a request.
         .layer(DefaultBodyLimit::max(config.max_body_bytes))
         .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
@@ -60,8 +74,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), count_request))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
-        .layer(middleware::map_request(remove_unusable_id));
-    mount(&state.config.base_path, routes)
+        .layer(middleware::map_request(remove_unusable_id))
 }
 
 /// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and
@@ -74,6 +87,7 @@ fn routes(state: &AppState) -> Router<AppState> {
     let document = docs::document(&state.config.base_path);
     let (sessions, _) = routes::sessions().split_for_parts();
     let (metrics, _) = routes::metrics().split_for_parts();
+    let (version, _) = routes::version().split_for_parts();
     let (probes, _) = routes::probes().split_for_parts();
     let pages = Router::new()
         .route("/", get(static_files::index))
@@ -82,7 +96,12 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/sample/{clip}/clip.json", get(sample_clips::view))
         .route("/sample/{clip}/{frame}", get(sample_clips::frame));
     pages
-        .route("/openapi.json", get(move || docs::served(document.clone())))
+        .route(
+            "/openapi.json",
+            get(move |headers: HeaderMap| docs::served(document.clone(), headers)),
+        )
+        .route("/docs/problems", get(docs::problems))
+        .merge(version)
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))

@@ -6,8 +6,8 @@ use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
 use crate::http::resources::saturation::Saturation;
-use crate::sessions::{
-    Admission, ByteBudget, Clock, IdempotencyStore, Lane, Lease, OpenStreams, Registry,
+use bagtrack_sessions::{
+    Admission, ByteBudget, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
     ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
 use std::io;
@@ -101,8 +101,8 @@ impl AppState {
     }
 
     /// In whose turn the work of a client is done.
-    pub fn flow(&self, client: &Client) -> Lane {
-        self.clients.account(client).lane()
+    pub fn flow(&self, client: &Client) -> Flow {
+        self.clients.account(client).flow()
     }
 
     /// When the session expires, in RFC 3339.

@@ -17,7 +17,7 @@ fn listed(command: &str) -> Vec<Vec<String>> {
 #[test]
 fn the_long_help_has_a_line_for_each_parameter() {
     let robust = serde_json::to_value(Preset::Robust.params()).unwrap();
-    for command in ["track", "eval"] {
+    for command in ["track"] {
         let lines = listed(command);
         assert_eq!(lines.len(), Params::TABLE.len(), "{command}: {lines:?}");
         for (line, row) in lines.iter().zip(Params::TABLE) {
@@ -55,7 +55,7 @@ fn the_list_says_what_the_default_preset_has() {
 
 #[test]
 fn the_short_help_stays_short_and_points_to_the_long_one() {
-    for command in ["track", "eval"] {
+    for command in ["track"] {
         let help = succeeds(&[command, "-h"]);
         assert!(help.contains("`--help` lists the parameters"), "{help}");
         for row in Params::TABLE.iter().filter(|row| row.name.contains('_')) {
@@ -68,7 +68,7 @@ fn the_short_help_stays_short_and_points_to_the_long_one() {
 fn the_help_of_the_program_fits_a_screen_and_names_the_commands() {
     let help = succeeds(&["--help"]);
     assert!(help.lines().count() <= 24, "{help}");
-    for command in ["serve", "track", "eval", "sample", "health"] {
+    for command in ["serve", "track", "eval", "sample", "health", "completions"] {
         let named = help
             .lines()
             .any(|line| line.trim_start().starts_with(command));
@@ -77,4 +77,56 @@ fn the_help_of_the_program_fits_a_screen_and_names_the_commands() {
     assert!(help.contains("bagtrack serve --help"), "{help}");
     // The settings are where it says, and hold without the command, too.
     assert!(succeeds(&["serve", "--help"]).contains("--session-idle"));
+}
+
+#[test]
+fn each_setting_of_the_service_is_below_a_heading() {
+    let help = succeeds(&["serve", "-h"]);
+    let mut heading = "";
+    let mut flags = std::collections::BTreeMap::<&str, Vec<&str>>::new();
+    for line in help.lines() {
+        let is_heading = !line.starts_with(' ') && line.ends_with(':');
+        if is_heading {
+            heading = line.trim_end_matches(':');
+        } else if let Some(flag) = line.split_whitespace().find(|word| word.starts_with("--")) {
+            flags.entry(heading).or_default().push(flag);
+        }
+    }
+    // A new setting belongs into src/cli/headings.rs.
+    assert_eq!(flags["Options"], ["--help"], "without a heading: {help}");
+    assert!(flags["Listening"].contains(&"--listen"), "{help}");
+    assert!(flags["Store"].contains(&"--store-prefix"), "{help}");
+    assert!(
+        flags["Access and keys"].contains(&"--api-keys-file"),
+        "{help}"
+    );
+    assert!(flags["Logging"].contains(&"--log-format"), "{help}");
+    let count: usize = flags.values().map(Vec::len).sum();
+    assert!(count > 45 && flags.len() >= 10, "{flags:?}");
+    let longest = flags.values().map(Vec::len).max();
+    assert!(longest <= Some(12), "{flags:?}");
+}
+
+#[test]
+fn shells_get_scripts_that_complete_commands_and_flags() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = succeeds(&["completions", shell]);
+        for word in ["track", "completions", "draw", "start", "session-idle"] {
+            assert!(script.contains(word), "{shell}: no {word}");
+        }
+    }
+    // A real bash completes with it.
+    let script = "source <(\"$0\" completions bash); COMP_WORDS=(bagtrack track --dr); COMP_CWORD=2; \
+                  _bagtrack bagtrack --dr track; echo \"${COMPREPLY[@]}\"";
+    let mut bash = std::process::Command::new("bash");
+    bash.args(["-c", script, env!("CARGO_BIN_EXE_bagtrack")]);
+    let Ok(output) = bash.output() else {
+        eprintln!("left out: there is no bash");
+        return;
+    };
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout).trim(),
+        "--draw",
+        "{output:?}"
+    );
 }

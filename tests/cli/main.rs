@@ -3,6 +3,9 @@
 mod help;
 mod readme_session;
 mod sample_track;
+mod serve;
+mod track_formats;
+mod track_signals;
 mod track_video;
 
 use bagtrack_testing::command;

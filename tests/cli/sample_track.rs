@@ -1,6 +1,6 @@
 //! `bagtrack sample` and `bagtrack track`, as a person types them.
 
-use crate::command::{bagtrack, clip, fails, folder, succeeds, text};
+use crate::command::{bagtrack, boxes, clip, fails, folder, rows, succeeds, text};
 use bagtrack_tracker::Rect;
 use serde_json::Value;
 use std::fs;
@@ -99,36 +99,27 @@ fn sample_says_which_setting_is_wrong() {
     assert!(!out.exists());
 }
 
-fn boxes(lines: &str) -> Vec<[f64; 4]> {
-    lines
-        .lines()
-        .map(|line| {
-            let numbers: Vec<f64> = line
-                .split(',')
-                .map(|n| n.parse().expect("a number"))
-                .collect();
-            numbers.try_into().expect("four numbers a line")
-        })
-        .collect()
-}
-
 #[test]
 fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);
     let lines = succeeds(&[
         "track",
+        "--format",
+        "csv",
         text(&dir),
         "--box",
         "44.1,101.4,46.1,57.6",
         "--seed",
         "3",
     ]);
-    let found = boxes(&lines);
+    let found = rows(&lines);
     assert_eq!(found.len(), 12);
-    assert_eq!(found[0], [44.1, 101.4, 46.1, 57.6]);
+    assert_eq!(found[0].area, [44.1, 101.4, 46.1, 57.6]);
     let again = succeeds(&[
         "track",
+        "--format",
+        "csv",
         text(&dir),
         "--box",
         "44.1,101.4,46.1,57.6",
@@ -138,6 +129,8 @@ fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
     assert_eq!(lines, again, "the same seed gives the same boxes");
     let other = succeeds(&[
         "track",
+        "--format",
+        "csv",
         text(&dir),
         "--box",
         "44.1,101.4,46.1,57.6",
@@ -147,6 +140,8 @@ fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
     assert_ne!(lines, other);
     let pictures = succeeds(&[
         "track",
+        "--format",
+        "csv",
         text(&dir.join("img")),
         "--box",
         "44.1,101.4,46.1,57.6",
@@ -165,7 +160,8 @@ fn track_takes_the_first_annotated_box_and_counts_from_zero() {
     let dir = clip(parent.path(), "clip", &[]);
     let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it was written");
     let [x, y, width, height] = boxes(&truth)[0];
-    let tracked = boxes(&succeeds(&["track", text(&dir)]));
+    let tracked = rows(&succeeds(&["track", text(&dir), "--format", "csv"]));
+    let tracked: Vec<[f64; 4]> = tracked.iter().map(|row| row.area).collect();
     for (found, expected) in tracked[0]
         .into_iter()
         .zip([x - 1.0, y - 1.0, width, height])
@@ -190,6 +186,8 @@ fn track_gives_json_lines() {
         let value: Value = serde_json::from_str(line).expect("each line is JSON");
         assert_eq!(value["frame"], index);
         assert_eq!(value["file"], format!("{:04}.jpg", index + 1));
+        assert_eq!(value["target"], 0);
+        assert!(value.get("time").is_none(), "{line}");
         for field in ["x", "y", "width", "height"] {
             assert!(value["box"][field].is_f64(), "{line}");
         }
@@ -271,6 +269,17 @@ fn track_says_in_one_line_what_is_wrong() {
     let line = fails(&["track", text(&dir)]);
     assert!(
         line.contains("0005.jpg") && line.contains("cut short"),
+        "{line}"
+    );
+    let larger = clip(
+        parent.path(),
+        "larger",
+        &["--width", "400", "--height", "300"],
+    );
+    fs::copy(larger.join("img/0005.jpg"), dir.join("img/0005.jpg")).expect("both are there");
+    let line = fails(&["track", text(&dir)]);
+    assert!(
+        line.contains("0005.jpg: the frame is 400 x 300, the frames before it are 320 x 240"),
         "{line}"
     );
 }

@@ -1,53 +1,21 @@
 //! `bagtrack track` on a video, and videos that it draws. They need ffmpeg, and say so where there is none.
 
-use crate::command::{clip, fails, folder, succeeds, text};
+use crate::command::{
+    about, bagtrack, boxes, clip, fails, folder, has_ffmpeg, rows, succeeds, text, video_of,
+};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn has_ffmpeg() -> bool {
-    let found = Command::new("ffmpeg").arg("-version").output().is_ok();
-    if !found {
-        eprintln!("left out: there is no ffmpeg");
-    }
-    found
-}
-
-/// A video of a clip's frames, at 30 frames a second.
-fn video_of(clip: &Path, video: &Path) {
-    let frames = clip.join("img/%04d.jpg");
-    let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-framerate", "30", "-i", text(&frames)]);
-    let made = command.args(["-b:v", "4M", text(video)]).status();
-    assert!(made.expect("ffmpeg starts").success());
-}
-
-fn boxes(output: &str) -> Vec<Vec<f64>> {
-    let numbers = |line: &str| {
-        line.split(',')
-            .map(|n| n.parse().expect("a number"))
-            .collect()
-    };
-    output.lines().map(numbers).collect()
-}
-
-/// What ffprobe says of a video's frames: their size and rate, and how many there are.
-fn about(video: &Path) -> String {
-    let mut command = Command::new("ffprobe");
-    command.args([
-        "-v",
-        "error",
-        "-count_frames",
-        "-of",
-        "csv=p=0",
-        "-show_entries",
-    ]);
-    command.arg("stream=width,height,avg_frame_rate,nb_read_frames");
-    let output = command.arg(video).output().expect("ffprobe starts");
-    String::from_utf8(output.stdout)
-        .expect("text")
-        .trim()
-        .to_owned()
+/// A small clip, and the flag for its first box.
+fn small_clip(parent: &Path, name: &str, [width, height]: [&str; 2]) -> (PathBuf, String) {
+    let dir = clip(parent, name, &["--width", width, "--height", height]);
+    let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it is there");
+    let [x, y, width, height] = boxes(&truth)[0];
+    (
+        dir,
+        format!("--box={},{},{width},{height}", x - 1.0, y - 1.0),
+    )
 }
 
 #[test]
@@ -56,53 +24,360 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
         return;
     }
     let parent = folder();
-    let dir = clip(
-        parent.path(),
-        "clip",
-        &["--width", "161", "--height", "121"],
-    );
-    let padded = parent.path().join("even");
-    let dir_even = clip(
-        parent.path(),
-        "even_clip",
-        &["--width", "160", "--height", "120"],
-    );
-    let video = padded.with_extension("mp4");
-    video_of(&dir_even, &video);
-    let truth = fs::read_to_string(dir_even.join("groundtruth_rect.txt")).expect("it is there");
-    let first: Vec<f64> = boxes(truth.lines().next().expect("a line")).remove(0);
-    let target = format!(
-        "{},{},{},{}",
-        first[0] - 1.0,
-        first[1] - 1.0,
-        first[2],
-        first[3]
-    );
+    let (dir, target) = small_clip(parent.path(), "even", ["160", "120"]);
+    let video = parent.path().join("even.mp4");
+    video_of(&dir, &video, 1);
     let drawn = parent.path().join("drawn.mp4");
-    let flags = ["--box", &target, "--seed", "7"];
-    let of_folder = succeeds(&[&["track", text(&dir_even)], &flags[..]].concat());
+    let flags = ["--format", "csv", &target, "--seed", "7"];
+    let of_folder = succeeds(&[&["track", text(&dir)], &flags[..]].concat());
     let draw = ["--draw", text(&drawn)];
     let of_video = succeeds(&[&["track", text(&video)], &flags[..], &draw].concat());
-    let (a, b) = (boxes(&of_folder), boxes(&of_video));
+    let (a, b) = (rows(&of_folder), rows(&of_video));
     assert_eq!((a.len(), b.len()), (12, 12));
-    for (a, b) in a.iter().zip(&b) {
+    for (index, (a, b)) in a.iter().zip(&b).enumerate() {
         // The same frames but for what the codec lost.
-        assert!(
-            (a[0] - b[0]).abs() < 3.0 && (a[1] - b[1]).abs() < 3.0,
-            "{a:?} {b:?}"
-        );
+        let near = |side: usize| (a.area[side] - b.area[side]).abs() < 3.0;
+        assert!(near(0) && near(1), "{a:?} {b:?}");
+        assert_eq!((a.frame, a.time), (index as u64, None));
+        let time = b.time.expect("frames of a video have times");
+        assert!((time - index as f64 / 30.0).abs() < 1e-3, "{b:?}");
     }
     assert_eq!(about(&drawn), "160,120,30/1,12");
     let line = fails(&[&["track", text(&video)], &flags[..], &draw].concat());
-    assert!(line.contains("drawn.mp4 is there"), "{line}");
-    // Pictures of a video have numbers; odd sides are made even in a video.
+    assert!(line.contains("drawn.mp4: it is there"), "{line}");
+    // Pictures of a video have numbers.
     let pictures = parent.path().join("pictures");
     let draw = ["--draw", text(&pictures)];
     succeeds(&[&["track", text(&video)], &flags[..], &draw].concat());
     assert!(pictures.join("000011.jpg").is_file());
-    let odd = parent.path().join("odd.mp4");
-    succeeds(&["track", text(&dir), "--box", &target, "--draw", text(&odd)]);
-    assert_eq!(about(&odd), "162,122,25/1,12");
+}
+
+#[test]
+fn each_ending_that_is_offered_becomes_a_video_of_this_kind() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    // Odd sides are made even where the encoder wants that.
+    let (dir, target) = small_clip(parent.path(), "odd", ["161", "121"]);
+    for (ending, kind, size) in [
+        ("mp4", "mp4", "162,122"),
+        ("m4v", "mp4", "162,122"),
+        ("mov", "mov", "162,122"),
+        ("mkv", "matroska", "162,122"),
+        ("webm", "webm", "162,122"),
+        ("avi", "avi", "162,122"),
+        ("gif", "gif", "161,121"),
+    ] {
+        let video = parent.path().join(format!("drawn.{ending}"));
+        let printed = succeeds(&["track", text(&dir), &target, "--draw", text(&video)]);
+        assert_eq!(printed.lines().count(), 13, "{ending}: {printed}");
+        assert_eq!(about(&video), format!("{size},25/1,12"), "{ending}");
+        let mut command = Command::new("ffprobe");
+        command.args([
+            "-v",
+            "error",
+            "-show_entries",
+            "format=format_name",
+            "-of",
+            "csv=p=0",
+        ]);
+        let format = command.arg(&video).output().expect("ffprobe starts").stdout;
+        let format = String::from_utf8(format).expect("text");
+        assert!(format.contains(kind), "{ending}: {format}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_told_before_the_first_row_and_leaves_nothing() {
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let there = parent.path().join("there.mp4");
+    fs::write(&there, "mine").expect("the folder is writable");
+    for (name, said) in [
+        (
+            "out.xyz",
+            "it can write a video (.mp4, .m4v, .mov, .mkv, .webm, .avi, .gif), or a folder",
+        ),
+        ("out.jpg", "or a folder of JPEG files, as"),
+        ("nowhere/out.mp4", "there is no folder"),
+        ("there.mp4", "it is there"),
+    ] {
+        let out = parent.path().join(name);
+        let output = bagtrack(&["track", text(&dir), &target, "--draw", text(&out)]);
+        let errors = String::from_utf8(output.stderr).expect("text");
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        assert!(output.stdout.is_empty(), "{name}: rows before {errors}");
+        assert!(errors.contains(said), "{name}: {errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+    assert_eq!(fs::read(&there).expect("it is there"), b"mine");
+    let left = fs::read_dir(parent.path()).expect("it is there").count();
+    assert_eq!(left, 2, "the clip and the file that was there");
+}
+
+#[test]
+fn a_name_with_a_slash_at_its_end_is_a_folder_whatever_its_ending() {
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let out = parent.path().join("out.avi");
+    let slash = format!("{}/", text(&out));
+    succeeds(&["track", text(&dir), &target, "--draw", &slash]);
+    assert_eq!(fs::read_dir(&out).expect("a folder").count(), 12);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
+    use std::os::unix::fs::PermissionsExt;
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let programs = parent.path().join("programs");
+    fs::create_dir(&programs).expect("the folder is writable");
+    let program = programs.join("ffmpeg");
+    // The real one, which is told to take an encoder that it does not have.
+    let path = std::env::var("PATH").expect("it is set");
+    let encode = "-f mjpeg -i pipe:0 -c:v nothing";
+    let script = format!(
+        "#!/bin/sh\nPATH='{path}'\nfor last; do :; done\nexec ffmpeg -v error {encode} \"$last\"\n"
+    );
+    fs::write(&program, script).expect("the folder is writable");
+    let executable = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(&program, executable).expect("it is ours");
+    let out = parent.path().join("out.webm");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    command.args(["track", text(&dir), &target, "--draw", text(&out)]);
+    let output = command.env("PATH", &programs).output().expect("it starts");
+    let errors = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(output.stdout.is_empty(), "rows before {errors}");
+    let told =
+        errors.contains("out.webm: this ffmpeg cannot write it") && errors.contains("nothing");
+    assert!(told, "{errors}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    let (dir, _) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it is there");
+    let [x, y, width, height] = boxes(&truth)[9];
+    let target = format!("--box={},{},{width},{height}", x - 1.0, y - 1.0);
+    // The last three frames alone.
+    let rest = parent.path().join("rest");
+    fs::create_dir(&rest).expect("the folder is writable");
+    for index in 10..=12 {
+        let name = format!("{index:04}.jpg");
+        fs::copy(dir.join("img").join(&name), rest.join(&name)).expect("it is there");
+    }
+    let flags = ["--format", "csv", "--start", "9"];
+    let alone = rows(&succeeds(&[
+        "track",
+        text(&rest),
+        &target,
+        "--format",
+        "csv",
+    ]));
+    let found = rows(&succeeds(
+        &[&["track", text(&dir), &target], &flags[..]].concat(),
+    ));
+    let areas = |rows: &[crate::command::Row]| rows.iter().map(|row| row.area).collect::<Vec<_>>();
+    assert_eq!(areas(&found), areas(&alone));
+    assert_eq!(
+        found.iter().map(|row| row.frame).collect::<Vec<_>>(),
+        [9, 10, 11]
+    );
+    // Without --box the annotation of that frame counts.
+    let annotated = rows(&succeeds(&[&["track", text(&dir)], &flags[..]].concat()));
+    for (found, expected) in annotated[0]
+        .area
+        .into_iter()
+        .zip([x - 1.0, y - 1.0, width, height])
+    {
+        assert!((found - expected).abs() < 1e-3, "{annotated:?}");
+    }
+    // Frame 9 is shown at 0.3 s: it is the first one that is not before 0.28 s.
+    let video = parent.path().join("clip.mkv");
+    video_of(&dir, &video, 1);
+    let of_video = ["track", text(&video), &target, "--format", "csv", "--start"];
+    let by_frame = succeeds(&[&of_video[..], &["9"]].concat());
+    for time in ["0.28s", "0.3s", "0:00.3", "0:00:00.3"] {
+        assert_eq!(
+            succeeds(&[&of_video[..], &[time]].concat()),
+            by_frame,
+            "{time}"
+        );
+    }
+    let by_frame = rows(&by_frame);
+    assert_eq!(by_frame.len(), 3);
+    assert_eq!((by_frame[0].frame, by_frame[0].time), (9, Some(0.3)));
+    for (video, alone) in by_frame.iter().zip(&alone) {
+        assert!(
+            (video.area[0] - alone.area[0]).abs() < 2.0,
+            "{video:?} {alone:?}"
+        );
+    }
+    for (path, start, said) in [
+        (&video, "12", "has 12 frames"),
+        (&video, "1:00", "has 12 frames"),
+        (&dir, "12", "has 12 frames"),
+        (&dir, "1s", "frames of a folder have no times"),
+    ] {
+        let line = fails(&["track", text(path), &target, "--start", start]);
+        assert!(line.contains(said), "{start}: {line}");
+    }
+}
+
+/// Frame n of these videos is of the gray 20 + 4 n. Files with an index are entered in the middle.
+#[test]
+fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    for (name, coded) in [
+        // With B-frames, and few frames that stand for themselves.
+        ("b.mp4", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        ("b.mkv", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        (
+            "late.mov",
+            ["-c:v", "mpeg4", "-output_ts_offset", "3", "-g", "20"],
+        ),
+        (
+            "golden.webm",
+            ["-c:v", "libvpx-vp9", "-cpu-used", "8", "-g", "20"],
+        ),
+        ("stream.ts", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        ("old.avi", ["-c:v", "mpeg4", "-bf", "2", "-g", "20"]),
+    ] {
+        let video = parent.path().join(name);
+        let mut command = Command::new("ffmpeg");
+        command.args(["-v", "error", "-f", "lavfi", "-i"]);
+        let gray = "lum='20+4*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
+        command.arg(format!("color=size=96x64:rate=30:duration=1.5,geq={gray}"));
+        command.args(coded).args(["-b:v", "2M", text(&video)]);
+        assert!(command.status().expect("ffmpeg starts").success(), "{name}");
+        for start in [0, 1, 19, 20, 21, 33, 44] {
+            let pictures = parent.path().join(format!("{name}-{start}"));
+            let start_at = start.to_string();
+            let flags = ["--box=30,20,24,24", "--start", &start_at, "--format", "csv"];
+            let out = format!("{}/", text(&pictures));
+            let printed = [&["track", text(&video)], &flags[..], &["--draw", &out]].concat();
+            let found = rows(&succeeds(&printed));
+            let numbers: Vec<u64> = found.iter().map(|row| row.frame).collect();
+            assert_eq!(
+                numbers,
+                (start..45).collect::<Vec<u64>>(),
+                "{name} from {start}"
+            );
+            let picture = image::open(pictures.join(format!("{start:06}.jpg")));
+            let picture = picture.expect("it was drawn").into_luma8();
+            // A square of the ground, away from the box.
+            let area = image::imageops::crop_imm(&picture, 66, 58, 4, 4).to_image();
+            let sum: f64 = area.pixels().map(|pixel| f64::from(pixel.0[0])).sum();
+            let mean = sum / 16.0;
+            let dark = if (66 / 8 + 58 / 8) % 2 == 0 {
+                0.0
+            } else {
+                25.0
+            };
+            // Luma is stored from 16 to 235.
+            let expected = (20.0 + dark + 4.0 * start as f64 - 16.0) * 255.0 / 219.0;
+            assert!(
+                (mean - expected).abs() < 2.3,
+                "{name} from {start}: {mean}, not {expected}"
+            );
+        }
+    }
+}
+
+/// A browser's recording of a screen is like this: frames come when something changes.
+#[test]
+fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let video = parent.path().join("bursts.mkv");
+    let mut command = Command::new("ffmpeg");
+    let frames = dir.join("img/%04d.jpg");
+    command.args(["-v", "error", "-framerate", "30", "-i", text(&frames)]);
+    let bursts = "settb=1/1000,setpts=if(lt(N\\,6)\\,N*5\\,N*60)";
+    command.args(["-vf", bursts, "-vsync", "passthrough"]);
+    command.args(["-enc_time_base", "1:1000", text(&video)]);
+    assert!(command.status().expect("ffmpeg starts").success());
+    let flags = ["track", text(&video), &target, "--format", "csv"];
+    let times = |printed: &str| {
+        let rows = rows(printed).into_iter();
+        rows.map(|row| (row.frame, row.time.expect("a time")))
+            .collect::<Vec<_>>()
+    };
+    let expected: Vec<(u64, f64)> = (0..12)
+        .map(|frame| {
+            (
+                frame,
+                f64::from(frame as u32 * if frame < 6 { 5 } else { 60 }) / 1000.0,
+            )
+        })
+        .collect();
+    assert_eq!(times(&succeeds(&flags)), expected);
+    let from_four = [&flags[..], &["--start", "4"]].concat();
+    assert_eq!(times(&succeeds(&from_four)), expected[4..]);
+}
+
+/// Frames of a phone come at uneven times.
+#[test]
+fn times_are_those_of_the_video_also_where_its_rate_changes() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let video = parent.path().join("uneven.mp4");
+    let mut command = Command::new("ffmpeg");
+    command.args([
+        "-v",
+        "error",
+        "-framerate",
+        "30",
+        "-i",
+        text(&dir.join("img/%04d.jpg")),
+    ]);
+    // From frame 6 on they are 1 s later.
+    command.args([
+        "-vf",
+        "settb=1/1000,setpts=PTS+gte(N\\,6)*1000",
+        "-vsync",
+        "vfr",
+    ]);
+    assert!(
+        command
+            .arg(&video)
+            .status()
+            .expect("ffmpeg starts")
+            .success()
+    );
+    let flags = ["track", text(&video), &target, "--format", "csv"];
+    let found = rows(&succeeds(&flags));
+    assert_eq!(found.len(), 12);
+    for row in &found {
+        let late = if row.frame >= 6 { 1.0 } else { 0.0 };
+        let time = row.time.expect("frames of a video have times");
+        assert!(
+            (time - row.frame as f64 / 30.0 - late).abs() < 2e-3,
+            "{row:?}"
+        );
+    }
+    let found = rows(&succeeds(&[&flags[..], &["--start", "0.5s"]].concat()));
+    assert_eq!(found[0].frame, 6);
 }
 
 #[test]

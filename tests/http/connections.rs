@@ -46,10 +46,7 @@ pub async fn expect_body_timeouts(app: &TestApplication, id: &str) {
         connection.send(head).await;
         let answer = connection.read_answer().await;
         assert!(answer.starts_with("HTTP/1.1 408"), "{media_type}: {answer}");
-        assert!(
-            answer.contains("urn:bagtrack:problem:body-timeout"),
-            "{answer}"
-        );
+        assert!(answer.contains("/docs/problems#body-timeout"), "{answer}");
     }
 }
 

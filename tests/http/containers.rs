@@ -52,9 +52,17 @@ fn promised(settings: &[(String, String)], workers: &str) -> u64 {
     promised.expect("the start says it")
 }
 
+/// The bytes of memory over which an alert is sent.
+fn alerted(docker: &Path) -> f64 {
+    let alerts = std::fs::read_to_string(docker.join("prometheus/alerts.yaml")).unwrap();
+    let expression = "process_resident_memory_bytes{job=\"bagtrack\"} > ";
+    between(&alerts, expression, "\n").parse().unwrap()
+}
+
 #[test]
-fn what_the_program_promises_fits_into_its_container() {
+fn what_the_program_promises_fits_into_its_container_and_an_alert_comes_before_the_limit() {
     let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");
+    let alerted = alerted(&docker);
     for (file, cpus, memory, unit) in [
         ("compose.yaml", "\n    cpus: ", "\n    mem_limit: ", "g"),
         (
@@ -79,5 +87,19 @@ fn what_the_program_promises_fits_into_its_container() {
         let limit = limit.parse::<u64>().unwrap() << 10;
         let promised = promised(&settings, workers);
         assert!(promised < limit, "{file}: {promised} MiB of {limit}");
+        // More than was promised is an alert, and it comes before the container is killed.
+        let mib = alerted / f64::from(1 << 20);
+        let range = promised as f64..limit as f64;
+        assert!(range.contains(&mib), "{file}: {mib} MiB of {range:?}");
+    }
+}
+
+#[test]
+fn the_container_of_https_has_the_limits_of_the_one_without() {
+    let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");
+    let text = std::fs::read_to_string(docker.join("compose.tls.yaml")).unwrap();
+    assert!(text.contains("file: compose.yaml\n      service: bagtrack\n"));
+    for bound in ["BAGTRACK_MAX_", "mem_limit", "cpus"] {
+        assert!(!text.contains(bound), "{bound} is set again");
     }
 }

@@ -1,6 +1,6 @@
 //! Snapshots with other contents, as a client can write them that knows the format.
 
-use bagtrack::sessions::{MAC_BYTES, MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack_sessions::{MAC_BYTES, MacKeys, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
 use flate2::Compression;
 use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;

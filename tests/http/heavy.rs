@@ -13,7 +13,8 @@ use tokio::task::JoinSet;
 /// Frames of one request that take the worker some seconds.
 pub const FRAMES: usize = 200;
 
-const PARAMS: &str = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
+/// The most expensive parameters.
+pub const PARAMS: &str = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
     "update_every": 1, "history": 10, "basis_dim": 6}"#;
 
 /// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take a worker tenths of a second, in one piece.

@@ -86,7 +86,7 @@ async fn an_address_has_a_share_of_the_connections() {
         "{head}"
     );
     let problem: Value = serde_json::from_str(body).unwrap();
-    assert_eq!(problem["type"], "urn:bagtrack:problem:quota-exceeded");
+    assert_eq!(problem["type"], "/docs/problems#quota-exceeded");
     drop(busy);
     let served = async {
         loop {
@@ -174,7 +174,7 @@ async fn a_request_names_exactly_one_host() {
             answer.starts_with(&format!("HTTP/1.1 {status}")),
             "{hosts:?}: {answer}"
         );
-        let is_problem = answer.contains("urn:bagtrack:problem:malformed-request");
+        let is_problem = answer.contains("/docs/problems#malformed-request");
         assert_eq!(is_problem, status == "400", "{answer}");
     }
     let mut old = RawConnection::open(app.address).await;

@@ -79,7 +79,7 @@ async fn frames_before_a_bad_one_count_and_its_problem_is_the_last_line() {
     let mut got = lines(post(&app, &id, &[("frame", "1")], bad).await).await;
     let last = got.pop().unwrap();
     assert_eq!(got, expected[..3]);
-    assert_eq!(last["type"], "urn:bagtrack:problem:unsupported-image");
+    assert_eq!(last["type"], "/docs/problems#unsupported-image");
     assert_eq!(last["status"], 415);
     assert_eq!(last["instance"], format!("/sessions/{id}/frames"));
     assert_eq!(app.frames_of(&id).await, 4);
@@ -135,7 +135,7 @@ async fn the_processor_time_of_all_frames_together_is_bounded() {
     let request = heavy::post(&app, &session, 400).header("accept", LINES);
     let mut got = lines(request.send().await.unwrap()).await;
     let last = got.pop().unwrap();
-    assert_eq!(last["type"], "urn:bagtrack:problem:request-too-costly");
+    assert_eq!(last["type"], "/docs/problems#request-too-costly");
     assert!((1..400).contains(&got.len()), "{} lines", got.len());
 }
 
@@ -153,7 +153,7 @@ async fn the_last_frame_has_to_be_tracked_in_the_time_of_one_request() {
     let request = request.header("accept", LINES);
     let mut got = lines(request.send().await.unwrap()).await;
     let last = got.pop().unwrap();
-    assert_eq!(last["type"], "urn:bagtrack:problem:work-timeout", "{last}");
+    assert_eq!(last["type"], "/docs/problems#work-timeout", "{last}");
     // The frame at work may have ended without its line.
     let tracked = app.frames_of(&id).await - 1;
     assert!((0..=1).contains(&(tracked - got.len() as u64)), "{tracked}");

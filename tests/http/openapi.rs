@@ -1,8 +1,13 @@
 //! The OpenAPI document: committed, generated, and held to the code.
 
-use crate::application::TestApplication;
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
 use bagtrack_tracker::{Params, Preset};
+use reqwest::StatusCode;
 use serde_json::{Value, json};
+
+/// The greatest number that JSON holds exactly in every language.
+const MAX_EXACT: u64 = (1 << 53) - 1;
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi/openapi.json");
 
@@ -72,7 +77,7 @@ async fn the_schema_has_every_row_of_the_table_of_parameters() {
         assert_eq!(property["description"], row.description.trim());
         let (kind, range) = match row.kind {
             "u32" => ("integer", row.range),
-            "u64" => ("integer", Some((0.0, u64::MAX as f64))),
+            "u64" => ("integer", Some((0.0, MAX_EXACT as f64))),
             "f64" => ("number", row.range),
             "bool" => ("boolean", None),
             _ => ("string", None),
@@ -129,5 +134,156 @@ async fn opening_a_session_tells_the_limits_that_validation_has() {
             description.contains(error.expected),
             "{name}: {description}"
         );
+    }
+}
+
+/// Every object in the document, with the pointer to it.
+fn objects(value: &Value, at: String, found: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Object(object) => {
+            found.push((at.clone(), value.clone()));
+            for (name, value) in object {
+                objects(value, format!("{at}/{name}"), found);
+            }
+        }
+        Value::Array(array) => {
+            for (index, value) in array.iter().enumerate() {
+                objects(value, format!("{at}/{index}"), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Generated clients in typed languages make a 32-bit number of an integer without a format.
+#[tokio::test]
+async fn every_integer_has_a_format_and_a_maximum_that_it_can_reach() {
+    let mut found = Vec::new();
+    objects(&served().await, String::new(), &mut found);
+    let is_integer = |schema: &Value| {
+        let kind = &schema["type"];
+        let kinds = kind.as_array().cloned().unwrap_or(vec![kind.clone()]);
+        kinds.contains(&json!("integer"))
+    };
+    let mut integers = 0;
+    for (at, schema) in found.iter().filter(|(_, schema)| is_integer(schema)) {
+        integers += 1;
+        let max = match schema["format"].as_str() {
+            Some("int32") => i32::MAX as u64,
+            Some("int64") => MAX_EXACT,
+            other => panic!("{at}: {other:?}"),
+        };
+        match schema["maximum"].as_u64() {
+            Some(maximum) => assert!(maximum <= max, "{at}: {schema}"),
+            None => {
+                let is_setting =
+                    at.contains("/parameters/") || at.contains("Json/") || at.contains("Form/");
+                assert!(!is_setting && schema["format"] == "int32", "{at}: {schema}");
+            }
+        }
+        let name = at.trim_end_matches("/schema");
+        if name.ends_with("/properties/target") {
+            assert_eq!(schema["maximum"], 15, "{at}");
+        }
+        if name.ends_with("/properties/seed") || name.ends_with("/properties/frame") {
+            assert_eq!(schema["maximum"], MAX_EXACT, "{at}");
+        }
+    }
+    assert!(integers > 30, "{integers}");
+}
+
+#[tokio::test]
+async fn the_greatest_seed_is_taken_and_sent_back_and_one_more_refused() {
+    let app = TestApplication::start().await;
+    let open = async |query: &[(&str, &str)]| {
+        let query = [&[("box", BOX), ("verbose", "true")], query].concat();
+        app.create(pictures::png(0), &query).await
+    };
+    let max = MAX_EXACT.to_string();
+    let parameters = format!("{{\"seed\": {max}}}");
+    for query in [[("seed", &*max)], [("parameters", &*parameters)]] {
+        let created = expect(open(&query).await, StatusCode::CREATED).await;
+        assert_eq!(created["parameters"]["seed"], MAX_EXACT);
+    }
+    let more = (MAX_EXACT + 1).to_string();
+    expect_problem(open(&[("seed", &more)]).await, "malformed-request").await;
+    let parameters = format!("{{\"seed\": {more}}}");
+    let refused = open(&[("parameters", &parameters)]).await;
+    expect_problem(refused, "invalid-parameter").await;
+}
+
+#[tokio::test]
+async fn a_body_has_one_raw_form_beside_the_form_and_json_and_errors_share_an_answer() {
+    let document = served().await;
+    let mut bodies = 0;
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for (method, operation) in methods.as_object().unwrap() {
+            let name = format!("{method} {path}");
+            let statuses = operation["responses"].as_object().unwrap().keys();
+            let errors: Vec<&String> = statuses.filter(|status| status.as_str() > "3").collect();
+            let shared = ["4XX", "5XX"];
+            assert!(
+                errors
+                    .iter()
+                    .all(|status| shared.contains(&status.as_str())),
+                "{name}: {errors:?}"
+            );
+            let Some(content) = operation["requestBody"]["content"].as_object() else {
+                continue;
+            };
+            bodies += 1;
+            for media_type in content.keys() {
+                let known = [
+                    "application/octet-stream",
+                    "application/vnd.bagtrack.snapshot",
+                    "multipart/form-data",
+                    "application/json",
+                ];
+                assert!(known.contains(&media_type.as_str()), "{name}: {media_type}");
+            }
+        }
+    }
+    assert!(bodies >= 5);
+}
+
+/// Swagger UI offers a file for a parameter with a content type, and nobody can type into that.
+#[tokio::test]
+async fn the_parameters_of_the_tracker_can_be_typed_in_a_query() {
+    let document = served().await;
+    let parameters = &document["paths"]["/sessions"]["post"]["parameters"];
+    let parameters = parameters.as_array().unwrap().iter();
+    let mut named = parameters.filter(|parameter| parameter["name"] == "parameters");
+    let schema = &named.next().unwrap()["schema"];
+    assert_eq!(schema["type"], "string");
+    assert!(
+        schema.get("contentMediaType").is_none() && schema["format"] != "binary",
+        "{schema}"
+    );
+}
+
+#[test]
+fn calls_stand_in_the_order_in_which_they_are_used() {
+    let text = bagtrack::http::openapi_document();
+    let text: String = text.split_whitespace().collect();
+    // Links name operations, too, and have no summary.
+    let call = |name: &str| format!("\"operationId\":\"{name}\",\"summary\"");
+    let at = |name: &str| text.find(&call(name)).expect(name);
+    let order = [
+        "createSession",
+        "putSession",
+        "getSession",
+        "deleteSession",
+        "postFrames",
+        "putTarget",
+        "openStream",
+        "getSnapshot",
+        "getBagPicture",
+        "createToken",
+        "track",
+        "getVersion",
+        "getHealth",
+    ];
+    for pair in order.windows(2) {
+        assert!(at(pair[0]) < at(pair[1]), "{pair:?}");
     }
 }

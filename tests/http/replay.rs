@@ -46,7 +46,7 @@ async fn a_frame_sent_again_gets_the_stored_answer() {
         ),
         (Some(409), Some(2))
     );
-    for number in [0, 3, u64::MAX] {
+    for number in [0, 3, (1 << 53) - 1] {
         let response = app.post_numbered(&id, number, pictures::png(1)).await;
         let problem = expect_problem(response, "frame-out-of-order").await;
         assert_eq!(

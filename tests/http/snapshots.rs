@@ -3,7 +3,7 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::{forged, pictures};
 use bagtrack::http::Secret;
-use bagtrack::sessions::{Fingerprint, SNAPSHOT_MAGIC};
+use bagtrack_sessions::{Fingerprint, SNAPSHOT_MAGIC};
 use bagtrack_tracker::{Estimate, Rect};
 use flate2::Compression;
 use flate2::write::DeflateEncoder;

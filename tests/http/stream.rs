@@ -24,7 +24,7 @@ async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
 fn problem_slug(message: &Value) -> &str {
     let kind = message["type"].as_str();
     let kind = kind.unwrap_or_else(|| panic!("{message} is no problem"));
-    kind.strip_prefix("urn:bagtrack:problem:").unwrap()
+    kind.strip_prefix("/docs/problems#").unwrap()
 }
 
 #[tokio::test]

@@ -30,7 +30,7 @@ async fn idle_streams_take_no_memory_of_uploads() {
     for (stream, id) in &mut streams {
         stream.send(vec![0; 99_999]).await;
         let answer = stream.message().await;
-        assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+        assert_eq!(answer["type"], "/docs/problems#unsupported-image");
         assert_eq!(app.frames_of(id).await, 1);
     }
     let id = app.open().await;
@@ -60,7 +60,7 @@ async fn a_part_of_a_message_is_charged_until_its_stream_ends() {
     // The rest of the message comes, and is answered.
     stream.send_raw(&[0; 1000]).await;
     let answer = stream.message().await;
-    assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+    assert_eq!(answer["type"], "/docs/problems#unsupported-image");
     expect(post().await, StatusCode::OK).await;
 }
 
@@ -79,7 +79,7 @@ async fn a_message_waits_until_there_is_memory_for_it() {
     second.send(vec![0; 90_000]).await;
     drop(first);
     let answer = second.message().await;
-    assert_eq!(answer["type"], "urn:bagtrack:problem:unsupported-image");
+    assert_eq!(answer["type"], "/docs/problems#unsupported-image");
 }
 
 #[tokio::test]
@@ -97,7 +97,7 @@ async fn a_message_that_does_not_end_ends_its_stream() {
     stream.send_raw(&HEAD).await;
     stream.send_raw(&[0; 10]).await;
     let problem = stream.message().await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:body-timeout");
+    assert_eq!(problem["type"], "/docs/problems#body-timeout");
     assert!(matches!(stream.receive().await, Received::Closed(4408)));
 }
 

@@ -86,7 +86,7 @@ async fn a_stream_answers_for_all_targets_and_corrects_one() {
         stream.say(said).await;
         stream.send(pictures::png(4)).await;
         let refused = stream.message().await;
-        assert_eq!(refused["type"], "urn:bagtrack:problem:malformed-request");
+        assert_eq!(refused["type"], "/docs/problems#malformed-request");
     }
     stream
         .say(r#"{"box": [42, 31, 18, 14], "target": 1}"#)

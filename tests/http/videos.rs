@@ -10,9 +10,9 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-const FRAMES: u32 = 12;
+pub const FRAMES: u32 = 12;
 
-fn has_ffmpeg() -> bool {
+pub fn has_ffmpeg() -> bool {
     let found = Command::new("ffmpeg").arg("-version").output().is_ok();
     if !found {
         eprintln!("left out: there is no ffmpeg");
@@ -21,7 +21,7 @@ fn has_ffmpeg() -> bool {
 }
 
 /// The drawn frames 1 to [`FRAMES`] as a video of this kind.
-fn video(extension: &str) -> Vec<u8> {
+pub fn video(extension: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("video").with_extension(extension);
     let mut command = Command::new("ffmpeg");
@@ -49,7 +49,7 @@ fn video(extension: &str) -> Vec<u8> {
     std::fs::read(file).unwrap()
 }
 
-fn motion_jpeg() -> Vec<u8> {
+pub fn motion_jpeg() -> Vec<u8> {
     let frames = (1..=FRAMES).map(|t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg));
     frames.flatten().collect()
 }
@@ -142,7 +142,7 @@ async fn what_is_wrong_with_a_video_is_told() {
     let whole = video("mp4");
     let mut got = lines(post(&app, &id, "video/mp4", whole.clone()).await).await;
     let last = got.pop().unwrap();
-    assert_eq!(last["type"], "urn:bagtrack:problem:too-many-frames");
+    assert_eq!(last["type"], "/docs/problems#too-many-frames");
     assert_eq!(got.len(), 5);
     assert_eq!(app.frames_of(&id).await, 6);
     // The index is missing.

@@ -1,16 +1,14 @@
 """The page in a real browser: Debian's Chromium, driven by Playwright.
 
-    python3 tests/page/check.py target/debug/bagtrack [--shots FOLDER] [--only NAME]
+    python3 tests/page/check.py target/debug/bagtrack [--shots FOLDER] [--only NAME...]
 
 Needs the packages playwright and axe-playwright-python from PyPI, and chromium.
 """
 
 import argparse
 import contextlib
-import csv
 import functools
 import http.server
-import io
 import json
 import pathlib
 import re
@@ -19,146 +17,16 @@ import threading
 import time
 import urllib.parse
 
-import axe_playwright_python
+import files
+from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
+from clips import Clips
 from playwright.sync_api import sync_playwright
 from service import Line, Service
 
-AXE = next(pathlib.Path(axe_playwright_python.__file__).parent.rglob("axe.min.js")).read_text()
 MAX_BYTES = 150_000
 MAX_SECONDS_TO_PICTURE = 1.0
-FRAMES_A_SECOND = 25
-TO_THE_END = 60_000
-DRAW = "Draw a box around what to follow"
-WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
 EXAMPLES = WEB.parent / "clients" / "js" / "examples"
-
-
-class Checks:
-    """One browser and one service, and what all pages of it must not do."""
-
-    def __init__(self, playwright, service, arguments):
-        self.playwright = playwright
-        self.service = service
-        self.program = arguments.program
-        self.shots = arguments.shots
-        self.from_disk = arguments.from_disk
-        self.faults = []
-        self.browser = self.launch()
-        self.clips = {name: service.call("GET", f"/sample/{name}/clip.json") for name in ("card", "leaves")}
-
-    def launch(self, *flags):
-        # A page that does not come from the service's address may not open its socket.
-        own = ["--no-sandbox"] + ["--disable-features=LocalNetworkAccessChecks"] * self.from_disk
-        return self.playwright.chromium.launch(executable_path="/usr/bin/chromium", args=[*own, *flags])
-
-    def page(self, url=None, browser=None, allowed=(), **options):
-        """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes."""
-        context = (browser or self.browser).new_context(**{"viewport": {"width": 1000, "height": 1100}, **options})
-        page = context.new_page()
-        url = url or self.service.url
-
-        def fault(text):
-            if not any(part in text for part in allowed):
-                self.faults.append(text)
-
-        page.on("console", lambda message: message.type == "error" and fault(f"console: {message.text}"))
-        page.on("pageerror", lambda error: fault(f"script: {error}"))
-        own = ("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:")
-        page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))
-        if self.from_disk:
-            page.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
-            page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
-        page.goto(url + "/")
-        said(page, "Nothing is uploaded")
-        return page
-
-    def shot(self, page, name):
-        if self.shots:
-            page.screenshot(path=pathlib.Path(self.shots) / f"{name}.png", full_page=True)
-
-    def no_axe_violations(self, page, where):
-        page.evaluate(AXE)
-        found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-        told = [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in found]
-        assert not told, f"{where}: {told}"
-
-
-def on_disk(url):
-    """A file of the page, or of the client that it uses."""
-    path = url.split("/page/")[1]
-    return (WEB.parent / "clients" if path.startswith("js/") else WEB) / path
-
-
-def said(page, text):
-    """Waits until the page says this."""
-    try:
-        page.locator("#message").filter(has_text=text).wait_for(timeout=TO_THE_END)
-    except Exception:
-        print("  it says:", page.locator("#message").inner_text())
-        raise
-
-
-def choose(page, clip):
-    page.locator(f"#{clip}").click()
-    said(page, DRAW)
-
-
-def corners(page, box):
-    """The corners of a box of the picture, in pixels of the window."""
-    area = page.locator("#picture").bounding_box()
-    width = page.evaluate("document.getElementById('picture').width")
-    scale = area["width"] / width
-    x, y, w, h = box[:4]
-    return [(area["x"] + a * scale, area["y"] + b * scale) for a, b in ((x, y), (x + w, y + h))]
-
-
-def drag(page, box):
-    page.locator("#picture").scroll_into_view_if_needed()
-    (left, top), (right, bottom) = corners(page, box)
-    page.mouse.move(left, top)
-    page.mouse.down()
-    page.mouse.move((left + right) / 2, bottom)
-    page.mouse.move(right, bottom)
-    page.mouse.up()
-
-
-def frames(page, count):
-    """Waits until the page has shown so many. Its policy forbids to evaluate texts in it."""
-    late = time.monotonic() + TO_THE_END / 1000
-    while not (shown := page.locator("#frames").inner_text()).isdigit() or int(shown) < count:
-        assert time.monotonic() < late, f"{shown} frames; it says: {page.locator('#message').inner_text()}"
-        page.wait_for_timeout(50)
-
-
-def to_the_end(page):
-    said(page, "The video has ended")
-
-
-def saved(page, button):
-    with page.expect_download() as download:
-        page.locator(button).click()
-    return pathlib.Path(download.value.path()).read_bytes()
-
-
-def rows(page):
-    return list(csv.DictReader(io.StringIO(saved(page, "#save-csv").decode())))
-
-
-def numbers(row):
-    return [float(row[name]) for name in ("x", "y", "width", "height")]
-
-
-def distance(row, truth):
-    x, y, width, height = numbers(row)
-    across = x + width / 2 - truth[0] - truth[2] / 2
-    down = y + height / 2 - truth[1] - truth[3] / 2
-    return (across**2 + down**2) ** 0.5
-
-
-def near(table, truth):
-    """How many rows are within 10 pixels of the truth."""
-    at = lambda row: truth[round(float(row["time"]) * FRAMES_A_SECOND)]
-    return sum(distance(row, at(row)) <= 10 for row in table)
+PICTURE = "document.getElementById('picture').toDataURL('image/png')"
 
 
 def opened(page, start):
@@ -218,30 +86,7 @@ def sample_by_mouse(checks):
     assert count >= 100 and len(table) == 150
     same_as_the_api(checks, table, "card", box, seed)
     stored = json.loads(saved(page, "#save-json"))
-    assert [float(row["x"]) for row in table] == [row["x"] for row in stored]
-    page.context.close()
-
-
-def correction_and_recording(checks):
-    page = checks.page()
-    truth = checks.clips["card"]["truth"]
-    choose(page, "card")
-    page.locator("#record").check()
-    drag(page, truth[0])
-    frames(page, 20)
-    page.locator("#pause").click()
-    drag(page, [10, 10, 60, 50])
-    said(page, "The box is corrected")
-    page.locator("#pause").click()
-    frames(page, 40)
-    page.locator("#stop").click()
-    table = rows(page)
-    drawn = {"x": 10, "y": 10, "width": 60, "height": 50}
-    corrected = [row for row in table[1:] if all(float(row[side]) == value for side, value in drawn.items())]
-    assert len(corrected) == 1, corrected
-    assert [int(row["frame"]) for row in table] == list(range(len(table)))
-    video = saved(page, "#save-video")
-    assert video.startswith(b"\x1a\x45\xdf\xa3") and len(video) > 10_000, "no WebM"
+    assert [float(row["x"]) for row in table] == [row["x"] for row in stored["boxes"]]
     page.context.close()
 
 
@@ -291,16 +136,39 @@ def phone_by_touch(checks):
         touches = [{"x": x, "y": y} for x, y in points]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
+    def swipe():
+        """A finger moves up over the picture; the page follows it, and no box is drawn."""
+        before = page.evaluate("scrollY")
+        x, y = (left + right) / 2, bottom
+        finger("touchStart", (x, y))
+        for step in range(1, 12):
+            finger("touchMove", (x, y - 12 * step))
+            page.wait_for_timeout(16)
+        finger("touchEnd")
+        scrolled = page.evaluate("scrollY") - before
+        assert scrolled > 50, scrolled
+        page.evaluate("y => scrollTo(0, y)", before)
+
+    swipe()
+    said(page, "Tap Draw")
+    assert page.locator("#figures").is_hidden(), "the swipe has drawn a box"
+    page.locator("#draw").tap()
+    page.locator("#picture").scroll_into_view_if_needed()
+    (left, top), (right, bottom) = corners(page, truth[0])
     finger("touchStart", (left, top))
     finger("touchMove", ((left + right) / 2, bottom))
     finger("touchMove", (right, bottom))
     finger("touchEnd")
+    frames(page, 30)
+    (left, top), (right, bottom) = corners(page, truth[30])
+    swipe()
     frames(page, 60)
     checks.shot(page, "phone")
     width = page.evaluate("document.documentElement.scrollWidth")
     assert width <= 390, f"{width} px wide"
     to_the_end(page)
-    assert near(rows(page), truth) >= 100
+    table = rows(page)
+    assert near(table, truth) >= 100 and len(table) == 150
     page.context.close()
 
 
@@ -340,12 +208,28 @@ def camera(checks):
         page = checks.page(browser=browser)
         page.locator("#camera").click()
         said(page, DRAW)
-        drag(page, checks.clips["card"]["truth"][0])
+        shown = {page.evaluate(PICTURE)}
+        while len(shown) < 5:
+            page.wait_for_timeout(50)
+            shown.add(page.evaluate(PICTURE))
+        (left, top), (right, bottom) = corners(page, checks.clips["card"]["truth"][0])
+        page.mouse.move(left, top)
+        page.mouse.down()
+        page.wait_for_timeout(200)
+        still = page.evaluate(PICTURE)
+        page.wait_for_timeout(300)
+        assert page.evaluate(PICTURE) == still, "the picture moves while the box is drawn"
+        page.mouse.move(right, bottom, steps=4)
+        page.mouse.up()
         frames(page, 30)
         page.locator("#stop").click()
         table = rows(page)
-        assert [int(row["frame"]) for row in table] == list(range(len(table)))
-        print(f"  {len(table)} frames of the camera, {page.locator('#skipped').inner_text()} skipped")
+        skipped = int(page.locator("#skipped").inner_text())
+        numbers = [int(row["frame"]) for row in table]
+        assert numbers == sorted(set(numbers)) and numbers[-1] + 1 <= len(table) + skipped, (numbers, skipped)
+        assert float(table[-1]["time"]) > float(table[1]["time"]) > 0
+        assert table[0]["video"] == "camera"
+        print(f"  {len(table)} frames of the camera, {skipped} skipped")
 
 
 def page_of_another_origin(checks):
@@ -378,15 +262,17 @@ def camera_refused(checks):
     page.context.close()
 
 
-def ended_session(checks):
-    """The session is ended behind the page's back."""
+def session_ended_elsewhere(checks):
+    """The session is ended behind the page's back. The page goes on from its snapshot."""
     page = checks.page(allowed=("404",))
+    truth = checks.clips["card"]["truth"]
     with page.expect_response(lambda response: "?box=" in response.url) as response:
         choose(page, "card")
-        drag(page, checks.clips["card"]["truth"][0])
-    frames(page, 10)
+        box, seed = opened(page, lambda: drag(page, truth[0]))
+    frames(page, 45)
     checks.service.delete(response.value.json()["id"])
-    said(page, "The session has ended")
+    to_the_end(page)
+    same_as_the_api(checks, rows(page), "card", box, seed)
     page.context.close()
 
 
@@ -395,9 +281,12 @@ def key_needed(checks):
     page = checks.page(url=service.url, allowed=("401",))
     choose(page, "card")
     drag(page, checks.clips["card"]["truth"][0])
-    said(page, "does not know this key")
-    page.locator("#key").fill("0123456789abcdef")
-    page.keyboard.press("Enter")
+    said(page, "asks for an API key")
+    checks.shot(page, "key-light")
+    for key, says in (("not the key", "does not know this key"), ("0123456789abcdef", "Following")):
+        page.locator("#key").fill(key)
+        page.keyboard.press("Enter")
+        said(page, says)
     frames(page, 20)
     page.context.close()
     service.stop()
@@ -418,7 +307,6 @@ def busy_service(checks):
 ALL = [
     weight_and_first_picture,
     sample_by_mouse,
-    correction_and_recording,
     lost_and_found,
     broken_line,
     phone_by_touch,
@@ -426,9 +314,10 @@ ALL = [
     camera,
     page_of_another_origin,
     camera_refused,
-    ended_session,
+    session_ended_elsewhere,
     key_needed,
     busy_service,
+    *files.ALL,
 ]
 
 
@@ -436,15 +325,15 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("--shots", help="where to put pictures of the page")
-    parser.add_argument("--only", help="the name of one check")
+    parser.add_argument("--only", nargs="+", help="names of checks")
     parser.add_argument("--from-disk", action="store_true", help="takes the page from web/, not from the program")
     arguments = parser.parse_args()
     service = Service(arguments.program)
     try:
-        with sync_playwright() as playwright:
-            checks = Checks(playwright, service, arguments)
+        with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
+            checks = Checks(playwright, service, Clips(arguments.program, folder), arguments)
             for check in ALL:
-                if arguments.only in (None, check.__name__):
+                if not arguments.only or check.__name__ in arguments.only:
                     print(check.__name__, flush=True)
                     check(checks)
                     assert not checks.faults, checks.faults

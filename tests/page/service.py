@@ -6,6 +6,7 @@ import re
 import socket
 import subprocess
 import threading
+import time
 import urllib.parse
 import urllib.request
 
@@ -53,6 +54,12 @@ class Service:
     def delete(self, session):
         request = urllib.request.Request(f"{self.url}/sessions/{session}", method="DELETE")
         urllib.request.urlopen(request).close()
+
+    def wait_for_no_session(self):
+        late = time.monotonic() + 60
+        while not re.search(r"^bagtrack_sessions 0$", self.bytes("/metrics").decode(), re.MULTILINE):
+            assert time.monotonic() < late, "the session does not expire"
+            time.sleep(0.05)
 
     def stop(self):
         self.process.terminate()

@@ -209,10 +209,7 @@ async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
     for _ in 0..3 {
         let refused = session.post(&replica, 6).await;
         assert_eq!(refused.status, StatusCode::SERVICE_UNAVAILABLE);
-        assert_eq!(
-            refused.body["type"],
-            "urn:bagtrack:problem:store-unavailable"
-        );
+        assert_eq!(refused.body["type"], "/docs/problems#store-unavailable");
         assert!(refused.retry_after);
     }
     until_ready(&replica, StatusCode::SERVICE_UNAVAILABLE).await;

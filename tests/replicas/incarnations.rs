@@ -20,7 +20,7 @@ async fn a_request_to_open_a_session_is_compared_with_the_one_that_has_the_id_no
     assert_eq!(again.headers()["replayed"], "true");
     assert_eq!(json(again, StatusCode::CREATED).await, opened);
     let other = json(pair.put(0, 7).await, StatusCode::CONFLICT).await;
-    assert_eq!(other["type"], "urn:bagtrack:problem:session-exists");
+    assert_eq!(other["type"], "/docs/problems#session-exists");
     json(pair.post(0, 1).await, StatusCode::OK).await;
 }
 

@@ -7,7 +7,7 @@ use reqwest::{Response, StatusCode};
 
 async fn must_be_lost(answer: Response) {
     let problem = json(answer, StatusCode::NOT_FOUND).await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:session-not-found");
+    assert_eq!(problem["type"], "/docs/problems#session-not-found");
     let detail = problem["detail"].as_str().unwrap();
     assert!(detail.contains("POST /sessions"), "{detail}");
 }
@@ -73,6 +73,6 @@ async fn the_stream_of_a_lost_session_ends_and_says_why() {
     pair.redis.ask(&["flushall"]);
     stream.send(&pair.clip.frames[2]).await;
     let problem = stream.message().await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:session-not-found");
+    assert_eq!(problem["type"], "/docs/problems#session-not-found");
     assert_eq!(stream.receive().await, Err(4404));
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 async fn must_come_again(answer: Response) {
     assert!(answer.headers().contains_key("retry-after"));
     let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:store-unavailable");
+    assert_eq!(problem["type"], "/docs/problems#store-unavailable");
 }
 
 /// The value of a metric of the first replica; none if it has no such metric.

@@ -73,7 +73,7 @@ async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
             }
             _ => {
                 let problem = json(answer, StatusCode::CONFLICT).await;
-                assert_eq!(problem["type"], "urn:bagtrack:problem:not-in-order");
+                assert_eq!(problem["type"], "/docs/problems#not-in-order");
             }
         }
     }
@@ -152,7 +152,7 @@ async fn a_session_is_opened_once_and_ended_everywhere() {
     assert_eq!(again.headers()["checkpoint"], "0");
     assert_eq!(again.text().await.unwrap(), first);
     let other = json(pair.put(1, 8).await, StatusCode::CONFLICT).await;
-    assert_eq!(other["type"], "urn:bagtrack:problem:session-exists");
+    assert_eq!(other["type"], "/docs/problems#session-exists");
 
     let keyed = async |replica: usize| {
         let query = format!("/sessions?box={}", pair.clip.first_box);

@@ -103,7 +103,7 @@ async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_strea
     let deleted = pair.client.delete(pair.url(1, "")).send().await.unwrap();
     assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
     let problem = other.message().await;
-    assert_eq!(problem["type"], "urn:bagtrack:problem:session-not-found");
+    assert_eq!(problem["type"], "/docs/problems#session-not-found");
     assert_eq!(other.receive().await, Err(4404));
 }
 

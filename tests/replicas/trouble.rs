@@ -86,7 +86,7 @@ async fn behind_haproxy_a_store_that_is_away_is_told_by_problem_documents() {
         let media_type = answer.headers()["content-type"].to_str().unwrap();
         assert_eq!(media_type, "application/problem+json");
         let problem = json(answer, StatusCode::SERVICE_UNAVAILABLE).await;
-        problem["type"] == format!("urn:bagtrack:problem:{kind}")
+        problem["type"] == format!("/docs/problems#{kind}")
     };
     let stopped = Instant::now();
     loop {

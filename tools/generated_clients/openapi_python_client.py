@@ -44,6 +44,6 @@ with Client(base_url=url) as client:
     again = create_session.sync(client=client, body=form)
     assert flat(post_frames.sync(again.id, client=client, body=body(clip.frames[1])))[0] == 1
     refused = post_frames.sync(again.id, client=client, body=body(b"no picture"))
-    assert refused.type_ == "urn:bagtrack:problem:unsupported-image", refused
+    assert refused.type_ == "/docs/problems#unsupported-image", refused
     for ended in (session, restored, again):
         delete_session.sync_detailed(ended.id, client=client)

@@ -69,7 +69,7 @@ for (const every of ["1", "7"]) {
         answers.push(await session.track(frame));
       }
       sameAsTheLibrary(answers);
-      assert.ok(session.kept.length < Number(every), `${session.kept.length} requests are kept`);
+      assert.ok(session.kept.frames.length < Number(every), `${session.kept.frames.length} frames are kept`);
     } finally {
       await replicas.stop();
     }

@@ -135,3 +135,26 @@ test("a service that has gone ends the stream when patience ends", async () => {
   await gone.stop();
   await assert.rejects(stream.track(clip.frames[2]), (error) => error instanceof Problem && error.slug === "unreachable");
 });
+
+test("frames without an answer are sent again by the stream or the post that comes next", async () => {
+  const session = await open(service.url);
+  const stream = session.stream();
+  const on = clip.frames.slice(1, 6).map((frame) => stream.track(frame));
+  await on[0];
+  stream.close();
+  const settled = await Promise.allSettled(on);
+  assert.ok(settled.some(({ status }) => status === "rejected"));
+  const posted = await session.track(clip.frames[6]);
+  assert.deepEqual(rounded(posted), clip.answers[6]);
+
+  const line = await openLine(service.port);
+  const impatient = await new Client(line.url, { patience: 0 }).open(clip.frames[0], clip.box, { seed: SEED });
+  line.shut(true);
+  line.cut();
+  await assert.rejects(impatient.track(clip.frames[1]));
+  line.shut(false);
+  const next = impatient.stream();
+  assert.deepEqual(rounded(await next.track(clip.frames[2])), clip.answers[2]);
+  next.close();
+  line.close();
+});

@@ -15,6 +15,7 @@ export type OpenOptions = {
 };
 export declare class Client {
     transport: Transport;
+    snapshotEvery: number;
     WebSocket: {
         new (url: string | URL, protocols?: string | string[]): WebSocket;
         prototype: WebSocket;
@@ -28,11 +29,14 @@ export declare class Client {
      * @param {object} [options]
      * @param {string} [options.key] An API key or a session token, where the service has keys.
      * @param {number} [options.patience] Milliseconds in which a call that fails for a moment is made again (20,000).
+     * @param {number} [options.snapshotEvery] Frames after which a session takes a snapshot, to go on after the service has
+     *   lost it (30). At 0 it takes none, and such a session has ended.
      * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
      */
     constructor(url: string | URL, options?: {
         key?: string;
         patience?: number;
+        snapshotEvery?: number;
         WebSocket?: typeof WebSocket;
     });
     /** The key that is sent with every call. */
@@ -54,7 +58,8 @@ export declare class Client {
      */
     restore(snapshot: Frame, signal?: AbortSignal, patience?: number): Promise<Session>;
     /**
-     * A session that is open already, such as one that a page was given a token for.
+     * A session that is open already, such as one that a page was given a token for. When the service loses it, it has
+     * ended: only a session that this client has opened goes on.
      * @param {string} id
      * @returns {Promise<Session>}
      */

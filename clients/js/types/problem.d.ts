@@ -18,6 +18,8 @@ export declare class Problem extends Error {
         detail?: string;
         expected_frame?: number;
     }, retryAfter?: number);
+    /** Whether the service does not have the session any more. */
+    get isGone(): boolean;
     /** Whether the same request may succeed later. */
     get isTemporary(): boolean;
 }

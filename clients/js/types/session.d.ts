@@ -1,3 +1,5 @@
+import { Kept } from "./kept.js";
+import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
 export type Box = {
     x: number;
@@ -30,9 +32,13 @@ export type View = {
 };
 export type Frame = import("./client.js").Frame;
 export type Sent = {
-    number: number;
-    count: number;
+    frames: Frame[];
+    /**
+     * Where the user corrects it.
+     */
+    box?: Box;
     make: (number: number) => Promise<Response>;
+    signal?: AbortSignal;
 };
 /** @param {Box} box */
 export declare function boxText({ x, y, width, height }: Box): string;
@@ -41,12 +47,15 @@ export declare class Session {
     id: string;
     frame: number;
     box: Box;
+    isOwn: boolean;
+    /** The last frame that the service has, as far as is known. */
+    lastAcknowledged: number;
     /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     isDraining: boolean;
     /** When that was tried last. */
     triedToMove: number;
-    /** @type {Sent[]} What a service with a store may ask for again. */
-    kept: Sent[];
+    /** What the service may ask for again. */
+    kept: Kept;
     /** @type {Promise<unknown>} The requests before. */
     before: Promise<unknown>;
     /** @type {FrameStream | undefined} */
@@ -57,10 +66,13 @@ export declare class Session {
      * @param {number} frame The number of its last frame.
      * @param {Box} box The box of that frame.
      * @param {Headers} headers Of the answer that told so.
+     * @param {import("./kept.js").Origin} [origin] What opens it again.
+     * @param {boolean} [isOwn] Whether this client has opened it.
      */
-    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers);
+    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers, origin?: import("./kept.js").Origin, isOwn?: boolean);
     /**
-     * Sends the next frame. Calls are made one after the other, in the order of `track`.
+     * Sends the next frame. Calls are made one after the other, in the order of `track`. A frame that got no answer, or
+     * whose call was aborted, is kept: the next call sends it before its own.
      * @param {Frame} frame
      * @param {AbortSignal} [signal]
      * @returns {Promise<Answer>}
@@ -117,24 +129,50 @@ export declare class Session {
      */
     post(method: string, path: string, query: Record<string, string | number>, body: BodyInit, signal?: AbortSignal): Promise<Response>;
     /**
+     * @param {number} number
+     * @param {Frame} frame
+     * @param {Box} box
+     * @param {AbortSignal} [signal]
+     */
+    put(number: number, frame: Frame, box: Box, signal?: AbortSignal): Promise<Response>;
+    /**
      * Makes a request with the next frames after those before.
-     * @param {number} count
-     * @param {Sent["make"]} make
-     */
-    next(count: number, make: Sent["make"]): Promise<any>;
-    /**
-     * @param {number} count
-     * @param {Sent["make"]} make
-     */
-    send(count: number, make: Sent["make"]): Promise<any>;
-    /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
-    moveOn(): Promise<void>;
-    /**
-     * A replica has gone, and the store has not its last frames: they are sent again, and then this one.
-     * @param {unknown} error
      * @param {Sent} sent
      */
-    resend(error: unknown, sent: Sent): Promise<Response>;
-    /** @param {Headers} headers */
-    note(headers: Headers): void;
+    next(sent: Sent): Promise<any>;
+    /** @param {Sent} sent */
+    send({ frames, box, make, signal }: Sent): Promise<any>;
+    /** Makes sure, after an answer, that the session can go on elsewhere.
+     * @param {string | null} stored The last frame that a store has. */
+    checkpoint(stored: string | null): Promise<void>;
+    get takesSnapshots(): boolean;
+    get isSnapshotDue(): boolean;
+    /** A snapshot of now or later; nothing where there is none for the moment.
+     * @returns {Promise<import("./kept.js").Origin | undefined>} */
+    takeOrigin(): Promise<import("./kept.js").Origin | undefined>;
+    /** Takes a snapshot; without it the older one and more frames are kept. */
+    renewOrigin(): Promise<import("./kept.js").Origin | undefined>;
+    /** Goes on elsewhere, under another id. While there is nothing else, it goes on here. */
+    move(): Promise<void>;
+    /**
+     * Makes a call for which the service must have the frames before one, and sends those that it does not have.
+     * @param {number} number The first frame that the call does not need.
+     * @param {(number: number) => Promise<Response>} call
+     */
+    deliver(number: number, call: (number: number) => Promise<Response>): Promise<Response>;
+    /** @param {number} number A frame that the service does not have. */
+    resend(number: number): Promise<void>;
+    /**
+     * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
+     * @param {unknown} error
+     * @param {number} number The first frame that the call does not need.
+     * @returns {error is Problem}
+     */
+    canRecover(error: unknown, number: number): error is Problem;
+    /**
+     * Opens the session again after the service has lost it, under another id.
+     * @param {Problem} lost What told so.
+     * @returns {Promise<number>} The last frame that it has then.
+     */
+    reopen(lost: Problem): Promise<number>;
 }

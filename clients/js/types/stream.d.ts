@@ -45,14 +45,10 @@ export declare class FrameStream {
     onLine: (isUp: boolean) => void;
     /** @type {Waiting[]} Oldest first. */
     waiting: Waiting[];
-    /** @type {(Waiting & {number: number})[]} Answered frames that a service with a store may ask for again. */
-    kept: (Waiting & {
-        number: number;
-    })[];
     /** How many of those that wait are on their way. */
     sent: number;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
-    misnumbered: number;
+    outOfOrder: number;
     /** @type {WebSocket | undefined} */
     socket: WebSocket | undefined;
     isUp: boolean;
@@ -62,8 +58,16 @@ export declare class FrameStream {
     downSince: number;
     /** @type {Problem | undefined} */
     lastProblem: Problem | undefined;
+    /** @type {Problem | undefined} The service has lost the session; it is opened again with the next frame. */
+    lost: Problem | undefined;
+    /** @type {{origin: import("./kept.js").Origin, until: number} | undefined} A snapshot of a frame up to `until`. */
+    newer: {
+        origin: import("./kept.js").Origin;
+        until: number;
+    } | undefined;
+    isRenewing: boolean;
     /** @type {(problem: Error | undefined) => void} */
-    tellEnd: (problem: Error | undefined) => void;
+    resolveEnded: (problem: Error | undefined) => void;
     /** @type {Promise<Error | undefined>} The stream has ended: why, if it was not by `close`. */
     ended: Promise<Error | undefined>;
     /**
@@ -83,21 +87,30 @@ export declare class FrameStream {
         box?: import("./session.js").Box;
         see?: boolean;
     }): Promise<StreamAnswer | undefined>;
-    /** Ends the stream; the session goes on. Frames without an answer are given up. */
+    /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
     transmit(): void;
     /** @param {any} message */
-    receive(message: any): void;
-    /** The oldest frame on its way. */
-    take(): Waiting | undefined;
+    receive(message: any): void | Promise<void>;
+    /** Makes sure, after an answer, that the session can be opened again.
+     * @param {number | undefined} stored The last frame that a store has. */
+    checkpoint(stored: number | undefined): Promise<void>;
+    /** Takes the oldest frame on its way, which has an answer. */
+    acknowledge(): Waiting | undefined;
     /** @param {Problem} problem */
-    refused(problem: Problem): void;
+    refused(problem: Problem): void | Promise<void>;
     /** The service expects frame `next`: it has those before it, and sends their answers.
      * @param {number} next */
     resume(next: number): void;
-    /** A replica has gone, and the store has no frames from `next` on: they are sent again before those that wait.
+    /** The service has no frames from `next` on any more: they are sent again before those that wait.
      * @param {number} next */
-    goBack(next: number): void;
+    resendFrom(next: number): void;
+    /** The service has lost the session.
+     * @param {Problem} problem */
+    gone(problem: Problem): void | Promise<void>;
+    /** Opens the session again, and the stream with it.
+     * @param {Problem} problem What told that the service has lost it. */
+    reopen(problem: Problem): Promise<void>;
     connect(): Promise<void>;
     /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
     token(): Promise<string>;
@@ -106,6 +119,10 @@ export declare class FrameStream {
      * @returns {Promise<void>}
      */
     closed(code: number): Promise<void>;
+    breakLine(): void;
+    /** The service does not take this stream.
+     * @param {Error} problem */
+    refusedFor(problem: Error): void;
     /** @param {number} status */
     reason(status: number): Problem;
     /** @param {Error | undefined} problem */

@@ -120,14 +120,15 @@ impl ClientBuilder {
     }
 
     /// For how long a request is sent again after a broken line, 408, 429, 502, 503 or 504 (60 s). With zero no request
-    /// is sent again.
+    /// is sent again; but a session that the service has lost is opened again, once.
     pub fn retry_for(mut self, time: Duration) -> Self {
         self.retry_for = time;
         self
     }
 
     /// After so many frames a session takes a snapshot (30), and keeps the frames after it (at most 128). Zero: never,
-    /// so that the session ends with the service. A service with a store needs none, and none are taken.
+    /// so that a session ends with the service, unless that drains first. A service with a store needs none, and none
+    /// are taken.
     pub fn snapshot_every(mut self, frames: u32) -> Self {
         self.snapshot_every = frames;
         self

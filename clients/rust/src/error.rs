@@ -15,8 +15,8 @@ pub enum ClientError {
     /// For as long as is tried no whole answer came, and the frame is kept; or the request cannot be made at all.
     #[error("no answer: {0}")]
     Transport(#[from] reqwest::Error),
-    /// The service has lost frames and asks for this one again, which is not kept any more.
-    #[error("the service asks for frame {frame} again, which is not kept")]
+    /// The service needs this frame again, which is not kept any more.
+    #[error("the service needs frame {frame} again, which is not kept any more")]
     NotKept {
         /// The number of the frame.
         frame: u64,

@@ -10,7 +10,7 @@ use std::time::Duration;
 #[serde(default)]
 #[non_exhaustive]
 pub struct Problem {
-    /// Names the kind of problem: `urn:bagtrack:problem:…`. Empty where the answer was no problem document.
+    /// Names the kind of problem, and opens as a page at the service: `/docs/problems#…`. Empty where the answer was no problem document.
     #[serde(rename = "type")]
     pub type_uri: String,
     /// The kind of problem in a few words.
@@ -35,7 +35,7 @@ pub struct Problem {
 impl Problem {
     /// The kind of problem: the last part of its type, such as `session-not-found`.
     pub fn kind(&self) -> &str {
-        self.type_uri.rsplit(':').next().unwrap_or_default()
+        self.type_uri.rsplit(['#', ':']).next().unwrap_or_default()
     }
 
     /// From the answer to a request.

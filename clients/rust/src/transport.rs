@@ -72,8 +72,12 @@ impl Reply {
     }
 
     /// Whether the same request may succeed later: as the service says, or a proxy before it.
-    fn may_come_again(&self) -> bool {
-        matches!(self.status.as_u16(), 408 | 429 | 502 | 503 | 504)
+    fn is_temporary(&self) -> bool {
+        match self.status.as_u16() {
+            408 | 429 | 502 | 503 | 504 => true,
+            409 => self.problem().kind() == "not-in-order",
+            _ => false,
+        }
     }
 }
 
@@ -105,7 +109,7 @@ impl Transport {
         let mut has_broken = self.retry_for.is_zero();
         loop {
             match self.attempt(request).await {
-                Ok(reply) if !reply.may_come_again() => return Ok(reply),
+                Ok(reply) if !reply.is_temporary() => return Ok(reply),
                 Ok(reply) => {
                     let problem = reply.problem();
                     if problem.kind() == "not-ready" {

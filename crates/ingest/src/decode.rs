@@ -19,12 +19,16 @@ thread_local! {
 /// See [`IngestError`]. Bytes that pass may still fail to decode.
 pub fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
     limits.check_bytes(bytes.len())?;
-    let format = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
+    let format = sniff::format(bytes).ok_or_else(|| unread(bytes))?;
     catch_decoder_panic(format, || match format {
         Format::Jpeg => jpeg::size(bytes, limits),
         Format::Png => raster::size_of_png(bytes, limits),
         Format::WebP => raster::size_of_webp(bytes, limits),
     })
+}
+
+fn unread(bytes: &[u8]) -> IngestError {
+    sniff::unread_type(bytes).map_or(IngestError::UnknownFormat, IngestError::UnreadFormat)
 }
 
 /// Decodes one uploaded frame in its own size, in colour where it has any.
@@ -53,7 +57,7 @@ pub fn decode_to(
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<Frame, IngestError> {
     limits.check_bytes(bytes.len())?;
-    let file = sniff::format(bytes).ok_or(IngestError::UnknownFormat)?;
+    let file = sniff::format(bytes).ok_or_else(|| unread(bytes))?;
     catch_decoder_panic(file, || {
         SCRATCH.with_borrow_mut(|scratch| {
             let planes = std::mem::take(&mut scratch.planes);

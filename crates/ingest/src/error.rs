@@ -7,6 +7,9 @@ pub enum IngestError {
     /// The bytes are none of JPEG, PNG, WebP.
     #[error("the bytes are not a JPEG, PNG or WebP image")]
     UnknownFormat,
+    /// The bytes are an image of this type, which is not read.
+    #[error("{0} images are not read")]
+    UnreadFormat(&'static str),
     /// The frame is over one of the limits; the text names it, with both numbers.
     #[error("{0}")]
     TooLarge(String),

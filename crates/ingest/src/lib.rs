@@ -49,3 +49,4 @@ mod webp_chunks;
 pub use decode::{decode, decode_to, recycle, size};
 pub use error::IngestError;
 pub use limits::Limits;
+pub use sniff::{type_name, unread_type};

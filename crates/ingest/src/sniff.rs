@@ -28,6 +28,65 @@ impl Format {
     }
 }
 
+/// Types that are known and not read, by the brands of their `ftyp` box. HEIC is an iPhone's, AVIF Android's and the
+/// web's. A file with a general brand names its own one among those that it is compatible with.
+const HEIC: [&[u8; 4]; 8] = [
+    b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs",
+];
+const AVIF: [&[u8; 4]; 2] = [b"avif", b"avis"];
+const GENERAL: [&[u8; 4]; 4] = [b"mif1", b"mif2", b"msf1", b"miaf"];
+/// Most brands that are looked at.
+const MAX_BRANDS: usize = 16;
+
+/// The name of the image type that the first bytes tell, also of one that is not read.
+pub fn type_name(bytes: &[u8]) -> Option<&'static str> {
+    let read = format(bytes).map(Format::name);
+    read.or_else(|| unread_type(bytes))
+}
+
+/// The name of an image type that is known and not read.
+pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.get(4..8) == Some(b"ftyp") {
+        return still_image(bytes);
+    }
+    let signatures: [(&[u8], &str); 5] = [
+        (b"II\x2A\x00", "TIFF"),
+        (b"MM\x00\x2A", "TIFF"),
+        (b"\xFF\x0A", "JPEG XL"),
+        (b"\x00\x00\x00\x0CJXL \r\n", "JPEG XL"),
+        (b"\x00\x00\x00\x0CjP  \r\n", "JPEG 2000"),
+    ];
+    let found = signatures
+        .iter()
+        .find(|(start, _)| bytes.starts_with(start));
+    // Two letters may begin any text. A bitmap has four zeros after its length.
+    let is_bitmap = bytes.starts_with(b"BM") && bytes.get(6..10) == Some(&[0; 4]);
+    found.map(|(_, name)| *name).or(is_bitmap.then_some("BMP"))
+}
+
+/// Which still image a file of boxes is; none where it is a video.
+fn still_image(bytes: &[u8]) -> Option<&'static str> {
+    let length = bytes
+        .first_chunk()
+        .map(|length| u32::from_be_bytes(*length))?;
+    let brands = bytes.get(8..bytes.len().min(length as usize))?;
+    let mut brands = brands.chunks_exact(4);
+    let major = brands.next()?;
+    // After the version, which is one of the chunks.
+    let compatible = brands.take(MAX_BRANDS);
+    let name = |brand: &[u8]| {
+        let is_of = |brands: &[&[u8; 4]]| brands.iter().any(|known| *known == brand);
+        match (is_of(&HEIC), is_of(&AVIF)) {
+            (true, _) => Some("HEIC"),
+            (_, true) => Some("AVIF"),
+            _ => None,
+        }
+    };
+    let is_general = GENERAL.iter().any(|brand| *brand == major);
+    let general = || is_general.then(|| compatible.filter_map(name).next().unwrap_or("HEIF"));
+    name(major).or_else(general)
+}
+
 /// The type that the signature at the start of `bytes` tells, if it is one of ours.
 pub(super) fn format(bytes: &[u8]) -> Option<Format> {
     if bytes.starts_with(&[0xFF, 0xD8, 0xFF]) {
@@ -38,5 +97,29 @@ pub(super) fn format(bytes: &[u8]) -> Option<Format> {
         Some(Format::WebP)
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_that_are_not_read_are_named_and_videos_are_none() {
+        for (bytes, name) in [
+            (&b"\0\0\0\x24ftypheic\0\0\0\0mif1heic"[..], Some("HEIC")),
+            (b"\0\0\0\x20ftypmif1\0\0\0\0mif1heicmiaf", Some("HEIC")),
+            (b"\0\0\0\x1cftypavif\0\0\0\0avifmif1miaf", Some("AVIF")),
+            (b"\0\0\0\x1cftypmif1\0\0\0\0avifmiafmif1", Some("AVIF")),
+            (b"\0\0\0\x20ftypisom\0\0\x02\0isomiso2avc1mp41", None),
+            (b"\0\0\0\x14ftypqt  \0\0\0\0qt  ", None),
+            (b"\0\0\0\x08ftyp", None),
+            (b"II*\0", Some("TIFF")),
+            (b"BM\x36\x10\0\0\0\0\0\0", Some("BMP")),
+            (b"BM, a text", None),
+            (b"", None),
+        ] {
+            assert_eq!(unread_type(bytes), name, "{bytes:?}");
+        }
     }
 }

@@ -73,3 +73,81 @@ pub fn clip(parent: &Path, name: &str, extra: &[&str]) -> PathBuf {
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("temporary folders have plain names")
 }
+
+/// The boxes of a file in the OTB layout, as they are in it.
+pub fn boxes(lines: &str) -> Vec<[f64; 4]> {
+    lines.lines().map(numbers).collect()
+}
+
+fn numbers(line: &str) -> [f64; 4] {
+    let numbers: Vec<f64> = line
+        .split(',')
+        .map(|number| number.parse().expect("a number"))
+        .collect();
+    numbers.try_into().expect("four numbers")
+}
+
+/// A line of `track --format csv`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub frame: u64,
+    pub time: Option<f64>,
+    pub target: usize,
+    pub area: [f64; 4],
+    pub score: f64,
+    pub status: String,
+}
+
+/// The lines of `track --format csv`.
+pub fn rows(csv: &str) -> Vec<Row> {
+    let mut lines = csv.lines();
+    let header = "frame,time,target,x,y,width,height,score,status";
+    assert_eq!(lines.next(), Some(header));
+    lines.map(row).collect()
+}
+
+fn row(line: &str) -> Row {
+    let fields: Vec<&str> = line.split(',').collect();
+    assert_eq!(fields.len(), 9, "{line}");
+    let number = |field: &str| field.parse().expect("a number");
+    Row {
+        frame: fields[0].parse().expect("a whole number"),
+        time: (!fields[1].is_empty()).then(|| number(fields[1])),
+        target: fields[2].parse().expect("a whole number"),
+        area: numbers(&fields[3..7].join(",")),
+        score: number(fields[7]),
+        status: fields[8].to_owned(),
+    }
+}
+
+/// Whether ffmpeg is here; says so where it is not.
+pub fn has_ffmpeg() -> bool {
+    let found = Command::new("ffmpeg").arg("-version").output().is_ok();
+    if !found {
+        eprintln!("left out: there is no ffmpeg");
+    }
+    found
+}
+
+/// A video of a clip's frames, at 30 frames a second, that plays them `times` times.
+pub fn video_of(clip: &Path, video: &Path, times: u32) {
+    let frames = clip.join("img/%04d.jpg");
+    let again = (times - 1).to_string();
+    let mut command = Command::new("ffmpeg");
+    command.args(["-v", "error", "-framerate", "30", "-stream_loop", &again]);
+    command.args(["-i", text(&frames), "-b:v", "4M", text(video)]);
+    assert!(command.status().expect("ffmpeg starts").success());
+}
+
+/// What ffprobe finds out about a video by decoding all of it: width, height, rate, number of frames.
+pub fn about(video: &Path) -> String {
+    let mut command = Command::new("ffprobe");
+    command.args(["-v", "error", "-count_frames", "-of", "csv=p=0"]);
+    command.args([
+        "-show_entries",
+        "stream=width,height,avg_frame_rate,nb_read_frames",
+    ]);
+    let output = command.arg(video).output().expect("ffprobe starts");
+    let told = String::from_utf8(output.stdout).expect("text");
+    told.trim().to_owned()
+}

@@ -2,9 +2,9 @@
 
 use super::token::SessionToken;
 use crate::http::problems::problem::Problem;
-use crate::sessions::Owner;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
+use bagtrack_sessions::Owner;
 use std::io;
 use std::sync::Arc;
 use std::time::SystemTime;

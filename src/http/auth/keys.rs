@@ -4,7 +4,7 @@
 
 use super::token::PREFIX;
 use crate::http::config::access::Secret;
-use crate::sessions::Owner;
+use bagtrack_sessions::Owner;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};

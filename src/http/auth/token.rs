@@ -7,7 +7,7 @@
 //! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 bytes of seconds since 1970 (big endian), 32 bytes of code,
 //! and the name.
 
-use crate::sessions::{MAC_BYTES, MacKeys, Owner};
+use bagtrack_sessions::{MAC_BYTES, MacKeys, Owner};
 use base64::Engine;
 use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

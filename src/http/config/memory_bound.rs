@@ -1,7 +1,7 @@
 //! How much memory the service takes at most, by its settings.
 
 use super::service::Config;
-use crate::sessions::MAX_LIST_BYTES;
+use bagtrack_sessions::MAX_LIST_BYTES;
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
@@ -15,6 +15,12 @@ const WORKER: u64 = 64 << 20;
 const WORKING_IMAGE: u64 = MAX_WORKING_SIDE as u64 * MAX_WORKING_SIDE as u64 * 3 / 2;
 /// A connection's tasks, beside its two buffers.
 const CONNECTION: u64 = 16 << 10;
+/// Most bytes of a connection that wait to be sent, encrypted.
+#[cfg(feature = "tls")]
+pub const MAX_UNSENT_BYTES: usize = 32 << 10;
+/// What TLS keeps of a connection: what waits to be sent, a handshake message that is not whole, and a record's text.
+#[cfg(feature = "tls")]
+const TLS_CONNECTION: u64 = MAX_UNSENT_BYTES as u64 + (64 << 10) + (32 << 10);
 
 /// Bytes that the parts of the service take at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +52,7 @@ impl MemoryBound {
             work: count(config.worker_count())
                 * (2 * (worker + WORKER) + 3 * (images + count(MAX_LIST_BYTES))),
             sessions: count(config.session_bytes()),
-            connections: count(config.max_connections) * (2 * count(MAX_BUFFER_BYTES) + CONNECTION),
+            connections: count(config.max_connections) * connection(config),
         }
     }
 
@@ -54,6 +60,18 @@ impl MemoryBound {
     pub fn total(&self) -> u64 {
         PROGRAM + self.uploads + self.work + self.sessions + self.connections
     }
+}
+
+/// What one connection takes.
+fn connection(config: &Config) -> u64 {
+    let plain = 2 * MAX_BUFFER_BYTES as u64 + CONNECTION;
+    #[cfg(feature = "tls")]
+    if config.tls.tls_cert.is_some() {
+        return plain + TLS_CONNECTION;
+    }
+    #[cfg(not(feature = "tls"))]
+    let _ = config;
+    plain
 }
 
 #[cfg(test)]
@@ -78,5 +96,7 @@ mod tests {
         assert!(with(&|c| c.workers = Some(3)) > before);
         assert!(with(&|c| c.max_sessions += 1) > before);
         assert!(with(&|c| c.max_connections += 1) > before);
+        #[cfg(feature = "tls")]
+        assert!(with(&|c| c.tls.tls_cert = Some("cert.pem".into())) > before);
     }
 }

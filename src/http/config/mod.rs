@@ -11,4 +11,6 @@ pub mod limits;
 pub mod memory_bound;
 pub mod service;
 pub mod store;
+#[cfg(feature = "tls")]
+pub mod tls;
 pub mod validation;

@@ -4,6 +4,8 @@
 use super::access::AccessConfig;
 use super::limits::LimitsConfig;
 use super::store::StoreConfig;
+#[cfg(feature = "tls")]
+use super::tls::TlsConfig;
 use crate::http::middleware::base_path::BasePath;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -24,6 +26,10 @@ pub struct Config {
         long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen, value_parser = parse_listen
     )]
     pub listen: SocketAddr,
+    /// The certificate that clients see.
+    #[cfg(feature = "tls")]
+    #[command(flatten)]
+    pub tls: TlsConfig,
     /// Frames decoded and tracked at the same time [default: the number of cores].
     #[arg(long, env = "BAGTRACK_WORKERS")]
     pub workers: Option<usize>,
@@ -114,7 +120,8 @@ pub struct Config {
         default_value_t = Config::default().base_path
     )]
     pub base_path: BasePath,
-    /// Time for a client to send its request head; a connection that is idle for longer is closed too.
+    /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
+    /// longer is closed too.
     #[arg(
         long, env = "BAGTRACK_HEADER_TIMEOUT",
         default_value = shown(Config::default().header_timeout),
@@ -167,6 +174,8 @@ impl Default for Config {
         let limits = bagtrack_ingest::Limits::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            #[cfg(feature = "tls")]
+            tls: TlsConfig::default(),
             workers: None,
             queue: 256,
             max_sessions: 1024,

@@ -1,7 +1,7 @@
 //! The settings of the store that replicas share.
 
 use super::access::Secret;
-use crate::sessions::{RedisStore, SessionStore, StoreAddress};
+use bagtrack_sessions::{RedisStore, SessionStore, StoreAddress};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use super::limits::shown;
 #[derive(Debug, Clone, clap::Args)]
 pub struct StoreConfig {
     /// Where sessions are stored: `redis://[user:password@]host[:port][/database]`, `valkey` alike, or
-    /// `redis-cluster://host:port,host:port`. In builds with the feature `tls`, `rediss` and `valkeys` for TLS.
+    /// `redis-cluster://host:port,host:port`. `rediss` and `valkeys` for TLS.
     #[arg(
         long,
         env = "BAGTRACK_STORE",

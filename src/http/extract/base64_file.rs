@@ -16,6 +16,12 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 /// # Errors
 /// It is not base64.
 pub fn decode(text: &str) -> Result<Bytes, Problem> {
+    if let Some((scheme, _)) = text.trim_start().split_once("://")
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric())
+    {
+        let detail = "A file is given as a URL, and URLs are not fetched. Send its bytes as base64, or as the body.";
+        return Err(Problem::malformed(detail));
+    }
     let encoded = match text.strip_prefix("data:") {
         Some(url) => {
             let split = url.split_once(";base64,").map(|(_, encoded)| encoded);

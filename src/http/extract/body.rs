@@ -5,10 +5,10 @@
 
 use super::pace::TooSlow;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{ByteCharge, BytesFull};
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
+use bagtrack_sessions::{ByteCharge, BytesFull};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
 use tower_http::timeout::TimeoutError;

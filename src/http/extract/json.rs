@@ -2,6 +2,7 @@
 
 use super::base64_file;
 use super::fields::Fields;
+use super::misnamed;
 use super::settings::{FrameCount, Settings};
 use crate::http::problems::problem::Problem;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
@@ -47,6 +48,19 @@ impl<'de> Visitor<'de> for ObjectVisitor {
     }
 }
 
+/// The mark that some editors put before UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// The text of a body that is JSON. It begins with `{`, after a byte order mark and blanks; no image and no snapshot
+/// does. A text that is labelled as JSON is no image either.
+pub(super) fn text_of(body: &[u8], is_labelled: bool) -> Option<&[u8]> {
+    let body = body.strip_prefix(BYTE_ORDER_MARK).unwrap_or(body);
+    let text = body.trim_ascii_start();
+    let is_printed = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    let is_text = || text.iter().take(64).all(is_printed);
+    (text.starts_with(b"{") || is_labelled && is_text()).then_some(text)
+}
+
 /// Adds the fields of a JSON body to `fields`: at most `max_files` files.
 pub(super) fn read<S: Settings>(
     body: &[u8],
@@ -69,8 +83,15 @@ pub(super) fn read<S: Settings>(
                     fields.files.push(base64_file::decode(&text)?);
                 }
             }
-            _ if value.get().starts_with('"') => fields.texts.add(&name, &text(&name, value)?)?,
-            _ => fields.texts.add(&name, value.get())?,
+            _ => {
+                if let Some(problem) = misnamed::field::<S>(&name, value.get()) {
+                    return Err(problem);
+                }
+                match value.get().starts_with('"') {
+                    true => fields.texts.add(&name, &text(&name, value)?)?,
+                    false => fields.texts.add(&name, value.get())?,
+                }
+            }
         }
     }
     Ok(())

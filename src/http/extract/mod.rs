@@ -1,9 +1,9 @@
 //! Uploads: frames and settings out of a request, in any of three forms.
 //!
-//! In: a request whose body is a raw file, `multipart/form-data`, or JSON with base64. The content type tells the
-//! form. A raw body may have any other one: the type of a frame is taken from its bytes, and curl labels what it sends
-//! as `application/x-www-form-urlencoded` unless it is told otherwise. Settings come in the query or as fields of the
-//! form, each once.
+//! In: a request whose body is a raw file, `multipart/form-data`, or JSON with base64. JSON is what begins with `{`,
+//! after blanks. A raw body may have any content type: the type of a frame is taken from its bytes, curl labels what it
+//! sends as `application/x-www-form-urlencoded` unless it is told otherwise, and generated clients label a file as JSON
+//! where a call takes both. Settings come in the query or as fields of the form, each once.
 //!
 //! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](settings::Settings) type of the route.
 //! Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then for what the
@@ -20,6 +20,7 @@ mod body;
 mod fields;
 pub mod idempotency_key;
 mod json;
+mod misnamed;
 mod multipart;
 pub mod overrides;
 mod pace;

@@ -2,20 +2,21 @@
 
 use super::body::{self, Buffer};
 use super::fields::Fields;
+use super::misnamed;
+use super::settings::Settings;
 use super::texts::MAX_TEXT_BYTES;
 use crate::http::problems::problem::Problem;
-use crate::sessions::ByteCharge;
 use axum::body::Bytes;
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
+use bagtrack_sessions::ByteCharge;
 
 /// Adds the parts of a multipart body to `fields`: at most `max_files` files. The router limits all bodies to
 /// `max_bytes` bytes. What is kept is charged to `charge`.
-pub(super) async fn read(
+pub(super) async fn read<S: Settings>(
     request: Request,
     max_bytes: usize,
     max_files: usize,
-    takes_snapshot: bool,
     fields: &mut Fields,
     charge: &mut ByteCharge,
 ) -> Result<(), Problem> {
@@ -25,11 +26,15 @@ pub(super) async fn read(
     })?;
     while let Some(part) = multipart.next_field().await.map_err(failed)? {
         let name = part.name().unwrap_or("").to_owned();
-        if name == "snapshot" && takes_snapshot && fields.snapshot.is_none() {
+        if name == "snapshot" && S::TAKES_SNAPSHOT && fields.snapshot.is_none() {
             fields.snapshot = Some(read_part(part, max_bytes, max_bytes, charge).await?);
         } else if name != "frame" {
             // One byte more than may be, so that a longer text is refused as such.
+            let has_file_name = part.file_name().is_some();
             let text = read_part(part, max_bytes, MAX_TEXT_BYTES + 1, charge).await?;
+            if let Some(problem) = misnamed::part::<S>(&name, has_file_name, &text) {
+                return Err(problem);
+            }
             fields.texts.add(&name, &String::from_utf8_lossy(&text))?;
         } else if fields.files.len() < max_files {
             let file = read_part(part, max_bytes, max_bytes, charge).await?;

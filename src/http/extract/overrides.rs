@@ -1,14 +1,11 @@
 //! A preset with single parameters set otherwise.
 
-use super::settings::{WholeNumber, whole};
+use super::settings::{MAX_EXACT, Seed, whole};
 use crate::http::problems::problem::Problem;
 use bagtrack_tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
-
-/// Seeds drawn here are below this, so that JSON numbers hold them exactly in every language.
-const SEED_END: u64 = 1 << 53;
 
 /// A named set of the tracker's parameters.
 #[derive(
@@ -52,9 +49,9 @@ impl ParamOverrides {
     ///
     /// # Errors
     /// A parameter is unknown or has the wrong type.
-    pub fn resolve(self, preset: Preset, seed: Option<u64>) -> Result<Params, Problem> {
+    pub fn resolve(self, preset: Preset, seed: Option<Seed>) -> Result<Params, Problem> {
         let mut params = preset.params();
-        params.seed = rand::random_range(0..SEED_END);
+        params.seed = rand::random_range(0..=MAX_EXACT);
         // One at a time, so that a value of the wrong type can be named.
         for (name, value) in self.0 {
             let mut known = by_name(&params);
@@ -72,7 +69,11 @@ impl ParamOverrides {
                 ))
             })?;
         }
-        params.seed = seed.unwrap_or(params.seed);
+        if params.seed > MAX_EXACT {
+            let detail = format!("Parameter `seed` must be a whole number from 0 to {MAX_EXACT}.");
+            return Err(Problem::invalid_parameter(detail));
+        }
+        params.seed = seed.map_or(params.seed, |seed| seed.0);
         Ok(params)
     }
 }
@@ -83,12 +84,12 @@ impl ParamOverrides {
 /// See [`ParamOverrides::resolve`].
 pub fn resolve(
     preset: Option<PresetName>,
-    seed: Option<WholeNumber>,
+    seed: Option<Seed>,
     params: Option<ParamOverrides>,
 ) -> Result<Params, Problem> {
     let preset = preset.map_or_else(Preset::default, Preset::from);
     let params = params.unwrap_or_default();
-    params.resolve(preset, seed.map(|seed| seed.0))
+    params.resolve(preset, seed)
 }
 
 /// The parameters by their names.

@@ -2,8 +2,8 @@
 //! until the deadline of the body.
 
 use crate::http::config::limits::LimitsConfig;
-use crate::sessions::ByteCharge;
 use axum::body::{Body, Bytes, HttpBody};
+use bagtrack_sessions::ByteCharge;
 use http_body::Frame;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};

@@ -11,8 +11,8 @@ use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
 use crate::http::respond::response_format::AnswerForm;
 use crate::http::state::AppState;
-use crate::sessions::{QueuePermit, SessionPermit};
 use axum::extract::{FromRequest, FromRequestParts, Request};
+use bagtrack_sessions::{QueuePermit, SessionPermit};
 
 /// A request with frames for a live session, with its permits.
 #[derive(Debug)]

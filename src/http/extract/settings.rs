@@ -1,9 +1,10 @@
 //! What the settings of a route are to the parsers and to the OpenAPI document.
 
+use bagtrack_sessions::MAX_TARGETS;
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;
-use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
+use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, Schema, SchemaFormat, SchemaType, Type};
 use utoipa::{IntoParams, Number, PartialSchema, ToSchema};
 
 /// How many frames a route takes.
@@ -28,25 +29,36 @@ pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
     const SCHEMA_PREFIX: &'static str;
 }
 
-/// A whole number from 0 to 2⁶⁴ - 1, parsed from its text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WholeNumber(pub u64);
+/// The greatest number that JSON holds exactly in every language: 2^53 - 1.
+pub const MAX_EXACT: u64 = (1 << 53) - 1;
+const MAX_TARGET: u64 = MAX_TARGETS as u64 - 1;
 
-impl WholeNumber {
-    /// As an index; one that is too large for that stays too large for any list.
+/// A whole number from 0 to `MAX`, parsed from its text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WholeNumber<const MAX: u64>(pub u64);
+
+/// The seed of all random draws.
+pub type Seed = WholeNumber<MAX_EXACT>;
+/// The number of a frame.
+pub type FrameNumber = WholeNumber<MAX_EXACT>;
+/// Which target is meant, counted from 0.
+pub type TargetNumber = WholeNumber<MAX_TARGET>;
+
+impl TargetNumber {
+    /// As an index.
     pub fn as_index(self) -> usize {
         usize::try_from(self.0).unwrap_or(usize::MAX)
     }
 }
 
-impl<'de> Deserialize<'de> for WholeNumber {
+impl<'de, const MAX: u64> Deserialize<'de> for WholeNumber<MAX> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Cow::<str>::deserialize(deserializer)?;
         let float = || text.parse().ok().and_then(whole);
-        text.parse().ok().or_else(float).map(Self).ok_or_else(|| {
+        let number = text.parse().ok().or_else(float);
+        number.filter(|n| *n <= MAX).map(Self).ok_or_else(|| {
             let start: String = text.chars().take(64).collect();
-            let max = u64::MAX;
-            D::Error::custom(format!("`{start}` is not a whole number from 0 to {max}"))
+            D::Error::custom(format!("`{start}` is not a whole number from 0 to {MAX}"))
         })
     }
 }
@@ -58,35 +70,55 @@ pub fn whole(value: f64) -> Option<u64> {
     is_whole.then_some(value as u64)
 }
 
-fn number_schema(schema_type: impl Into<SchemaType>) -> ObjectBuilder {
+/// The schema of a whole number from 0 to this one.
+pub fn number_schema(schema_type: impl Into<SchemaType>, max: u64) -> ObjectBuilder {
+    let format = match i32::try_from(max) {
+        Ok(_) => KnownFormat::Int32,
+        Err(_) => KnownFormat::Int64,
+    };
     ObjectBuilder::new()
         .schema_type(schema_type)
+        .format(Some(SchemaFormat::KnownFormat(format)))
         .minimum(Some(Number::UInt(0)))
-        .maximum(Some(Number::UInt(usize::MAX)))
+        .maximum(Some(Number::UInt(
+            usize::try_from(max).unwrap_or(usize::MAX),
+        )))
 }
 
-/// A whole number in the query and in forms.
+/// A whole number from 0 to `MAX` in the query and in forms.
 #[derive(Debug)]
-pub struct NumberText;
+pub struct NumberText<const MAX: u64>;
 
-impl ToSchema for NumberText {}
+/// A whole number from 0 to `MAX` in a JSON body, which may be a text.
+#[derive(Debug)]
+pub struct NumberInput<const MAX: u64>;
 
-impl PartialSchema for NumberText {
+/// A seed or the number of a frame, as a text.
+pub type ExactText = NumberText<MAX_EXACT>;
+/// The same in JSON.
+pub type ExactInput = NumberInput<MAX_EXACT>;
+/// Which target is meant, as a text.
+pub type TargetText = NumberText<MAX_TARGET>;
+/// The same in JSON.
+pub type TargetInput = NumberInput<MAX_TARGET>;
+
+impl<const MAX: u64> ToSchema for NumberText<MAX> {}
+
+impl<const MAX: u64> PartialSchema for NumberText<MAX> {
     fn schema() -> RefOr<Schema> {
-        number_schema(Type::Integer).build().into()
+        number_schema(Type::Integer, MAX).build().into()
     }
 }
 
-/// A whole number in a JSON body, which may be a text.
-#[derive(Debug)]
-pub struct NumberInput;
+impl<const MAX: u64> ToSchema for NumberInput<MAX> {}
 
-impl ToSchema for NumberInput {}
-
-impl PartialSchema for NumberInput {
+impl<const MAX: u64> PartialSchema for NumberInput<MAX> {
     fn schema() -> RefOr<Schema> {
         let types = [Type::Integer, Type::String, Type::Null];
-        let number = number_schema(SchemaType::from_iter(types));
-        number.pattern(Some("^[0-9]{1,19}$")).build().into()
+        let number = number_schema(SchemaType::from_iter(types), MAX);
+        // All of fewer digits than the greatest.
+        let digits = MAX.ilog10().max(1);
+        let pattern = format!("^[0-9]{{1,{digits}}}$");
+        number.pattern(Some(pattern)).build().into()
     }
 }

@@ -1,5 +1,6 @@
 //! Settings as texts, before they are parsed.
 
+use super::misnamed;
 use super::settings::Settings;
 use crate::http::problems::problem::Problem;
 use axum::extract::Query;
@@ -70,8 +71,15 @@ impl Texts {
     /// # Errors
     /// One is unknown, or its text is no value of its type.
     pub fn parse<S: Settings>(self) -> Result<S, Problem> {
-        serde_json::from_value(Value::Object(self.0))
-            .map_err(|error| Problem::malformed(format!("The settings cannot be read: {error}.")))
+        let misplaced = self.0.iter().find_map(|(name, text)| {
+            misnamed::parameter::<S>(name, text.as_str().unwrap_or_default())
+        });
+        match misplaced {
+            Some(problem) => Err(problem),
+            None => serde_json::from_value(Value::Object(self.0)).map_err(|error| {
+                Problem::malformed(format!("The settings cannot be read: {error}."))
+            }),
+        }
     }
 }
 

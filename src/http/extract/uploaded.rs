@@ -12,11 +12,11 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::RequestPermit;
 use crate::http::resources::snapshot::MEDIA_TYPE;
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, QueuePermit, WorkMeter};
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header::CONTENT_TYPE;
 use bagtrack_ingest::video::{VideoFormat, video_format};
+use bagtrack_sessions::{ByteCharge, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
 /// What curl calls a body, whatever it is.
@@ -27,8 +27,8 @@ const MIN_STRIPPED: usize = 256;
 const STRIPPED: &str =
     "The file has lost its line breaks and zeros, as `curl -d` does: use `--data-binary @file`.";
 
-const VIDEO: &str = "A video goes to `POST /sessions/{id}/frames`, one in a request, after a picture has opened the \
-    session. Here send a JPEG, PNG or WebP image.";
+const VIDEO: &str = "A video goes to `POST /track` with a box, or to `POST /sessions/{id}/frames` after a picture has \
+    opened the session, one in a request. Here send a JPEG, PNG or WebP image.";
 
 /// What a client uploaded.
 #[derive(Debug)]
@@ -78,32 +78,24 @@ impl<S: Settings> Upload<S> {
             // The parser keeps bytes that it has not given out yet; they are charged beside the files.
             let arriving = Some(new_charge());
             let request = request.map(|body| Body::new(PacedBody::new(body, pace, arriving)));
-            let takes = S::TAKES_SNAPSHOT;
-            multipart::read(
-                request,
-                max_bytes,
-                max_files,
-                takes,
-                &mut fields,
-                &mut charge,
-            )
-            .await?;
+            multipart::read::<S>(request, max_bytes, max_files, &mut fields, &mut charge).await?;
         } else {
             let body = Body::new(PacedBody::new(request.into_body(), pace, None));
             let bytes = body::read(body, max_bytes, &mut charge).await?;
-            // No image and no snapshot starts like a JSON object, which curl's -d mislabels too.
-            if media_type == "application/json" || bytes.starts_with(b"{") {
-                charge.grow(json::DECODED_PER_BYTE * bytes.len())?;
-                json = Some(bytes);
+            // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
+            let is_labelled = media_type == "application/json";
+            if let Some(text) = json::text_of(&bytes, is_labelled) {
+                charge.grow(json::DECODED_PER_BYTE * text.len())?;
+                json = Some(bytes.slice_ref(text));
             } else if media_type == FORM_URLENCODED && is_stripped(&bytes) {
                 return Err(Problem::new(Kind::FrameDamaged, STRIPPED));
             } else if !bytes.is_empty() {
                 fields.files.push(bytes);
             }
         }
-        let (lane, permit) = (permit.lane(), Arc::new(permit));
+        let (flow, permit) = (permit.flow(), Arc::new(permit));
         let held = Box::new((charge, permit.clone()));
-        let queue = state.service.admission.enter(lane, held)?;
+        let queue = state.service.admission.enter(flow, held)?;
         if let Some(bytes) = json {
             let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;

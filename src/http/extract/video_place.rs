@@ -3,15 +3,34 @@
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use crate::sessions::{QueueFull, QueuePermit};
+use bagtrack_sessions::{QueueFull, QueuePermit};
+use std::time::Duration;
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, sleep, timeout_at};
+
+/// How long a frame of a video waits before it asks for a place in the quota again.
+const RETRY: Duration = Duration::from_millis(20);
 
 /// A place for a process that decodes a video, given back when this is dropped.
 #[derive(Debug)]
 pub struct VideoPlace {
     _of_client: OwnedSemaphorePermit,
     _of_all: OwnedSemaphorePermit,
+}
+
+/// Waits until a frame of a video has a place in the client's quota of frames.
+///
+/// # Errors
+/// It has none in the time that a request may take.
+pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Problem> {
+    let account = state.clients.account(client);
+    let deadline = Instant::now() + state.config.work_timeout;
+    loop {
+        match account.count_frames(1) {
+            Err(_) if Instant::now() < deadline => sleep(RETRY).await,
+            counted => return counted,
+        }
+    }
 }
 
 impl VideoPlace {
@@ -27,7 +46,7 @@ impl VideoPlace {
     ) -> Result<(Self, QueuePermit), Problem> {
         let config = &state.config;
         let deadline = Instant::now() + config.work_timeout;
-        let request = queue.leave();
+        let request = queue.yield_place();
         let own = state.clients.account(client).videos().acquire_owned();
         let own = timeout_at(deadline, own).await.ok().and_then(Result::ok);
         let own = own.ok_or_else(|| Problem::quota_exceeded("videos at a time", 1))?;
@@ -35,7 +54,7 @@ impl VideoPlace {
         let all = all.ok().and_then(Result::ok).ok_or(QueueFull)?;
         let requests = config.limits.max_video_frames.div_ceil(config.max_frames);
         let requests = u32::try_from(requests).unwrap_or(u32::MAX);
-        let queue = state.service.admission.enter_again(request)?;
+        let queue = state.service.admission.rejoin(request)?;
         let place = Self {
             _of_client: own,
             _of_all: all,

@@ -2,7 +2,7 @@
 
 use super::maker::{METADATA, Maker};
 use crate::http::problems::kind::Kind;
-use crate::sessions::TrackingMetrics;
+use bagtrack_sessions::TrackingMetrics;
 use metrics::{Counter, Gauge, Histogram, Key, Label, Recorder};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
@@ -206,7 +206,7 @@ fn tracking(make: &Maker) -> TrackingMetrics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::PerTarget;
+    use bagtrack_sessions::PerTarget;
     use bagtrack_tracker::{Estimate, Rect, Status};
     use std::time::Duration;
 

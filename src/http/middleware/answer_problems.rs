@@ -26,7 +26,7 @@ pub async fn answer_problems(
     };
     state.metrics.problem(problem.kind());
     log_problem(&problem);
-    let mut written = respond(&problem, path, id);
+    let mut written = respond(&problem, state.config.base_path.as_str(), path, id);
     // The first response's headers stay: it may have some that the problem does not know, like `Allow`.
     for (name, value) in response.headers() {
         written.headers_mut().entry(name).or_insert(value.clone());

@@ -51,6 +51,18 @@ impl ConnectionHold {
         while self.cut_off.changed().await.is_ok() {}
     }
 
+    /// What comes of `beginning`, unless the connection has to end before that.
+    pub async fn begin<T>(&mut self, beginning: impl Future<Output = T>) -> Option<T> {
+        let activity = self.activity().clone();
+        let mut cut_off = self.clone();
+        tokio::select! {
+            begun = beginning => Some(begun),
+            () = self.ending() => None,
+            () = activity.shed.notified() => None,
+            () = cut_off.cut_off() => None,
+        }
+    }
+
     /// Serves HTTP until the connection ends, or a stream has taken it over.
     pub async fn serve<S>(mut self, connection: UpgradeableConnection<TokioIo<ConnectionIo>, S>)
     where

@@ -6,6 +6,7 @@
 //!   whole shows when its handler has read the body, for which there is a moment.
 
 use super::activity::Activity;
+use super::handshake::Transport;
 use super::least_rate::LeastRate;
 use crate::http::config::limits::LimitsConfig;
 use std::io::{self, IoSlice};
@@ -14,7 +15,6 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Time for a handler to read the body that has come.
@@ -23,7 +23,7 @@ const READING: Duration = Duration::from_millis(500);
 /// The stream of a connection.
 #[derive(Debug)]
 pub struct ConnectionIo {
-    stream: TcpStream,
+    stream: Transport,
     activity: Arc<Activity>,
     /// At which the client takes answers.
     rate: LeastRate,
@@ -34,7 +34,7 @@ pub struct ConnectionIo {
 
 impl ConnectionIo {
     /// For a stream whose service tells `activity` what it does.
-    pub fn new(stream: TcpStream, activity: Arc<Activity>, limits: &LimitsConfig) -> Self {
+    pub fn new(stream: Transport, activity: Arc<Activity>, limits: &LimitsConfig) -> Self {
         Self {
             stream,
             activity,
@@ -59,6 +59,18 @@ impl ConnectionIo {
             }
         }
         written
+    }
+
+    /// What came of sending what TLS has encrypted: an error where the client is too slow.
+    fn timely(&mut self, cx: &mut Context<'_>, sent: Poll<io::Result<()>>) -> Poll<io::Result<()>> {
+        match sent {
+            Poll::Ready(_) => self.rate.pause(),
+            Poll::Pending => {
+                ready!(self.rate.poll_late(cx));
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
+        sent
     }
 }
 
@@ -114,10 +126,12 @@ impl AsyncWrite for ConnectionIo {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(cx)
+        let flushed = Pin::new(&mut self.stream).poll_flush(cx);
+        self.timely(cx, flushed)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(cx)
+        let ended = Pin::new(&mut self.stream).poll_shutdown(cx);
+        self.timely(cx, ended)
     }
 }

@@ -3,12 +3,16 @@
 //! In: sockets. Out: requests for the [router](super::router), and their responses.
 //!
 //! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, or keeps idle ones.
-//! [`least_rate`] and the time limit for heads bound the first, [`connections`] the others.
+//! [`least_rate`] and the time limits for handshakes and heads bound the first, [`connections`] the others.
 
 pub mod activity;
+#[cfg(feature = "tls")]
+pub mod certificate;
 pub mod connection_hold;
 pub mod connection_io;
+pub mod connection_service;
 pub mod connections;
+pub mod handshake;
 pub mod least_rate;
 pub mod refusal;
 pub mod server;

@@ -15,7 +15,7 @@ pub fn answer_of(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8
     metrics.problem(problem.kind());
     let (kind, status) = (problem.kind().slug(), problem.kind().status().as_u16());
     tracing::info!(id, %client, kind, status, "connection refused");
-    let document = ProblemDocument::new(problem, "/".to_owned(), id.clone());
+    let document = ProblemDocument::new(problem, "", "/".to_owned(), id.clone());
     let body = json::line(&document).unwrap_or_default();
     let retry = problem.retry_seconds();
     let retry = retry.map_or(String::new(), |seconds| {

@@ -4,33 +4,32 @@
 //! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a
 //! bounded time to end.
 
+#[cfg(feature = "tls")]
+use super::certificate::{Certificate, CertificateError};
 use super::connection_hold::ConnectionHold;
-use super::connection_io::ConnectionIo;
+use super::connection_service::ConnectionService;
 use super::connections::{Connections, NoRoom};
+use super::handshake::Security;
 use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
-use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
 use crate::http::config::service::Config;
 use crate::http::config::store;
 use crate::http::config::validation::ConfigError;
 use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
+#[cfg(fuzzing)]
 use crate::http::quotas::client::Peer;
 use crate::http::router::router;
 use crate::http::state::AppState;
-use crate::sessions::Clock;
-use axum::body::Body;
-use axum::{Extension, Router};
-use hyper::Request;
-use hyper::body::Incoming;
-use hyper::server::conn::http1;
-use hyper::service::{Service, service_fn};
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
+#[cfg(fuzzing)]
+use axum::Extension;
+use axum::Router;
+use bagtrack_sessions::Clock;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
@@ -48,6 +47,10 @@ pub enum BindError {
     /// The keys cannot be used, or the service would be open to a network.
     #[error(transparent)]
     Access(#[from] AccessError),
+    /// There is no certificate to show, where the settings name one.
+    #[cfg(feature = "tls")]
+    #[error(transparent)]
+    Certificate(#[from] CertificateError),
     /// The address cannot be listened on.
     #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
     Listen {
@@ -80,6 +83,7 @@ impl From<()> for Shutdown {
 #[derive(Debug)]
 pub struct Application {
     listener: TcpListener,
+    security: Security,
     state: AppState,
     extra: Router,
 }
@@ -101,10 +105,15 @@ impl Application {
         config.validate()?;
         let address = config.listen;
         let access = Access::load(&config.access, address)?;
+        #[cfg(feature = "tls")]
+        let security = Certificate::load(&config.tls)?.map_or(Security::Plain, Security::Tls);
+        #[cfg(not(feature = "tls"))]
+        let security = Security::Plain;
         let listener = TcpListener::bind(address).await;
         let store = store::connect(&config.store).await;
         Ok(Self {
             listener: listener.map_err(|source| BindError::Listen { address, source })?,
+            security,
             state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
             extra: Router::new(),
         })
@@ -116,6 +125,20 @@ impl Application {
     /// What the system says.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
+    }
+
+    /// How the service's address begins: `http`, or `https` where the settings name a certificate.
+    pub fn scheme(&self) -> &'static str {
+        self.security.scheme()
+    }
+
+    /// The certificate, to read it again.
+    #[cfg(feature = "tls")]
+    pub fn certificate(&self) -> Option<Certificate> {
+        match &self.security {
+            Security::Plain => None,
+            Security::Tls(certificate) => Some(certificate.clone()),
+        }
     }
 
     /// The API keys, to read them again.
@@ -144,6 +167,7 @@ impl Application {
     pub async fn serve<S: Into<Shutdown>>(self, shutdown: impl Future<Output = S>) -> bool {
         let Self {
             listener,
+            security,
             state,
             extra,
         } = self;
@@ -153,6 +177,7 @@ impl Application {
         let sweeper = tokio::spawn(sweep(state.clone()));
         {
             let service = router(state.clone(), extra);
+            let service = ConnectionService::new(state.clone(), security, service);
             let accepting = accept(&listener, &state, service, &ending, cut_off);
             let mut accepting = pin!(accepting);
             tokio::select! {
@@ -186,7 +211,7 @@ impl Application {
 async fn accept(
     listener: &TcpListener,
     state: &AppState,
-    service: Router,
+    service: ConnectionService,
     ending: &watch::Sender<bool>,
     cut_off: watch::Receiver<()>,
 ) {
@@ -198,11 +223,7 @@ async fn accept(
         of_address,
         state.metrics.shed_connections.clone(),
     );
-    let mut builder = http1::Builder::new();
-    builder
-        .timer(TokioTimer::new())
-        .max_buf_size(MAX_BUFFER_BYTES)
-        .header_read_timeout(config.header_timeout);
+    let service = Arc::new(service);
     loop {
         let (stream, peer) = match listener.accept().await {
             Ok(accepted) => accepted,
@@ -223,33 +244,23 @@ async fn accept(
             }
         };
         let Ok(permit) = permit else {
-            refuse(stream, peer, state);
+            refuse(stream, peer, state, service.has_tls());
             continue;
         };
-        if let Err(error) = stream.set_nodelay(true) {
-            tracing::debug!(%error, "cannot set TCP_NODELAY");
-        }
-        let activity = permit.activity.clone();
-        let io = ConnectionIo::new(stream, activity.clone(), limits);
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
-        let service = service.clone().layer(Extension(Peer(peer)));
-        let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
-        let watched = service_fn(move |request: Request<Incoming>| {
-            let activity = activity.clone();
-            let request = request.map(|body| activity.receive(Body::new(body)));
-            let answer = service.call(request);
-            async move { answer.await.map(|answer| activity.answer(answer)) }
-        });
-        let connection = builder.serve_connection(TokioIo::new(io), watched);
-        tokio::spawn(hold.serve(connection.with_upgrades()));
+        let service = service.clone();
+        tokio::spawn(async move { service.serve(stream, peer, hold).await });
     }
 }
 
-/// Tells a client that it has too many connections, as far as its system takes that at once.
-fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState) {
+/// Tells a client that it has too many connections, as far as its system takes that at once. With TLS the connection is
+/// closed without a word: what is said before the handshake looks like a fault of the service.
+fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) {
     let problem = Problem::too_many_connections();
     let answer = refusal::answer_of(&problem, peer.ip(), &state.metrics);
-    if let Ok(mut stream) = stream.into_std() {
+    if let Ok(mut stream) = stream.into_std()
+        && !has_tls
+    {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);
     }

@@ -2,6 +2,7 @@
 
 use super::key_order::InOrder;
 use super::routes;
+use crate::http::extract::settings::MAX_EXACT;
 use serde_json::{Map, Value, json};
 
 /// The id in all examples: that of `putSession` opens the session which the others use.
@@ -22,6 +23,7 @@ pub fn document_at(base_path: &str) -> String {
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
     let links = links(&document);
+    bound_integers(&mut document);
     for operation in operations(&mut document) {
         complete_parameters(operation);
         if operation["tags"] != json!(["service"]) {
@@ -32,6 +34,21 @@ pub fn document_at(base_path: &str) -> String {
         }
     }
     serde_json::to_string_pretty(&InOrder(&document)).expect("the document is plain JSON")
+}
+
+/// Whole numbers of 64 bits are no greater than JSON holds exactly in every language.
+fn bound_integers(value: &mut Value) {
+    match value {
+        Value::Object(object) => {
+            if object.get("format").is_some_and(|format| format == "int64") {
+                let max = json!(MAX_EXACT);
+                object.entry("maximum").or_insert(max);
+            }
+            object.values_mut().for_each(bound_integers);
+        }
+        Value::Array(array) => array.iter_mut().for_each(bound_integers),
+        _ => {}
+    }
 }
 
 fn operations(document: &mut Value) -> impl Iterator<Item = &mut Value> {
@@ -56,12 +73,12 @@ fn complete_parameters(operation: &mut Value) {
     }
 }
 
-/// Answers tell the client's quotas, and refusals for one of them.
+/// Answers tell the client's quotas, and refusals for one of them (429).
 fn add_rate_limits(operation: &mut Value) {
     let header = |text: &str| json!({"description": text, "schema": {"type": "string"}});
     let responses = operation["responses"].as_object_mut();
     for (status, response) in responses.into_iter().flatten() {
-        if status.starts_with('2') || status == "429" {
+        if status.starts_with('2') || status == "4XX" {
             let text = "The client's quotas (draft-ietf-httpapi-ratelimit-headers).";
             response["headers"]["RateLimit-Policy"] = header(text);
             response["headers"]["RateLimit"] = header("What is left of them.");

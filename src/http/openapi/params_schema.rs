@@ -1,11 +1,14 @@
 //! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
 
 use crate::http::extract::overrides::{ParamOverrides, by_name};
+use crate::http::extract::settings::{MAX_EXACT, number_schema};
 use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
 use std::borrow::Cow;
-use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, SchemaFormat, Type};
-use utoipa::openapi::{Ref, RefOr};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{
+    AdditionalProperties, KnownFormat, ObjectBuilder, Schema, SchemaFormat, Type,
+};
 use utoipa::{Number, PartialSchema, ToSchema};
 
 impl ToSchema for ParamOverrides {
@@ -45,8 +48,9 @@ impl PartialSchema for ParametersText {
         let text = ObjectBuilder::new()
             .schema_type(Type::String)
             .format(Some(SchemaFormat::Custom("json".to_owned())))
-            .content_media_type("application/json")
-            .content_schema(Some(Ref::from_schema_name(ParamOverrides::name())));
+            .description(Some(
+                "A JSON object; its properties are those of the schema `Parameters`.",
+            ));
         text.build().into()
     }
 }
@@ -63,20 +67,20 @@ fn param(row: &Parameter, default: Option<Value>) -> Schema {
             greatest.map(Number::Float),
         ),
         "u32" => (Type::Integer, least.map(whole), greatest.map(whole)),
-        "u64" => (
-            Type::Integer,
-            Some(Number::UInt(0)),
-            Some(Number::UInt(usize::MAX)),
-        ),
         "bool" => (Type::Boolean, None, None),
         _ => (Type::String, None, None),
     };
     let choices = (!row.choices.is_empty()).then_some(row.choices.iter().copied());
-    let schema = ObjectBuilder::new()
-        .schema_type(schema_type)
+    let schema = match row.kind {
+        "u64" => number_schema(Type::Integer, MAX_EXACT),
+        kind => ObjectBuilder::new()
+            .schema_type(schema_type)
+            .format((kind == "u32").then_some(SchemaFormat::KnownFormat(KnownFormat::Int32)))
+            .minimum(minimum)
+            .maximum(maximum),
+    };
+    let schema = schema
         .description(Some(row.description.trim()))
-        .minimum(minimum)
-        .maximum(maximum)
         .enum_values(choices)
         .default(default);
     schema.build().into()

@@ -1,17 +1,12 @@
-//! The problem responses in the OpenAPI document: one for each status, with an example for each kind.
+//! The problem responses in the OpenAPI document: one for the client's faults and one for the service's, which name the
+//! kinds of the operation.
 
-use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
+use crate::http::problems::document::MEDIA_TYPE;
 use crate::http::problems::kind::Kind;
-use crate::http::problems::problem::Problem;
-use crate::sessions::{
-    QueueFull, ReplayError, SessionBusy, SnapshotError, StoreUnavailable, TooManySessions,
-};
-use bagtrack_ingest::IngestError;
-use bagtrack_tracker::TrackerError;
 use std::collections::BTreeMap;
+use utoipa::openapi::schema::{KnownFormat, SchemaFormat, Type};
 use utoipa::openapi::{
     ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder,
-    example::ExampleBuilder, schema::Type,
 };
 
 /// The problem that every operation may answer.
@@ -41,18 +36,18 @@ pub const UPLOAD: &[Kind] = &[
     Kind::Internal,
 ];
 
-/// The responses of these problems: one for each status, with an example for each kind.
+/// The responses of these problems, one for each class of statuses. Each kind leads to its section of the page about
+/// problems, which stands beside the document's.
 pub fn problem_responses(kinds: &[&[Kind]]) -> BTreeMap<String, RefOr<Response>> {
-    let mut by_status: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
+    let mut by_class: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
     for kind in kinds.concat() {
-        by_status
-            .entry(kind.status().as_u16())
-            .or_default()
-            .push(kind);
+        let class = kind.status().as_u16() / 100;
+        by_class.entry(class).or_default().push(kind);
     }
-    let responses = by_status
-        .into_iter()
-        .map(|(status, kinds)| (status.to_string(), RefOr::T(response(&kinds))));
+    let responses = by_class.into_iter().map(|(class, mut kinds)| {
+        kinds.sort();
+        (format!("{class}XX"), RefOr::T(response(&kinds)))
+    });
     responses.collect()
 }
 
@@ -73,91 +68,26 @@ macro_rules! operation_problems {
 }
 pub(crate) use operation_problems;
 
-const EXAMPLE_ID: &str = "1da43888-6f49-40f8-a05c-7bb628ba4f6a";
-
 fn response(kinds: &[Kind]) -> Response {
-    let titles: Vec<&str> = kinds.iter().map(|kind| kind.title()).collect();
-    let examples = kinds.iter().map(|kind| {
-        let (instance, id) = ("/sessions".to_owned(), EXAMPLE_ID.to_owned());
-        let document = ProblemDocument::new(&example(*kind), instance, id);
-        let value = serde_json::to_value(document).expect("a problem document is plain JSON");
-        let example = ExampleBuilder::new()
-            .summary(kind.title())
-            .value(Some(value));
-        (kind.slug(), example.build())
+    let links = kinds.iter().map(|kind| {
+        let (slug, status) = (kind.slug(), kind.status().as_u16());
+        format!("[{slug}](problems#{slug}) ({status})")
     });
+    let links: Vec<String> = links.collect();
     let content = ContentBuilder::new()
         .schema(Some(Ref::from_schema_name("Problem")))
-        .examples_from_iter(examples)
         .build();
     let mut response = ResponseBuilder::new()
-        .description(titles.join("; or: "))
+        .description(format!("A problem: {}", links.join(", ")))
         .content(MEDIA_TYPE, content);
     if kinds.iter().any(|kind| kind.retry_after().is_some()) {
-        let seconds = ObjectBuilder::new().schema_type(Type::Integer);
-        let header = HeaderBuilder::new()
-            .schema(Some(seconds))
-            .description(Some("Seconds after which trying again makes sense."));
+        let seconds = ObjectBuilder::new()
+            .schema_type(Type::Integer)
+            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Int32)));
+        let header = HeaderBuilder::new().schema(Some(seconds)).description(Some(
+            "Seconds after which trying again makes sense, with 429 and 503.",
+        ));
         response = response.header("Retry-After", header.build());
     }
     response.build()
-}
-
-fn example(kind: Kind) -> Problem {
-    match kind {
-        Kind::MalformedRequest => Problem::malformed("`box` is given twice; give it once."),
-        Kind::MissingFrame => Problem::missing_frame(),
-        Kind::MissingBox => Problem::missing_box(),
-        Kind::Unauthorized => Problem::unauthorized(),
-        Kind::Forbidden => Problem::forbidden(),
-        Kind::OriginNotAllowed => Problem::origin_not_allowed(),
-        Kind::HostNotAllowed => Problem::host_not_allowed(),
-        Kind::SessionExpired => Problem::session_expired(),
-        Kind::SessionExists => Problem::session_exists(),
-        Kind::IdempotencyKeyReused => Problem::idempotency_key_reused(),
-        Kind::RouteNotFound => Problem::route_not_found(),
-        Kind::SessionNotFound => Problem::session_not_found(),
-        Kind::MethodNotAllowed => Problem::method_not_allowed(),
-        Kind::BodyTimeout => Problem::body_timeout(),
-        Kind::NotInOrder => Problem::not_in_order(),
-        Kind::FrameOutOfOrder => Problem::from(ReplayError::OutOfOrder {
-            got: 9,
-            expected: 4,
-        }),
-        Kind::FrameDiffers => Problem::from(ReplayError::Differs {
-            got: 3,
-            expected: 4,
-        }),
-        Kind::BodyTooLarge => Problem::body_too_large(33_554_432),
-        Kind::RequestTooCostly => Problem::too_many_pixels(500_000_000, 160_000_000),
-        Kind::FrameTooLarge => {
-            let limit = "a side of 9000 px is over the limit of 8192 px".to_owned();
-            IngestError::TooLarge(limit).into()
-        }
-        Kind::TooManyFrames => Problem::too_many_frames(64),
-        Kind::UnsupportedImage => IngestError::UnknownFormat.into(),
-        Kind::FrameDamaged => Problem::from(IngestError::Damaged {
-            format: "JPEG",
-            reason: "the data ends early".to_owned(),
-        }),
-        Kind::FrameSizeMismatch => Problem::from(TrackerError::FrameSize {
-            width: 320,
-            height: 240,
-            got_width: 640,
-            got_height: 480,
-        }),
-        Kind::InvalidBox => Problem::from(TrackerError::Target("does not touch the frame")),
-        Kind::InvalidParameter => {
-            Problem::invalid_parameter("There is no parameter `colour`; the parameters are …")
-        }
-        Kind::InvalidSnapshot => SnapshotError::Damaged.into(),
-        Kind::SessionBusy => SessionBusy.into(),
-        Kind::QuotaExceeded => Problem::quota_exceeded("requests in flight", 64),
-        Kind::Internal => Problem::panicked(),
-        Kind::QueueFull => QueueFull.into(),
-        Kind::TooManySessions => TooManySessions(1024).into(),
-        Kind::WorkTimeout => Problem::work_timeout(),
-        Kind::NotReady => Problem::not_ready(),
-        Kind::StoreUnavailable => StoreUnavailable::default().into(),
-    }
 }

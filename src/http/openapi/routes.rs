@@ -12,6 +12,7 @@ use crate::http::resources::session;
 use crate::http::resources::snapshot;
 use crate::http::resources::token;
 use crate::http::resources::track;
+use crate::http::resources::version;
 use crate::http::state::AppState;
 use crate::http::stream::handshake;
 use utoipa::OpenApi;
@@ -27,8 +28,8 @@ use utoipa_axum::routes;
             session; every further frame gets a box back.\n\n\
             A frame is sent as a raw body (the settings are in the query), as `multipart/form-data`, or as JSON \
             with base64. Its type is taken from its bytes: JPEG, PNG or WebP. Boxes are in the pixels of the \
-            uploaded frame. Every error is a problem document (RFC 9457) and leaves the session as it was, but for \
-            `work-timeout`, which says what to do. Paths that do not exist answer `route-not-found` (404). \
+            uploaded frame. Every error is a [problem document](problems) (RFC 9457) and leaves the session as it \
+            was, but for `work-timeout`, which says what to do. The `type` of a problem opens as a page. Paths that do not exist answer `route-not-found` (404). \
             Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
             to hosts that are not allowed `host-not-allowed` (421).\n\n\
             Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \
@@ -78,6 +79,11 @@ pub fn metrics() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(metrics::get))
 }
 
+/// `/version`.
+pub fn version() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(version::get))
+}
+
 /// The probes, which everybody may use.
 pub fn probes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -89,6 +95,7 @@ pub fn probes() -> OpenApiRouter<AppState> {
 pub fn handlers() -> utoipa::openapi::OpenApi {
     OpenApiRouter::with_openapi(Api::openapi())
         .merge(sessions())
+        .merge(version())
         .merge(metrics())
         .merge(probes())
         .into_openapi()

@@ -1,34 +1,46 @@
-//! `/openapi.json`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
+//! `/openapi.json`, `/docs/problems`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
+use super::static_file::StaticFile;
 use crate::http::middleware::base_path::BasePath;
-use crate::http::middleware::security_headers::DOCS_POLICY;
+use crate::http::middleware::security_headers::{DOCS_POLICY, STRICT};
 use crate::http::openapi::document;
+use crate::http::problems::page;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::http::header::{CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE};
-use axum::response::{IntoResponse, Redirect, Response};
+use axum::http::HeaderMap;
+use axum::response::{Redirect, Response};
 use std::borrow::Cow;
-use std::sync::{Arc, LazyLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use utoipa_swagger_ui::Config;
 
 // The default validator is on another host.
 static SWAGGER: LazyLock<Arc<Config<'static>>> =
     LazyLock::new(|| Arc::new(Config::new(["../openapi.json"]).validator_url("none")));
 
+/// The files of Swagger UI that were asked for.
+static FILES: Mutex<BTreeMap<String, Arc<StaticFile>>> = Mutex::new(BTreeMap::new());
+
+static PROBLEMS: LazyLock<Arc<StaticFile>> = LazyLock::new(|| {
+    let html = "text/html; charset=utf-8";
+    StaticFile::new(html, DOCS_POLICY, "no-cache", page::page().into())
+});
+
 /// `/openapi.json` of a service below this path.
-pub fn document(base: &BasePath) -> Bytes {
+pub fn document(base: &BasePath) -> Arc<StaticFile> {
     let document = match base.as_str() {
         "" => document::document(),
         path => document::document_at(path),
     };
-    (document + "\n").into()
+    let bytes = (document + "\n").into();
+    StaticFile::new("application/json", STRICT, "no-cache", bytes)
 }
 
 /// `/openapi.json`, as it was made at the start.
-pub async fn served(document: Bytes) -> Response {
-    ([(CONTENT_TYPE, "application/json")], document).into_response()
+pub async fn served(document: Arc<StaticFile>, headers: HeaderMap) -> Response {
+    document.respond(&headers).await
 }
 
 /// `/docs`: the files of Swagger UI are relative to `/docs/`.
@@ -36,35 +48,43 @@ pub async fn redirect() -> Redirect {
     Redirect::to("/docs/")
 }
 
+/// `/docs/problems`: where the types of problems lead to.
+pub async fn problems(headers: HeaderMap) -> Response {
+    PROBLEMS.respond(&headers).await
+}
+
 /// `/docs/`.
-pub async fn index() -> Result<Response, Problem> {
-    file("")
+pub async fn index(headers: HeaderMap) -> Result<Response, Problem> {
+    Ok(file("")?.respond(&headers).await)
 }
 
 /// `/docs/{file}`.
-pub async fn asset(path: Result<Path<String>, PathRejection>) -> Result<Response, Problem> {
+pub async fn asset(
+    path: Result<Path<String>, PathRejection>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     let Path(path) = path.map_err(|_| Problem::route_not_found())?;
-    file(&path)
+    Ok(file(&path)?.respond(&headers).await)
 }
 
-fn file(path: &str) -> Result<Response, Problem> {
-    match utoipa_swagger_ui::serve(path, SWAGGER.clone()) {
-        Ok(Some(file)) => {
-            // No copy for each answer: a client may leave it unread.
-            let bytes = match file.bytes {
-                Cow::Borrowed(bytes) => Bytes::from_static(bytes),
-                Cow::Owned(bytes) => bytes.into(),
-            };
-            let headers = [
-                (CONTENT_TYPE, file.content_type),
-                (CACHE_CONTROL, "max-age=3600".to_owned()),
-                (CONTENT_SECURITY_POLICY, DOCS_POLICY.to_owned()),
-            ];
-            Ok((headers, bytes).into_response())
-        }
-        Ok(None) => Err(Problem::route_not_found()),
-        Err(error) => Err(Problem::internal(Arc::new(std::io::Error::other(
-            error.to_string(),
-        )))),
+/// A file of Swagger UI. Those that there are not are not kept.
+fn file(path: &str) -> Result<Arc<StaticFile>, Problem> {
+    // Nothing panics while it is held.
+    let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(file) = files.get(path) {
+        return Ok(file.clone());
     }
+    let found = utoipa_swagger_ui::serve(path, SWAGGER.clone());
+    let found = found.map_err(|error| {
+        let cause = std::io::Error::other(error.to_string());
+        Problem::internal(Arc::new(cause))
+    })?;
+    let found = found.ok_or_else(Problem::route_not_found)?;
+    let bytes = match found.bytes {
+        Cow::Borrowed(bytes) => Bytes::from_static(bytes),
+        Cow::Owned(bytes) => bytes.into(),
+    };
+    let file = StaticFile::new(found.content_type, DOCS_POLICY, "max-age=3600", bytes);
+    files.insert(path.to_owned(), file.clone());
+    Ok(file)
 }

@@ -2,4 +2,5 @@
 
 pub mod docs;
 pub mod sample_clips;
+mod static_file;
 pub mod static_files;

@@ -1,6 +1,8 @@
 //! `/sample/{clip}/…`: the synthetic clips of the page, drawn when they are asked for.
 //!
 //! Each frame is drawn once, one at a time, and kept: what the clips cost is bounded however often they are asked for.
+//! The first one takes up to a second, since the wall behind is drawn with it: whoever opens the page may want it next,
+//! so it is drawn then.
 
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
@@ -10,8 +12,10 @@ use axum::extract::rejection::PathRejection;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use bagtrack_sample::{Clip, Format, Scene, Settings};
+use image::ImageResult;
 use serde::Serialize;
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::{Arc, LazyLock, Once, OnceLock};
+use std::thread;
 use tokio::sync::Mutex;
 
 const FRAMES: u32 = 150;
@@ -70,12 +74,37 @@ impl Drawn {
             return Ok(bytes.clone());
         }
         let clip = self.clip.clone();
-        let draw = move || Format::Jpeg.encode(&clip.draw(index));
+        let draw = move || encode(&clip, index);
         let drawn = tokio::task::spawn_blocking(draw).await;
         let drawn = drawn.map_err(|_| Problem::panicked())?;
         let bytes = drawn.map_err(|error| Problem::internal(Arc::new(error)))?;
         Ok(frame.get_or_init(|| bytes.into()).clone())
     }
+
+    /// Draws the first frame. Who asks for it meanwhile waits for this one.
+    fn draw_first(&self) {
+        let _drawing = self.drawing.blocking_lock();
+        // One that cannot be drawn is told to whoever asks for it.
+        if let Ok(bytes) = encode(&self.clip, 0) {
+            self.frames[0].get_or_init(|| bytes.into());
+        }
+    }
+}
+
+fn encode(clip: &Clip, index: u32) -> ImageResult<Vec<u8>> {
+    Format::Jpeg.encode(&clip.draw(index))
+}
+
+/// Draws the clips' first frames in the background, once. No service waits for it, at its start or at its end.
+pub fn draw_ahead() {
+    static BEGUN: Once = Once::new();
+    BEGUN.call_once(|| {
+        let draw = || CLIPS.iter().for_each(Drawn::draw_first);
+        // Without a thread they are drawn when they are asked for.
+        let _ = thread::Builder::new()
+            .name("sample-clips".to_owned())
+            .spawn(draw);
+    });
 }
 
 fn find(name: &str) -> Result<&'static Drawn, Problem> {

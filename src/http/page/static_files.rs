@@ -2,16 +2,18 @@
 //!
 //! Browsers ask again each time, and get 304 as long as the program is the same.
 
+use super::static_file::StaticFile;
 use crate::http::middleware::base_path::client_path;
 use crate::http::middleware::security_headers::PAGE_POLICY;
+use crate::http::page::sample_clips;
 use crate::http::problems::problem::Problem;
+use axum::body::Bytes;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Request};
-use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, IF_NONE_MATCH,
-};
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
@@ -43,30 +45,48 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 16] = [
+const FILES: [File; 22] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
+    file!("camera.js", SCRIPT),
     file!("chart.js", SCRIPT),
     file!("clip.js", SCRIPT),
+    file!("file.js", SCRIPT),
+    file!("matroska.js", SCRIPT),
     file!("problems.js", SCRIPT),
+    file!("recording.js", SCRIPT),
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
+    file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
-    file!("video.js", SCRIPT),
+    client_file!("js/backoff.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
+    client_file!("js/kept.js"),
     client_file!("js/problem.js"),
     client_file!("js/session.js"),
     client_file!("js/stream.js"),
     client_file!("js/transport.js"),
 ];
 
+/// All of them, by their names.
+static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
+    let files = FILES.iter().chain([&INDEX]);
+    let served = files.map(|(name, media_type, text)| {
+        let bytes = Bytes::from_static(text.as_bytes());
+        let file = StaticFile::new(*media_type, PAGE_POLICY, "no-cache", bytes);
+        (*name, file)
+    });
+    served.collect()
+});
+
 /// `/`. Its links are relative, so a base path needs its slash.
 pub async fn index(request: Request) -> Response {
+    sample_clips::draw_ahead();
     let path = client_path(&request);
     match path.ends_with('/') {
-        true => respond(INDEX, request.headers()),
+        true => SERVED[INDEX.0].respond(request.headers()).await,
         false => Redirect::permanent("/").into_response(),
     }
 }
@@ -77,25 +97,7 @@ pub async fn asset(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let Path(path) = path.map_err(|_| Problem::route_not_found())?;
-    let file = FILES.iter().find(|(name, ..)| *name == path);
+    let file = SERVED.get(&*path).filter(|_| path != INDEX.0);
     let file = file.ok_or_else(Problem::route_not_found)?;
-    Ok(respond(*file, &headers))
-}
-
-fn respond((_, media_type, text): File, headers: &HeaderMap) -> Response {
-    let tag = format!("\"{:032x}\"", xxhash_rust::xxh3::xxh3_128(text.as_bytes()));
-    let known = headers
-        .get(IF_NONE_MATCH)
-        .and_then(|value| value.to_str().ok());
-    let is_known = known.is_some_and(|known| known.contains(&tag));
-    let headers = [
-        (CONTENT_TYPE, media_type.to_owned()),
-        (CONTENT_SECURITY_POLICY, PAGE_POLICY.to_owned()),
-        (CACHE_CONTROL, "no-cache".to_owned()),
-        (ETAG, tag),
-    ];
-    match is_known {
-        true => (StatusCode::NOT_MODIFIED, headers).into_response(),
-        false => (headers, text).into_response(),
-    }
+    Ok(file.respond(&headers).await)
 }

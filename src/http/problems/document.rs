@@ -14,8 +14,9 @@ pub const MEDIA_TYPE: &str = "application/problem+json";
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 #[schema(as = Problem)]
 pub struct ProblemDocument {
-    /// Names the kind of problem and never changes: `urn:bagtrack:problem:…`.
-    #[schema(example = "urn:bagtrack:problem:session-not-found")]
+    /// Names the kind of problem, and opens as a page with its causes and cure. Relative to the service; what follows `#`
+    /// never changes.
+    #[schema(format = "uri-reference", example = "/docs/problems#session-not-found")]
     r#type: String,
     /// The kind of problem in a few words.
     title: &'static str,
@@ -36,16 +37,16 @@ pub struct ProblemDocument {
     expected_frame: Option<u64>,
     /// Which frame of the request is meant, counted from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[schema(value_type = Option<u32>, nullable = false)]
     index: Option<usize>,
 }
 
 impl ProblemDocument {
-    /// The document of a problem, for the request to this path with this id.
-    pub fn new(problem: &Problem, instance: String, request_id: String) -> Self {
+    /// The document of a problem, for the request to this path with this id, of a service below a base path.
+    pub fn new(problem: &Problem, base_path: &str, instance: String, request_id: String) -> Self {
         let kind = problem.kind();
         Self {
-            r#type: kind.urn(),
+            r#type: kind.uri(base_path),
             title: kind.title(),
             status: kind.status().as_u16(),
             detail: problem.detail().to_owned(),
@@ -58,8 +59,14 @@ impl ProblemDocument {
 }
 
 /// The response that answers the request to this path with this id.
-pub fn respond(problem: &Problem, instance: String, request_id: String) -> Response {
-    let document = Json(ProblemDocument::new(problem, instance, request_id));
+pub fn respond(
+    problem: &Problem,
+    base_path: &str,
+    instance: String,
+    request_id: String,
+) -> Response {
+    let document = ProblemDocument::new(problem, base_path, instance, request_id);
+    let document = Json(document);
     let mut response = (problem.kind().status(), document).into_response();
     let headers = response.headers_mut();
     headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));

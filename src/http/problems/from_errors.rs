@@ -2,12 +2,12 @@
 
 use super::kind::Kind;
 use super::problem::Problem;
-use crate::sessions::{
-    ActError, BytesFull, FrameFault, FramesError, NoSession, OpenError, QueueFull, QuotaExhausted,
-    ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
+use bagtrack_ingest::IngestError;
+use bagtrack_sessions::{
+    ActError, BytesFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
+    QuotaExhausted, ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
     TooManySessions, TrackError, WorkPanicked,
 };
-use bagtrack_ingest::IngestError;
 use bagtrack_tracker::TrackerError;
 use std::sync::Arc;
 
@@ -36,6 +36,7 @@ impl From<IngestError> for Problem {
                 let detail = "The type is taken from the bytes; send a JPEG, PNG or WebP image.";
                 Self::new(Kind::UnsupportedImage, detail)
             }
+            IngestError::UnreadFormat(name) => Self::new(Kind::UnsupportedImage, unread(name)),
             IngestError::TooLarge(limit) => Self::new(
                 Kind::FrameTooLarge,
                 format!("{limit}. Send a smaller frame."),
@@ -46,6 +47,15 @@ impl From<IngestError> for Problem {
             }
         }
     }
+}
+
+/// What is said to an image of a type that is not read.
+fn unread(name: &str) -> String {
+    let cure = match name {
+        "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
+        _ => "Convert it, or let the camera or the browser make JPEGs.",
+    };
+    format!("The file has the format {name}, which is not read. Send JPEG, PNG or WebP. {cure}")
 }
 
 impl From<TrackerError> for Problem {
@@ -59,6 +69,12 @@ impl From<TrackerError> for Problem {
             }
             other => Self::internal(Arc::new(other)),
         }
+    }
+}
+
+impl From<ImplausibleBox> for Problem {
+    fn from(error: ImplausibleBox) -> Self {
+        Self::new(Kind::InvalidBox, error.to_string())
     }
 }
 
@@ -201,6 +217,7 @@ impl From<FramesError> for Problem {
                 count,
                 fault,
             } => Self::from(fault).of_frame(index, count),
+            FramesError::Box(error) => error.into(),
             FramesError::TooManyPixels { pixels, limit } => Self::too_many_pixels(pixels, limit),
         }
     }
@@ -216,6 +233,10 @@ impl From<OpenError> for Problem {
                     Self::from(error).of_target(target, count)
                 }
                 _ => error.into(),
+            },
+            OpenError::Box { error, listed } => match listed {
+                Some((target, count)) => Self::from(error).of_target(target, count),
+                None => error.into(),
             },
             OpenError::Snapshot(error) => error.into(),
             OpenError::Draining => Self::not_ready(),

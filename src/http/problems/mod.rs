@@ -5,10 +5,13 @@
 //! modules [turn into problems](from_errors) by `?`. The layer [`answer_problems`](crate::http::middleware::answer_problems) writes the
 //! [document](document), since it knows the path and the id of the request.
 //!
+//! The kinds make one catalogue. [The page](page) that the types of problems lead to is made from it, too.
+//!
 //! What can go wrong: a cause that reaches the client tells more than it should. So the document has no field for it.
 
 pub mod document;
 mod from_errors;
 pub mod kind;
 mod limits;
+pub mod page;
 pub mod problem;

@@ -70,6 +70,21 @@ impl Problem {
         Self::new(Kind::RouteNotFound, "See /docs for the paths there are.")
     }
 
+    /// No route has this path.
+    pub fn no_route(path: &str) -> Self {
+        match path.trim_end_matches('/') {
+            "" => Self::route_not_found(),
+            _ if !path.ends_with('/') => Self::route_not_found(),
+            shorter => {
+                let shorter: String = shorter.chars().take(100).collect();
+                let detail = format!(
+                    "Leave out the slash at the end: `{shorter}`. See /docs for the paths there are."
+                );
+                Self::new(Kind::RouteNotFound, detail)
+            }
+        }
+    }
+
     /// The request has no key, or none that is valid.
     pub fn unauthorized() -> Self {
         let detail =

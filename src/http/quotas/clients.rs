@@ -6,8 +6,8 @@
 use super::client::Client;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{ByteBudget, Held, Lane, QuotaExhausted, SessionQuota};
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use bagtrack_sessions::{ByteBudget, Flow, QuotaExhausted, Reservation, SessionQuota};
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
@@ -45,13 +45,13 @@ struct Quotas {
 pub struct Clients {
     quotas: Quotas,
     accounts: Mutex<HashMap<Client, Arc<Account>>>,
-    next_lane: AtomicU64,
+    next_flow: AtomicU64,
 }
 
 /// What one client has in use.
 #[derive(Debug)]
 pub struct Account {
-    lane: Lane,
+    flow: Flow,
     quotas: Quotas,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
@@ -90,7 +90,7 @@ impl Clients {
                 frames,
             },
             accounts: Mutex::default(),
-            next_lane: AtomicU64::new(0),
+            next_flow: AtomicU64::new(0),
         }
     }
 
@@ -103,8 +103,8 @@ impl Clients {
         if accounts.len() >= MAX_IDLE_ACCOUNTS {
             accounts.retain(|_, account| Arc::strong_count(account) > 1);
         }
-        let lane = Lane(self.next_lane.fetch_add(1, Ordering::Relaxed));
-        let account = Arc::new(Account::new(lane, self.quotas));
+        let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
+        let account = Arc::new(Account::new(flow, self.quotas));
         accounts.insert(client.clone(), account.clone());
         account
     }
@@ -142,14 +142,14 @@ impl Clients {
 }
 
 impl Account {
-    fn new(lane: Lane, quotas: Quotas) -> Self {
+    fn new(flow: Flow, quotas: Quotas) -> Self {
         let frames = quotas.frames.map(|(rate, burst)| {
             let quota = Quota::per_second(rate).allow_burst(burst);
             RateLimiter::direct(quota).with_middleware()
         });
         let permits = |count: usize| Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)));
         Self {
-            lane,
+            flow,
             quotas,
             sessions: permits(quotas.sessions),
             requests: permits(quotas.requests),
@@ -165,8 +165,8 @@ impl Account {
     }
 
     /// In whose turn the client's work is done.
-    pub fn lane(&self) -> Lane {
-        self.lane
+    pub fn flow(&self) -> Flow {
+        self.flow
     }
 
     /// Takes a place for a request in flight.
@@ -214,7 +214,7 @@ impl SessionQuota for ClientSessions {
         }
     }
 
-    fn reserve(&self, targets: usize) -> Result<Held, QuotaExhausted> {
+    fn reserve(&self, targets: usize) -> Result<Reservation, QuotaExhausted> {
         let places = u32::try_from(targets).unwrap_or(u32::MAX);
         let permit = self.0.sessions.clone().try_acquire_many_owned(places);
         let permit = permit.map_err(|_| self.0.too_many_sessions())?;
@@ -224,8 +224,8 @@ impl SessionQuota for ClientSessions {
 
 impl RequestPermit {
     /// In whose turn the request's work is done.
-    pub fn lane(&self) -> Lane {
-        self.account.lane
+    pub fn flow(&self) -> Flow {
+        self.account.flow
     }
 
     /// The bytes that the client may have inside.

@@ -8,12 +8,12 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, SessionState};
 use axum::Extension;
 use axum::extract::{Query, State};
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{ByteCharge, SessionState};
 use bagtrack_tracker::{BagEntry, VectorView};
 use image::{ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
@@ -30,7 +30,7 @@ const GROUND: Rgb<u8> = Rgb([24, 25, 28]);
 #[into_params(parameter_in = Query)]
 pub struct BagSettings {
     /// Whose bag, counted from 0, in a session that was opened with `boxes`.
-    #[param(required = false, nullable = false, default = 0)]
+    #[param(value_type = u32, required = false, nullable = false, maximum = 15, default = 0)]
     target: Option<usize>,
 }
 
@@ -78,7 +78,7 @@ pub async fn get(
     let queue = state
         .service
         .admission
-        .enter(request.lane(), Box::new(request))?;
+        .enter(request.flow(), Box::new(request))?;
     let draw = move |state: &SessionState| {
         let bag = state.bag(target);
         let bytes = draw(

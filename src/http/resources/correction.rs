@@ -1,7 +1,9 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::settings::{
+    ExactInput, ExactText, FrameCount, FrameNumber, Settings, TargetInput, TargetNumber, TargetText,
+};
 use crate::http::openapi::example_frames;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
@@ -12,9 +14,9 @@ use crate::http::respond::checkpoint::with_checkpoint;
 use crate::http::respond::json::Json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::state::AppState;
-use crate::sessions::{FrameBatch, GivenBox, Tracked};
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{FrameBatch, GivenBox, Tracked, box_warnings};
 use serde::Deserialize;
 
 /// The settings of a correction.
@@ -28,13 +30,13 @@ pub struct TargetSettings {
     #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    frame: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    frame: Option<FrameNumber>,
     /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    target: Option<WholeNumber>,
+    #[param(value_type = TargetText, inline, required = false)]
+    #[schema(value_type = TargetInput, inline, required = false)]
+    target: Option<TargetNumber>,
 }
 
 impl Settings for TargetSettings {
@@ -74,9 +76,8 @@ operation_problems!(
         TargetSettings,
     ),
     request_body(
-        description = "The frame in one of three forms.",
+        description = "The frame as a raw body (JPEG, PNG or WebP), as a form, or as JSON with base64.",
         content(
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
             (TargetForm = "multipart/form-data"),
             (
@@ -117,6 +118,7 @@ pub async fn put(
         }),
     );
     let targets = request.permit.session().target_count();
+    let size = request.permit.session().source_size();
     let queue = request.queue.for_frames(targets);
     let permit = request.permit;
     let queue = state.service.wait_for_turn(&permit, queue, number).await?;
@@ -126,7 +128,8 @@ pub async fn put(
         checkpoint,
         ..
     } = state.service.advance(permit, queue, next).await?;
-    let answer = Json(Answer::from(&estimates[0])).into_response();
+    let warnings = box_warnings(&[to.into()], size);
+    let answer = Json(Answer::from(&estimates[0]).with_warnings(warnings)).into_response();
     Ok(with_checkpoint(
         checkpoint,
         replayed_header(replayed, answer),

@@ -42,9 +42,8 @@ operation_problems!(
         CreateSettings,
     ),
     request_body(
-        description = "The first frame in one of three forms, or a snapshot.",
+        description = "The first frame as a raw body (JPEG, PNG or WebP), as a form, or as JSON with base64; or a snapshot.",
         content(
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
             (CreateForm = "multipart/form-data"),
             (

@@ -4,7 +4,7 @@ use crate::http::auth::caller::Caller;
 use crate::http::extract::admit::admit;
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
 use crate::http::extract::switch::Switch;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
@@ -15,9 +15,9 @@ use crate::http::quotas::clients::{Account, ClientSessions};
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
 use crate::http::state::AppState;
-use crate::sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
+use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
 use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
@@ -45,9 +45,9 @@ pub struct CreateSettings {
     #[param(nullable = false)]
     pub preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    pub seed: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    pub seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
     #[serde(rename = "parameters")]

@@ -2,7 +2,7 @@
 
 use super::snapshot::charged;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, FrameNumber, Settings};
 use crate::http::extract::switch::Switch;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
@@ -18,10 +18,11 @@ use crate::http::respond::json;
 use crate::http::respond::ndjson::{FrameSource, LineWork};
 use crate::http::respond::response_format::AnswerForm;
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, FrameBatch};
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_ingest::video::VideoFormat;
+use bagtrack_sessions::{ByteCharge, FrameBatch};
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -31,9 +32,9 @@ use std::sync::Arc;
 #[into_params(parameter_in = Query)]
 pub struct FramesSettings {
     /// The number of the (first) frame of this request.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    frame: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    frame: Option<FrameNumber>,
     /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
     /// has the answer as JSON.
     #[serde(default)]
@@ -87,12 +88,10 @@ operation_problems!(
         FramesSettings,
     ),
     request_body(
-        description = "The frame in one of three forms; the second and third take several.",
+        description = "The frame as a raw body (JPEG, PNG, WebP, or a video: MP4, WebM, GIF, Motion JPEG as \
+            `video/x-motion-jpeg`), as a form, or as JSON with base64. The last two take several frames.",
         content(
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
-            (BinaryBody = "video/mp4"), (BinaryBody = "video/webm"), (BinaryBody = "image/gif"),
-            (BinaryBody = "video/x-motion-jpeg"),
             (FramesForm = "multipart/form-data"),
             (FramesJson = "application/json", example = json!({"frame": example_frames::next()})),
         )
@@ -115,67 +114,100 @@ operation_problems!(
 )]
 pub async fn post(
     State(state): State<AppState>,
-    request: SessionRequest<FramesSettings>,
+    mut request: SessionRequest<FramesSettings>,
 ) -> Result<Response, Problem> {
-    let SessionRequest {
-        client,
-        form,
-        path,
-        request_id,
-        permit,
-        queue,
-        upload,
-    } = request;
-    let number = upload.settings.frame.map(|number| number.0);
-    let form = match upload.settings.draw.0 {
+    let number = request.upload.settings.frame.map(|number| number.0);
+    let form = match request.upload.settings.draw.0 {
         true => AnswerForm::Picture,
-        false => form,
+        false => request.form,
     };
-    let mut queue = state.service.wait_for_turn(&permit, queue, number).await?;
-    let (mut files, targets) = (upload.files, permit.session().target_count());
-    let frames = match (upload.video, form) {
+    let turn = state
+        .service
+        .wait_for_turn(&request.permit, request.queue, number);
+    request.queue = turn.await?;
+    match (request.upload.video.take(), form) {
         (Some(_), AnswerForm::Picture) => {
             let detail = "A drawn answer is one picture; leave out `draw` for a video.";
-            return Err(Problem::malformed(detail));
+            Err(Problem::malformed(detail))
         }
-        (Some(format), _) => {
-            let video = files.swap_remove(0);
-            let place;
-            (place, queue) = VideoPlace::take(&state, &client, queue).await?;
-            FrameSource::Video(VideoFrames::decode(&state, video, format, place)?)
-        }
-        (None, AnswerForm::Lines) => FrameSource::of_files(&state, queue.clone(), files).await?,
-        (None, AnswerForm::Picture) => {
-            let next = FrameBatch::posted(number, files, None);
-            let queue = queue.for_frames(targets);
-            return answer_drawn(&state, permit, queue, &client, next).await;
-        }
-        (None, AnswerForm::Json) => {
-            let queue = queue.for_frames(files.len() * targets);
-            let account = state.clients.account(&client);
-            // Before the frames are tracked: what cannot be answered must not count.
-            let mut charge = ByteCharge::new(&state.uploads, account.bytes());
-            charge.grow(answer_bytes(files.len(), targets))?;
-            let next = FrameBatch::posted(number, files, None);
-            let answered = state.service.advance(permit, queue, next).await?;
-            let answers = json::line(&FrameAnswers::from(&answered.estimates[..]));
-            let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
-            charge.shrink(answers.len());
-            let headers = [(CONTENT_TYPE, "application/json")];
-            let answers = (headers, charged(answers, charge)).into_response();
-            let response = replayed_header(answered.replayed, answers);
-            return Ok(with_checkpoint(answered.checkpoint, response));
-        }
-    };
-    let work = LineWork {
-        queue: queue.for_frames(targets),
+        (Some(format), _) => respond_to_video(state, request, format).await,
+        (None, AnswerForm::Lines) => respond_by_lines(state, request).await,
+        (None, AnswerForm::Picture) => respond_drawn(&state, request).await,
+        (None, AnswerForm::Json) => respond_at_once(&state, request).await,
+    }
+}
+
+/// All frames are tracked before the first is answered.
+async fn respond_at_once(
+    state: &AppState,
+    mut request: SessionRequest<FramesSettings>,
+) -> Result<Response, Problem> {
+    let (batch, targets) = (batch(&mut request), request.permit.session().target_count());
+    let queue = request.queue.for_frames(batch.files.len() * targets);
+    let account = state.clients.account(&request.client);
+    // Before the frames are tracked: what cannot be answered must not count.
+    let mut charge = ByteCharge::new(&state.uploads, account.bytes());
+    charge.grow(answer_bytes(batch.files.len(), targets))?;
+    let tracked = state.service.advance(request.permit, queue, batch).await?;
+    let answers = json::line(&FrameAnswers::from(&tracked.estimates[..]));
+    let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
+    charge.shrink(answers.len());
+    let headers = [(CONTENT_TYPE, "application/json")];
+    let answers = (headers, charged(answers, charge)).into_response();
+    let response = replayed_header(tracked.replayed, answers);
+    Ok(with_checkpoint(tracked.checkpoint, response))
+}
+
+async fn respond_drawn(
+    state: &AppState,
+    mut request: SessionRequest<FramesSettings>,
+) -> Result<Response, Problem> {
+    let batch = batch(&mut request);
+    let targets = request.permit.session().target_count();
+    let queue = request.queue.for_frames(targets);
+    answer_drawn(state, request.permit, queue, &request.client, batch).await
+}
+
+async fn respond_by_lines(
+    state: AppState,
+    mut request: SessionRequest<FramesSettings>,
+) -> Result<Response, Problem> {
+    let files = std::mem::take(&mut request.upload.files);
+    let frames = FrameSource::of_files(&state, request.queue.clone(), files).await?;
+    line_work(state, request, frames).answer().await
+}
+
+async fn respond_to_video(
+    state: AppState,
+    mut request: SessionRequest<FramesSettings>,
+    format: VideoFormat,
+) -> Result<Response, Problem> {
+    let video = request.upload.files.swap_remove(0);
+    let place;
+    (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let frames = FrameSource::Video(VideoFrames::decode(&state, video, format, place)?);
+    line_work(state, request, frames).answer().await
+}
+
+fn line_work(
+    state: AppState,
+    request: SessionRequest<FramesSettings>,
+    frames: FrameSource,
+) -> LineWork {
+    let targets = request.permit.session().target_count();
+    LineWork {
         state,
-        permit,
-        client,
+        queue: request.queue.for_frames(targets),
+        permit: request.permit,
+        client: request.client,
         frames,
-        number,
-        path,
-        request_id,
-    };
-    work.answer().await
+        number: request.upload.settings.frame.map(|number| number.0),
+        path: request.path,
+        request_id: request.request_id,
+    }
+}
+
+fn batch(request: &mut SessionRequest<FramesSettings>) -> FrameBatch {
+    let number = request.upload.settings.frame.map(|number| number.0);
+    FrameBatch::posted(number, std::mem::take(&mut request.upload.files), None)
 }

@@ -5,8 +5,8 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
-use crate::sessions::StoreUnavailable;
 use axum::extract::State;
+use bagtrack_sessions::StoreUnavailable;
 use serde::Serialize;
 
 /// The service runs.

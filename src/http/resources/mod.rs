@@ -10,6 +10,8 @@ pub mod create_named;
 pub mod create_request;
 pub mod frames;
 pub mod health;
+#[cfg(feature = "tls")]
+pub mod https_only;
 pub mod metrics;
 pub mod saturation;
 pub mod session;
@@ -17,3 +19,5 @@ pub mod session_path;
 pub mod snapshot;
 pub mod token;
 pub mod track;
+mod track_video;
+pub mod version;

@@ -4,9 +4,9 @@ use crate::http::auth::caller::Caller;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use crate::sessions::Session;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
+use bagtrack_sessions::Session;
 use std::sync::Arc;
 use uuid::Uuid;
 

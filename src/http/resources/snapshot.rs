@@ -8,13 +8,13 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use crate::sessions::ByteCharge;
 use axum::Extension;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::State;
 use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::ByteCharge;
 use http_body_util::Full;
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -69,7 +69,7 @@ pub async fn get(
     let queue = state
         .service
         .admission
-        .enter(client.lane(), Box::new(client))?;
+        .enter(client.flow(), Box::new(client))?;
     let bytes = state
         .service
         .snapshot(session.read_permit()?, queue)

@@ -1,28 +1,35 @@
 //! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
 
 use super::snapshot::charged;
+use super::track_video::{self, VideoRequest};
 use crate::http::auth::caller::Caller;
 use crate::http::extract::admit::admit;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{FrameCount, NumberInput, NumberText, Settings, WholeNumber};
+use crate::http::extract::settings::{
+    ExactInput, ExactText, FrameCount, Seed, Settings, TargetInput, TargetNumber, TargetText,
+};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
+use crate::http::middleware::base_path::client_path;
+use crate::http::middleware::request_id;
 use crate::http::openapi::example_frames;
 use crate::http::openapi::params_schema::ParametersText;
 use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes};
 use crate::http::respond::json;
 use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
 use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
 use crate::http::state::AppState;
-use crate::sessions::{ByteCharge, GivenBox, TrackFrom, TrackedAway};
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{Boxes, ByteCharge, GivenBox, TrackFrom, TrackedAway};
+use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
@@ -43,17 +50,17 @@ pub struct TrackSettings {
     #[schema(value_type = BoxesInput, inline, required = false)]
     boxes: Option<TargetBoxes>,
     /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    target: Option<WholeNumber>,
+    #[param(value_type = TargetText, inline, required = false)]
+    #[schema(value_type = TargetInput, inline, required = false)]
+    target: Option<TargetNumber>,
     /// `robust` (the default) or `paper`. Only without a snapshot.
     #[param(nullable = false)]
     preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
     /// snapshot.
-    #[param(value_type = NumberText, inline, required = false)]
-    #[schema(value_type = NumberInput, inline, required = false)]
-    seed: Option<WholeNumber>,
+    #[param(value_type = ExactText, inline, required = false)]
+    #[schema(value_type = ExactInput, inline, required = false)]
+    seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
     #[serde(rename = "parameters")]
     #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
@@ -63,6 +70,7 @@ pub struct TrackSettings {
 impl Settings for TrackSettings {
     const FRAMES: FrameCount = FrameCount::Several;
     const TAKES_SNAPSHOT: bool = true;
+    const TAKES_VIDEO: bool = true;
     const SCHEMA_PREFIX: &'static str = "Track";
 }
 
@@ -101,12 +109,19 @@ operation_problems!(
 /// or to another one with the same secret (`BAGTRACK_SNAPSHOT_KEYS`). Nothing is kept here, so the same request gets
 /// the same answer again, but for the random seed of a new track.
 ///
+/// A video and a box are tracked to the video's end, where the service has an `ffmpeg`: a line of JSON for each frame
+/// (`application/x-ndjson`), as soon as it is tracked, the first one being the box. Where the rest cannot be tracked,
+/// the last line is a problem document.
+///
+/// `curl -N --data-binary @clip.mp4 'http://localhost:8080/track?box=10,20,30,40'`
+///
 /// `curl -F frame=@next.jpg -F snapshot=@last.snapshot http://localhost:8080/track`
 #[utoipa::path(
     post, path = "/track", tag = "sessions", operation_id = "track",
     params(TrackSettings),
     request_body(
-        description = "The frames and the snapshot. A raw frame begins a track.",
+        description = "The frames and the snapshot. A raw frame begins a track; so does a video (MP4, WebM, GIF, Motion \
+            JPEG as `video/x-motion-jpeg`).",
         content(
             (TrackForm = "multipart/form-data"),
             (
@@ -117,24 +132,47 @@ operation_problems!(
                     "seed": 7
                 })
             ),
-            (BinaryBody = "image/jpeg"), (BinaryBody = "image/png"), (BinaryBody = "image/webp"),
             (BinaryBody = "application/octet-stream"),
         )
     ),
     responses(
-        (status = 200, description = "Where the target is, and the new snapshot", body = Tracked),
+        (
+            status = 200, description = "Where the target is, and the new snapshot; for a video, a line for each frame",
+            content((Tracked = "application/json"), (String = "application/x-ndjson"))
+        ),
         Problems
     )
 )]
 pub async fn post(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
     let texts = Texts::of_query::<TrackSettings>(request.uri())?;
+    let (path, request_id) = (client_path(&request), request_id::of(&request));
     let (mut parts, body) = request.into_parts();
     let caller = Caller::from_request_parts(&mut parts, &state).await?;
     caller.require_key()?;
+    let client = Client::of(&parts);
     let admitted = admit(&state, &parts)?;
     let mut charge = ByteCharge::new(&state.uploads, admitted.bytes());
     let request = Request::from_parts(parts, body);
-    let (upload, queue) = Upload::read(&state, admitted, texts, request).await?;
+    let (mut upload, queue) = Upload::read(&state, admitted, texts, request).await?;
+    if let Some(format) = upload.video {
+        if upload.snapshot.is_some() {
+            let detail = "A video begins a track; leave out the snapshot.";
+            return Err(Problem::malformed(detail));
+        }
+        let video = upload.files.swap_remove(0);
+        let (boxes, params) = begin(upload.settings)?;
+        let request = VideoRequest {
+            video,
+            format,
+            boxes,
+            params,
+            queue,
+            client,
+            path,
+            request_id,
+        };
+        return track_video::answer(state, request).await;
+    }
     let (from, files) = asked(upload)?;
     let answer = move |tracked: TrackedAway| {
         let body = answer_body(&tracked, &mut charge)?;
@@ -147,17 +185,23 @@ pub async fn post(State(state): State<AppState>, request: Request) -> Result<Res
     Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
 }
 
+/// What a new track begins with.
+fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
+    if settings.target.is_some() {
+        let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
+        return Err(Problem::malformed(detail));
+    }
+    let params = overrides::resolve(settings.preset, settings.seed, settings.params)?;
+    let boxes = boxes_of(settings.r#box, settings.boxes.as_ref())?;
+    Ok((boxes, Box::new(params)))
+}
+
 /// Where the track stands, and the frames.
 fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Problem> {
     let (settings, files) = (upload.settings, upload.files);
     let Some(snapshot) = upload.snapshot else {
-        if settings.target.is_some() {
-            let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
-            return Err(Problem::malformed(detail));
-        }
-        let params = overrides::resolve(settings.preset, settings.seed, settings.params)?;
-        let boxes = boxes_of(settings.r#box, settings.boxes.as_ref())?;
-        return Ok((TrackFrom::Start(boxes, Box::new(params)), files));
+        let (boxes, params) = begin(settings)?;
+        return Ok((TrackFrom::Start(boxes, params), files));
     };
     let allowed = TrackSettings {
         r#box: settings.r#box,
@@ -189,7 +233,7 @@ fn answer_body(tracked: &TrackedAway, charge: &mut ByteCharge) -> Result<Vec<u8>
     let targets = estimates.first().map_or(1, |first| first.as_slice().len());
     charge.grow(2 * text + answer_bytes(estimates.len(), targets))?;
     let tracked = Tracked {
-        answers: FrameAnswers::from(estimates),
+        answers: FrameAnswers::from(estimates).with_warnings(tracked.warnings.clone()),
         snapshot: STANDARD.encode(snapshot),
     };
     let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;

@@ -7,12 +7,12 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::snapshot::charged;
 use crate::http::state::AppState;
-use crate::sessions::{
-    ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
-};
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{
+    ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
+};
 use bagtrack_tracker::Seen;
 use std::sync::Arc;
 

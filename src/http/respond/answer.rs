@@ -1,8 +1,8 @@
 //! Answers as they are sent.
 
 use super::target_box::TargetBox;
-use crate::sessions::{Estimates, PerTarget};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{Estimates, PerTarget};
 use bagtrack_tracker::{Estimate, Status};
 use serde::Serialize;
 
@@ -45,6 +45,10 @@ pub struct Answer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, min_items = 1, max_items = 16)]
     targets: Option<Vec<TargetView>>,
+    /// What may be wrong with the box that the request gave, in words for people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, min_items = 1)]
+    warnings: Option<Vec<String>>,
 }
 
 /// Where a target is.
@@ -69,6 +73,14 @@ impl From<&Estimate> for TargetView {
     }
 }
 
+impl Answer {
+    /// With what may be wrong with the box that was given, where anything is.
+    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
+        self.warnings = warnings;
+        self
+    }
+}
+
 impl From<&Estimates> for Answer {
     fn from(estimates: &Estimates) -> Self {
         let first = estimates.first();
@@ -79,6 +91,7 @@ impl From<&Estimates> for Answer {
                 PerTarget::One(_) => None,
                 PerTarget::List(list) => Some(list.iter().map(TargetView::from).collect()),
             },
+            warnings: None,
         }
     }
 }
@@ -108,6 +121,14 @@ impl From<&[Estimates]> for FrameAnswers {
             last: (&estimates[estimates.len() - 1]).into(),
             answers: (estimates.len() > 1).then(all),
         }
+    }
+}
+
+impl FrameAnswers {
+    /// With what may be wrong with the box that was given, where anything is.
+    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
+        self.last = self.last.with_warnings(warnings);
+        self
     }
 }
 

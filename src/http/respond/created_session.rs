@@ -5,10 +5,10 @@ use super::checkpoint::with_checkpoint;
 use super::json::Json;
 use super::target_box::TargetBox;
 use crate::http::extract::overrides::ParamOverrides;
-use crate::sessions::{Opened, PerTarget, Session};
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{Opened, PerTarget, Session, box_warnings};
 use bagtrack_tracker::Params;
 use serde::Serialize;
 use std::time::{Duration, SystemTime};
@@ -28,6 +28,10 @@ pub struct CreatedSession {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, min_items = 1, max_items = 16)]
     boxes: Option<Vec<TargetBox>>,
+    /// What may be wrong with the boxes, in words for people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, min_items = 1)]
+    warnings: Option<Vec<String>>,
     /// The size that all frames of the session have.
     image: ImageSize,
     /// With `verbose`: the tracker's parameters, with the seed that was drawn when none was given.
@@ -43,17 +47,24 @@ impl CreatedSession {
     fn of(session: &Session, is_verbose: bool) -> Self {
         let opening = session.opening();
         let expires = SystemTime::UNIX_EPOCH + Duration::from_secs(opening.expires);
+        let frame = opening.estimates.first().frame;
+        let given = opening.estimates.map(|estimate| estimate.target);
+        // The box of a snapshot is the tracker's.
+        let warnings = (frame == 0)
+            .then(|| box_warnings(given.as_slice(), session.source_size()))
+            .flatten();
         let boxes = opening
             .estimates
             .map(|estimate| TargetBox::answered(estimate.target));
         Self {
             id: session.id(),
-            frame: opening.estimates.first().frame,
+            frame,
             r#box: TargetBox::answered(opening.estimates.first().target),
             boxes: match boxes {
                 PerTarget::One(_) => None,
                 PerTarget::List(list) => Some(list),
             },
+            warnings,
             image: session.source_size().into(),
             params: is_verbose.then(|| session.params().clone()),
             expires_at: humantime::format_rfc3339_seconds(expires).to_string(),

@@ -9,29 +9,26 @@
 use super::json;
 use super::response_format;
 use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::count_frame;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use crate::http::stream::message::StreamAnswer;
-use crate::sessions::{
-    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
-    check_readable_pixels,
-};
 use axum::body::{Body, Bytes, HttpBody};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{
+    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
+    check_readable_pixels,
+};
 use http_body::Frame;
 use std::convert::Infallible;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
-use std::time::Duration;
 use std::vec::IntoIter;
-use tokio::time::{Instant, sleep, timeout_at};
+use tokio::time::{Instant, timeout_at};
 use tracing::Instrument;
-
-/// How long a frame of a video waits before it asks for a place in the quota again.
-const RETRY: Duration = Duration::from_millis(20);
 
 /// Where frames come from.
 #[derive(Debug)]
@@ -92,7 +89,7 @@ impl LineWork {
     pub async fn answer(mut self) -> Result<Response, Problem> {
         if self.number.is_some() {
             // What is compared with the number must be the newest.
-            let flow = self.queue.lane();
+            let flow = self.queue.flow();
             let session = self.permit.session();
             self.state.service.refresh(session, None, flow).await?;
         }
@@ -140,7 +137,7 @@ impl LineWork {
             return Ok(answer.with_checkpoint(session.checkpoint()));
         }
         if matches!(self.frames, FrameSource::Video(_)) {
-            self.count_frame().await?;
+            count_frame(&self.state, &self.client).await?;
         }
         let mut next = FrameBatch::posted(self.number, vec![file], None);
         // So that the request can be sent again when its line breaks.
@@ -151,18 +148,6 @@ impl LineWork {
         self.number = Some(estimates.first().frame + 1);
         let answer = StreamAnswer::new(estimates, 0, answered.replayed, state.is_draining());
         Ok(answer.with_checkpoint(answered.checkpoint))
-    }
-
-    /// Waits for a place in the quota of frames.
-    async fn count_frame(&self) -> Result<(), Problem> {
-        let account = self.state.clients.account(&self.client);
-        let deadline = Instant::now() + self.state.config.work_timeout;
-        loop {
-            match account.count_frames(1) {
-                Err(_) if Instant::now() < deadline => sleep(RETRY).await,
-                counted => return counted,
-            }
-        }
     }
 
     /// The next line, and what follows it.
@@ -186,7 +171,8 @@ impl LineWork {
         let cause = cause.as_deref().unwrap_or("none");
         tracing::info!(kind, cause, "problem of a later frame");
         let (path, id) = (self.path.clone(), self.request_id.clone());
-        line(&ProblemDocument::new(problem, path, id)).unwrap_or_default()
+        let base = self.state.config.base_path.as_str();
+        line(&ProblemDocument::new(problem, base, path, id)).unwrap_or_default()
     }
 }
 

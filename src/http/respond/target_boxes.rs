@@ -1,15 +1,15 @@
 //! Lists of boxes as they are received, one for each target.
 
-use super::target_box::{BoxInput, NUMBER, TargetBox, box_forms};
+use super::target_box::{BoxInput, NUMBER, TargetBox};
 use crate::http::problems::problem::Problem;
-use crate::sessions::{Boxes, MAX_TARGETS, PerTarget};
+use bagtrack_sessions::{Boxes, MAX_TARGETS, PerTarget};
 use bagtrack_tracker::Rect;
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;
 use std::borrow::Cow;
 use std::str::FromStr;
 use utoipa::openapi::schema::{AnyOfBuilder, ArrayBuilder, ObjectBuilder, Schema, Type};
-use utoipa::openapi::{RefOr, SchemaFormat};
+use utoipa::openapi::{Ref, RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
 /// The boxes of the targets, 1 to [`MAX_TARGETS`].
@@ -103,7 +103,7 @@ impl PartialSchema for BoxesText {
     }
 }
 
-/// A list of boxes in a JSON body: an array of boxes, or a text.
+/// A list of boxes in a JSON body; see [`BoxInput`].
 #[derive(Debug)]
 pub struct BoxesInput;
 
@@ -116,14 +116,13 @@ impl ToSchema for BoxesInput {
 impl PartialSchema for BoxesInput {
     fn schema() -> RefOr<Schema> {
         let list = ArrayBuilder::new()
-            .items(box_forms())
+            .items(Ref::from_schema_name(TargetBox::name()))
             .min_items(Some(1))
             .max_items(Some(MAX_TARGETS));
-        let forms = AnyOfBuilder::new()
+        AnyOfBuilder::new()
             .item(list)
-            .item(text_schema())
-            .item(ObjectBuilder::new().schema_type(Type::Null));
-        forms.into()
+            .item(ObjectBuilder::new().schema_type(Type::Null))
+            .into()
     }
 }
 

@@ -6,8 +6,8 @@
 //! its memory is charged. Where there is none the client waits: nothing more is read from it.
 
 use crate::http::net::least_rate::LeastRate;
-use crate::sessions::{ByteBudget, ByteCharge, BytesFull};
 use arrayvec::ArrayVec;
+use bagtrack_sessions::{ByteBudget, ByteCharge, BytesFull};
 use bytes::{Buf, BytesMut};
 use std::future::poll_fn;
 use std::io;

@@ -6,11 +6,11 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
-use crate::sessions::{
+use bagtrack_sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
-    Tracked,
+    Tracked, box_warnings,
 };
-use bagtrack_tracker::Seen;
+use bagtrack_tracker::{Rect, Seen};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -51,6 +51,8 @@ pub struct Given {
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
     pub seen: Option<Seen>,
+    /// What may be wrong with the box that came with it.
+    pub warnings: Option<Vec<String>>,
     /// The last frame whose state is in the store.
     pub checkpoint: Option<u64>,
 }
@@ -110,7 +112,7 @@ impl FrameWork {
         let queue = state
             .service
             .admission
-            .enter(request.lane(), Box::new(request.clone()))?;
+            .enter(request.flow(), Box::new(request.clone()))?;
         request.count_frames(1)?;
         let targets = session.session().target_count();
         Ok((session, queue.for_frames(targets)))
@@ -124,7 +126,7 @@ impl FrameWork {
         if caller.has_ended(state.now()) || !has_key {
             return Err(Problem::unauthorized());
         }
-        let flow = self.account.lane();
+        let flow = self.account.flow();
         Ok(state
             .service
             .find(self.session, caller.owner(), flow)
@@ -138,7 +140,7 @@ impl FrameWork {
     /// The token has ended, or the key; or the session.
     pub async fn check_newest(&self) -> Result<(), Problem> {
         let session = self.find().await?;
-        let flow = self.account.lane();
+        let flow = self.account.flow();
         self.state.service.refresh(&session, None, flow).await?;
         self.place.has_ended(&session);
         Ok(())
@@ -180,7 +182,11 @@ impl FrameWork {
             };
             let at = session.session().clone();
             match self.state.service.advance(session, queue, next).await {
-                Ok(answered) => return Ok(Given::of(answered, shown)),
+                Ok(answered) => {
+                    let given = header.r#box.map(Rect::from);
+                    let warnings = box_warnings(given.as_slice(), at.source_size());
+                    return Ok(Given::of(answered, shown, warnings));
+                }
                 Err(FramesError::Act(ActError::Store(_))) if Instant::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
                     number = number.or(Some(at.latest_frame() + 1));
@@ -195,13 +201,14 @@ impl FrameWork {
 
 impl Given {
     /// The answer to one frame, with what the tracker of this target saw.
-    fn of(mut answered: Tracked, target: usize) -> Self {
+    fn of(mut answered: Tracked, target: usize, warnings: Option<Vec<String>>) -> Self {
         let seen =
             (target < answered.diagnostics.len()).then(|| answered.diagnostics.swap_remove(target));
         Self {
             estimates: answered.estimates.swap_remove(0),
             replayed: answered.replayed,
             seen,
+            warnings,
             checkpoint: answered.checkpoint,
         }
     }

@@ -15,10 +15,10 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
 use crate::http::state::AppState;
-use crate::sessions::{Lane, ReplayError, Session, StreamPlace};
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
 use axum::response::Response;
+use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
 use serde::Deserialize;
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -99,7 +99,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let permit = account.stream()?;
     // The stream before this one tracks no further frame.
     let place = Arc::new(state.service.streams.take(session.id()));
-    let stand = stand(&state, &session, account.lane(), &place, settings.from).await?;
+    let stand = stand(&state, &session, account.flow(), &place, settings.from).await?;
     let newest_wins = settings.drop.0;
     let max_bytes = max_message_bytes(&state, &session);
     let budgets = [state.uploads.clone(), account.bytes().clone()];
@@ -147,7 +147,7 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
 async fn stand(
     state: &AppState,
     session: &Arc<Session>,
-    flow: Lane,
+    flow: Flow,
     place: &StreamPlace,
     from: Option<u64>,
 ) -> Result<Stand, Problem> {

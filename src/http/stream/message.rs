@@ -3,7 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
 use crate::http::respond::target_box::TargetBox;
-use crate::sessions::{Estimates, GivenBox};
+use bagtrack_sessions::{Estimates, GivenBox};
 use bagtrack_tracker::Seen;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
@@ -144,6 +144,12 @@ impl StreamAnswer {
     /// With the last frame whose state is in the store.
     pub fn with_checkpoint(mut self, checkpoint: Option<u64>) -> Self {
         self.checkpoint = checkpoint;
+        self
+    }
+
+    /// With what may be wrong with the box that was given, where anything is.
+    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
+        self.answer = self.answer.with_warnings(warnings);
         self
     }
 

@@ -10,8 +10,8 @@ use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::sessions::{ByteCharge, BytesFull, Estimates};
 use axum::body::Bytes;
+use bagtrack_sessions::{ByteCharge, BytesFull, Estimates};
 use futures_util::stream::FusedStream;
 use futures_util::{SinkExt, StreamExt};
 use serde::Serialize;
@@ -145,10 +145,11 @@ impl SessionStream {
                     }
                     counts.skipped += skipped;
                     match answer {
-                        Ok(Given { estimates, replayed, seen, checkpoint }) => {
+                        Ok(Given { estimates, replayed, seen, warnings, checkpoint }) => {
                             counts.answered += 1;
                             let answer = self.answer(&estimates, skipped, replayed);
                             let answer = answer.with_seen(seen).with_checkpoint(checkpoint);
+                            let answer = answer.with_warnings(warnings);
                             self.send(socket, &answer).await?;
                         }
                         Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
@@ -212,7 +213,8 @@ impl SessionStream {
             tracing::error!(problem = problem.kind().slug(), %cause, "a frame failed");
         }
         let (path, id) = (self.path.clone(), self.request_id.clone());
-        let document = ProblemDocument::new(problem, path, id);
+        let base = self.work.state.config.base_path.as_str();
+        let document = ProblemDocument::new(problem, base, path, id);
         self.send(socket, &document).await
     }
 

@@ -4,7 +4,6 @@ use super::fragments::Fragments;
 use crate::http::net::connection_io::ConnectionIo;
 use crate::http::net::least_rate::LeastRate;
 use crate::http::problems::problem::Problem;
-use crate::sessions::ByteBudget;
 use axum::extract::FromRequestParts;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::http::header::{
@@ -13,6 +12,7 @@ use axum::http::header::{
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::ByteBudget;
 use hyper::upgrade::OnUpgrade;
 use hyper_util::rt::TokioIo;
 use tokio_tungstenite::WebSocketStream;

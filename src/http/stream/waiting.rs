@@ -2,8 +2,8 @@
 
 use super::message::FrameHeader;
 use crate::http::problems::problem::Problem;
-use crate::sessions::ByteCharge;
 use axum::body::Bytes;
+use bagtrack_sessions::ByteCharge;
 use std::collections::VecDeque;
 
 /// Frames that wait behind the one at work. The next one is there when that is done; more would only wait here in place
@@ -93,7 +93,7 @@ impl Waiting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sessions::ByteBudget;
+    use bagtrack_sessions::ByteBudget;
 
     fn frame(name: &'static str, corrects: bool) -> Result<ArrivedFrame, Problem> {
         let budget = ByteBudget::new(1);

@@ -1,6 +1,7 @@
 //! A session at the service: where it stands there, and how it goes on when frames or the whole session are lost.
+//! docs/PROTOCOL.md says what is done when.
 
-mod care;
+mod checkpoint;
 
 use crate::answer::Answer;
 use crate::backoff::Backoff;
@@ -23,7 +24,7 @@ pub struct Remote {
     /// The last frame whose answer the caller has.
     answered: u64,
     /// The last frame that the service has, as far as is known.
-    at: u64,
+    last_acknowledged: u64,
     kept: Kept,
     snapshot_every: u64,
     resent: u64,
@@ -96,7 +97,7 @@ impl Remote {
             transport,
             id: created.id,
             answered: created.frame,
-            at: created.frame,
+            last_acknowledged: created.frame,
             kept,
             snapshot_every: u64::from(snapshot_every).min(MOST as u64 / 2),
             resent: 0,
@@ -122,13 +123,14 @@ impl Remote {
         // It is kept before it is sent: a call that is dropped counts as one without answer.
         self.kept.put(before + 1, upload);
         let delivered = self.deliver(before + 1).await;
-        if let Err(ClientError::Refused(_) | ClientError::NotKept { .. }) = delivered {
-            self.kept.forget_after(self.at.max(self.answered));
+        if let Err(ClientError::Refused(_)) = delivered {
+            self.kept
+                .forget_after(self.last_acknowledged.max(self.answered));
         }
         let answers = delivered?;
         if let Some(last) = answers.last() {
             self.answered = last.frame;
-            self.look_after(last).await;
+            self.checkpoint(last).await;
         }
         Ok(answers)
     }
@@ -136,15 +138,16 @@ impl Remote {
     /// Brings the service up to this frame; the answers to the request that has it.
     async fn deliver(&mut self, number: u64) -> Result<Vec<Answer>, ClientError> {
         let mut backoff = Backoff::new(self.transport.retry_for);
+        let mut has_recovered = false;
         loop {
-            let next = (self.at + 1).min(number);
+            let next = (self.last_acknowledged + 1).min(number);
             let upload = self.kept.from(next);
             let upload = upload.ok_or(ClientError::NotKept { frame: next })?;
             let reply = self.transport.call(&upload.request(self.id, next)).await?;
             let problem = match reply.checked() {
                 Ok(reply) => {
                     let last = upload.last(next);
-                    self.at = self.at.max(last);
+                    self.last_acknowledged = self.last_acknowledged.max(last);
                     self.resent += (next..=last.min(self.answered)).count() as u64;
                     if last < number {
                         continue;
@@ -153,26 +156,42 @@ impl Remote {
                 }
                 Err(problem) => problem,
             };
-            let expected = problem.expected_frame.filter(|&expected| expected < next);
-            let (is_gone, goes_back) = (is_gone(&problem), expected.is_some());
-            // Where every replica loses the session again, this ends with the time for retries.
-            if !(is_gone || goes_back) || !backoff.wait(None).await {
+            let expected = problem
+                .expected_frame
+                .filter(|&expected| match expected < next {
+                    true => self.kept.from(expected).is_some(),
+                    // It has frames already that were sent again.
+                    false => next < expected && expected <= number,
+                });
+            if !is_gone(&problem) && expected.is_none() {
                 return Err(problem.into());
             }
+            // Where every replica loses the session again, this ends with the time for retries.
+            if has_recovered && !backoff.wait(None).await {
+                return Err(problem.into());
+            }
+            has_recovered = true;
             match expected {
-                Some(expected) => self.at = expected.saturating_sub(1),
-                None => self.open_again(problem).await?,
+                Some(expected) => self.last_acknowledged = expected.saturating_sub(1),
+                None => self.reopen(problem).await?,
             }
         }
     }
 
     /// Opens the session again after the service has lost it.
-    async fn open_again(&mut self, lost: Box<Problem>) -> Result<(), ClientError> {
+    async fn reopen(&mut self, mut lost: Box<Problem>) -> Result<(), ClientError> {
         let Some(origin) = self.kept.origin() else {
             return Err(lost.into());
         };
-        let created = create(&mut self.transport, origin).await?;
-        (self.id, self.at) = (created.id, created.frame);
+        let created = match create(&mut self.transport, origin).await {
+            // Such as a service with other keys, which does not take the snapshot.
+            Err(ClientError::Refused(problem)) => {
+                lost.detail += &format!(" It could not be opened again: {problem}");
+                return Err(lost.into());
+            }
+            created => created?,
+        };
+        (self.id, self.last_acknowledged) = (created.id, created.frame);
         Ok(())
     }
 
@@ -184,10 +203,10 @@ impl Remote {
         let reply = self.transport.call(&self.request_snapshot()).await?;
         match reply.checked() {
             Ok(reply) => return Ok(reply.body),
-            Err(problem) if is_gone(&problem) => self.open_again(problem).await?,
+            Err(problem) if is_gone(&problem) => self.reopen(problem).await?,
             Err(problem) => return Err(problem.into()),
         }
-        if self.at < self.answered {
+        if self.last_acknowledged < self.answered {
             self.deliver(self.answered).await?;
         }
         let reply = self.transport.call(&self.request_snapshot()).await?;

@@ -240,3 +240,15 @@ fn a_broken_sequence_is_told_in_one_line_that_names_the_folder() {
     });
     assert!(line.contains("no JPEG, PNG or WebP frames"), "{line}");
 }
+
+#[test]
+fn the_help_lists_the_parameters_and_the_short_help_points_there() {
+    let help = succeeds(&["--help"]);
+    assert!(help.contains("\nParameters for --set NAME=VALUE"), "{help}");
+    for row in bagtrack_tracker::Params::TABLE {
+        assert!(help.contains(&format!("\n  {} ", row.name)), "{}", row.name);
+    }
+    let short = succeeds(&["-h"]);
+    assert!(short.contains("`--help` lists the parameters"), "{short}");
+    assert!(!short.contains("Parameters for --set"), "{short}");
+}

@@ -26,6 +26,9 @@ pub(super) fn start<A: AsRef<OsStr>>(
     if let Some(path) = std::env::var_os("PATH") {
         command.env("PATH", path);
     }
+    // Ctrl-C goes to the whole group of the terminal. Whoever wants the pictures decides when this ends.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let child = pipes.stderr(Stdio::piped()).spawn();
     let child = child.map_err(|source| VideoError::NoProgram {

@@ -68,13 +68,24 @@ impl VideoDecoder {
         Self::start(program, &input, bytes, limits)
     }
 
-    /// Begins to decode a file of this machine.
+    /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown `from`
+    /// seconds after the file's start time or later. A file without an index may begin later than that.
     ///
     /// # Errors
     /// The program cannot be started.
-    pub fn of_file(program: &str, path: &Path, limits: VideoLimits) -> Result<Self, VideoError> {
+    pub fn of_file(
+        program: &str,
+        path: &Path,
+        from: Option<f64>,
+        limits: VideoLimits,
+    ) -> Result<Self, VideoError> {
         let url = format!("file:{}", path.display());
-        let input = ["-protocol_whitelist", "file", "-i", &url];
+        let from = from.map(|seconds| format!("{seconds:.6}"));
+        let mut input = vec!["-protocol_whitelist", "file"];
+        if let Some(seconds) = &from {
+            input.extend(["-ss", seconds]);
+        }
+        input.extend(["-i", &url]);
         Self::start(program, &input, [], limits)
     }
 
@@ -97,11 +108,13 @@ impl VideoDecoder {
             "-frames:v",
             &count,
         ];
+        // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
+        let times = ["-enc_time_base", "1:1000000"];
         let coded = [
             "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
         ];
         let output = ["-f", "mpjpeg", "pipe:1"];
-        let arguments = [&before[..], &limit, input, &chosen, &coded, &output].concat();
+        let arguments = [&before[..], &limit, input, &chosen, &times, &coded, &output].concat();
         let mut child = child::start(program, arguments)?;
         let piped = "the command says that it is a pipe";
         let (mut stdin, stdout, stderr) = (

@@ -1,0 +1,148 @@
+//! What is sent again, and for how long: against answers that services and proxies give seldom.
+
+use crate::script::{Reply, Script, answer, created};
+use bagtrack_client::{Client, ClientBuilder, ClientError, OpenOptions, Rect, Session};
+use std::time::{Duration, Instant};
+
+const TARGET: Rect = Rect {
+    x: 1.0,
+    y: 2.0,
+    width: 30.5,
+    height: 40.0,
+};
+
+fn client(script: &Script) -> ClientBuilder {
+    Client::builder(script.url())
+}
+
+async fn open(client: ClientBuilder) -> Session {
+    let client = client.build().unwrap();
+    let options = OpenOptions::new().seed(u64::MAX);
+    client.open("first", TARGET, &options).await.unwrap()
+}
+
+#[tokio::test]
+async fn what_fails_for_a_moment_is_sent_again_with_its_number() {
+    let page = Reply::new(502, "<html>Bad Gateway</html>");
+    let replies = [
+        created(0),
+        Reply::new(408, ""),
+        Reply::new(429, ""),
+        page,
+        Reply::new(503, ""),
+        Reply::new(504, ""),
+        Reply::Cut,
+        answer(1),
+    ];
+    let script = Script::start(replies).await;
+    let mut session = open(client(&script)).await;
+    let answer = session.track("second").await.unwrap();
+    assert_eq!((answer.frame, session.frame()), (1, 1));
+    assert!(!answer.draining && answer.checkpoint.is_none());
+    assert_eq!(session.resent(), 0, "it had no answer before");
+    let requests = script.requests();
+    let (first, rest) = requests.split_first().unwrap();
+    let id = session.id();
+    let query = "box=1%2C2%2C30.5%2C40&seed=18446744073709551615&verbose=true";
+    assert!(first.head.starts_with("PUT /base/sessions/"), "{first:?}");
+    assert!(first.head.contains(query), "{first:?}");
+    let path = format!("POST /base/sessions/{id}/frames?frame=1 ");
+    assert_eq!(rest.len(), 7);
+    for request in rest {
+        assert!(request.head.starts_with(&path), "{request:?}");
+        assert_eq!(request.body, b"second");
+    }
+}
+
+#[tokio::test]
+async fn the_service_says_how_long_to_wait() {
+    let busy = Reply::new(429, "").with("Retry-After: 1");
+    let script = Script::start([created(0), busy, answer(1)]).await;
+    let mut session = open(client(&script)).await;
+    let begin = Instant::now();
+    session.track("second").await.unwrap();
+    assert!(begin.elapsed() >= Duration::from_secs(1));
+}
+
+#[tokio::test]
+async fn a_call_that_is_dropped_counts_as_one_without_answer() {
+    let replies = [created(0), Reply::Silence, answer(1), answer(2)];
+    let mut script = Script::start(replies).await;
+    let mut session = open(client(&script)).await;
+    tokio::select! {
+        _ = session.track("second") => panic!("there is no answer"),
+        () = script.is_silent() => {}
+    }
+    assert_eq!(session.track("third").await.unwrap().frame, 2);
+    let last = script.requests().pop().unwrap();
+    assert!(last.head.contains("frame=2 "), "{last:?}");
+}
+
+#[tokio::test]
+async fn a_refused_frame_is_not_sent_again() {
+    let text = r#"{"type": "/docs/problems#invalid-image", "title": "Not an image", "status": 422, "index": 0}"#;
+    let replies = [created(0), Reply::new(422, text), answer(1)];
+    let script = Script::start(replies).await;
+    let mut session = open(client(&script)).await;
+    let error = session.track("damaged").await.unwrap_err();
+    let ClientError::Refused(problem) = error else {
+        panic!("{error}")
+    };
+    assert_eq!((problem.status, problem.kind()), (422, "invalid-image"));
+    assert_eq!(problem.index, Some(0));
+    assert_eq!(session.track("second").await.unwrap().frame, 1);
+    assert_eq!(script.requests().pop().unwrap().body, b"second");
+}
+
+#[tokio::test]
+async fn a_proxys_page_is_a_problem_without_a_kind() {
+    let script = Script::start([Reply::new(413, "<html>413</html>")]).await;
+    let client = client(&script).build().unwrap();
+    let opened = client.open("first", TARGET, &OpenOptions::new()).await;
+    let Err(ClientError::Refused(problem)) = opened else {
+        panic!("{opened:?}")
+    };
+    assert_eq!((problem.status, problem.kind()), (413, ""));
+    assert_eq!(problem.to_string(), "Payload Too Large (413)");
+}
+
+/// A replica with checkpoints has ended: its frames after the checkpoint are asked for.
+#[tokio::test]
+async fn frames_that_the_service_lost_are_sent_again_as_far_as_they_are_kept() {
+    let conflict = |expected: u64| {
+        let text = format!(
+            r#"{{"type": "/docs/problems#frame-out-of-order", "status": 409, "expected_frame": {expected}}}"#
+        );
+        Reply::new(409, &text)
+    };
+    let replies = [
+        created(0),
+        answer(1).with("Checkpoint: 0"),
+        answer(2).with("Checkpoint: 2"),
+        answer(3).with("Checkpoint: 2"),
+        answer(4).with("Checkpoint: 2"),
+        conflict(3),
+        answer(3),
+        answer(4),
+        answer(5).with("Checkpoint: 2"),
+        conflict(2),
+    ];
+    let script = Script::start(replies).await;
+    let mut session = open(client(&script)).await;
+    for (number, body) in (1..).zip(["a", "b", "c"]) {
+        assert_eq!(session.track(body).await.unwrap().frame, number);
+    }
+    let answer = session.track("d").await.unwrap();
+    assert_eq!(answer.checkpoint, Some(2));
+    assert_eq!(session.track("e").await.unwrap().frame, 5);
+    assert_eq!(session.resent(), 2);
+    let bodies = script.requests().into_iter().map(|request| request.body);
+    let bodies: Vec<u8> = bodies.skip(5).flatten().collect();
+    assert_eq!(bodies, b"ecde");
+    // Frame 2 is at the store, as it said: it was not kept.
+    let error = session.track("f").await.unwrap_err();
+    let ClientError::Refused(problem) = error else {
+        panic!("{error}")
+    };
+    assert_eq!((problem.status, problem.expected_frame), (409, Some(2)));
+}

@@ -1,0 +1,204 @@
+//! Takes the next frames of a session.
+
+use super::error::{ActError, FramesError};
+use super::frames::{FrameBatch, Tracked};
+use super::service::SessionService;
+use crate::store::{Commit, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
+use crate::{
+    LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
+};
+use std::sync::Arc;
+use tokio::time::timeout;
+
+/// How often the frames of one request are looked at: other replicas may be there first each time.
+const MAX_ATTEMPTS: usize = 4;
+
+/// What came of the frames, on a copy of the state.
+enum Attempt {
+    /// They were tracked, up to this state; its bytes are there where they are to be written.
+    Tracked(Box<SessionState>, Tracked, Option<Vec<u8>>),
+    /// They were answered before.
+    Replayed(Tracked),
+    /// Their number does not fit this state. Another one might.
+    Misnumbered(ReplayError),
+}
+
+impl SessionService {
+    /// The answers to the next frames of a session.
+    ///
+    /// # Errors
+    /// That of the first bad frame, of the frame number, or of the store. The session is unchanged.
+    pub async fn advance(
+        &self,
+        permit: SessionPermit,
+        queue: QueuePermit,
+        batch: FrameBatch,
+    ) -> Result<Tracked, FramesError> {
+        let (session, is_posted) = (permit.session().clone(), batch.stream.is_none());
+        let advancing = self.advance_until_committed(permit, queue, Arc::new(batch));
+        let advanced = timeout(self.settings.work_timeout, advancing).await;
+        let advanced = advanced.unwrap_or_else(|_| Err(Stopped::Deadline.into()));
+        if let Err(error) = &advanced
+            && is_posted
+            && error.is_temporary()
+        {
+            let is_away = matches!(error, FramesError::Act(ActError::Store(_)));
+            self.renew(&session, !is_away).await;
+        }
+        advanced
+    }
+
+    async fn advance_until_committed(
+        &self,
+        permit: SessionPermit,
+        queue: QueuePermit,
+        batch: Arc<FrameBatch>,
+    ) -> Result<Tracked, FramesError> {
+        let flow = queue.flow();
+        let mut locked = match batch.is_unordered() {
+            true => self.lock_newest(permit, flow, true).await?,
+            false => permit.lock().await?,
+        };
+        // Whether another frame was there first, and whether the state is what the store told.
+        let (mut was_late, mut is_told) = (false, false);
+        for _ in 0..MAX_ATTEMPTS {
+            let attempt;
+            (locked, attempt) = self.attempt(queue.clone(), locked, batch.clone()).await?;
+            let intent = attempt.intent(&batch, locked.state().latest_frame(), is_told);
+            let outcome = self
+                .commit(&locked, &attempt, &batch, intent, is_told)
+                .await;
+            let incarnation = locked.session().name().incarnation;
+            match reconcile(
+                Local {
+                    incarnation,
+                    intent,
+                },
+                outcome,
+            ) {
+                Step::Commit(_) => return attempt.accept(&mut locked, was_late),
+                Step::GoOn(record) => {
+                    was_late |= matches!(attempt, Attempt::Tracked(..));
+                    is_told = true;
+                    self.take_over(&mut locked, *record, flow).await?;
+                }
+                Step::Conflict(record) => {
+                    self.take_over(&mut locked, *record, flow).await?;
+                    return Err(FramesError::NotInOrder);
+                }
+                step => return Err(self.refusal(locked.session(), step).into()),
+            }
+        }
+        Err(SessionBusy.into())
+    }
+
+    /// Looks at the frames on a worker, with a copy of the state.
+    async fn attempt(
+        &self,
+        queue: QueuePermit,
+        mut locked: LockedSession,
+        batch: Arc<FrameBatch>,
+    ) -> Result<(LockedSession, Attempt), FramesError> {
+        let (limits, metrics) = (self.request_limits(), self.tracking.clone());
+        // What is in memory only would be lost soon.
+        let every = if self.is_draining() {
+            1
+        } else {
+            self.settings.store_every
+        };
+        self.run(queue, move |meter| {
+            let session = locked.session().clone();
+            if batch
+                .stream
+                .as_ref()
+                .is_some_and(|place| place.has_ended(&session))
+            {
+                return Err(FramesError::StreamReplaced);
+            }
+            let mut copy = locked.state().clone();
+            let attempt = match batch.track(&mut copy, &limits, meter, &metrics) {
+                Ok(tracked) if tracked.replayed => Attempt::Replayed(tracked),
+                Ok(tracked) => {
+                    let is_due = |checkpoint| copy.latest_frame() >= checkpoint + every;
+                    let bytes = session.checkpoint().is_some_and(is_due);
+                    let bytes = bytes.then(|| copy.stored());
+                    Attempt::Tracked(Box::new(copy), tracked, bytes)
+                }
+                Err(FramesError::Replay(error)) => Attempt::Misnumbered(error),
+                Err(error) => return Err(error),
+            };
+            Ok((locked, attempt))
+        })
+        .await
+    }
+
+    /// Commits the frames to the store, or asks it whether the copy is the newest. Without a store it is.
+    async fn commit(
+        &self,
+        locked: &LockedSession,
+        attempt: &Attempt,
+        batch: &FrameBatch,
+        intent: Intent,
+        is_told: bool,
+    ) -> Result<Outcome, StoreUnavailable> {
+        let (session, ttl) = (locked.session(), self.registry.idle_lease());
+        let (Some(store), Some(before)) = (&self.store, session.version()) else {
+            return Ok(Outcome::Committed(ttl));
+        };
+        match attempt {
+            Attempt::Tracked(state, _, bytes) => {
+                let commit = Commit {
+                    name: session.name(),
+                    before,
+                    frame: state.latest_frame(),
+                    state: bytes.as_deref(),
+                    // A frame that comes late, after others that only another replica has, takes nothing back.
+                    takes_over: is_told || batch.number.is_none(),
+                    ttl,
+                };
+                store.commit(commit).await
+            }
+            Attempt::Replayed(_) | Attempt::Misnumbered(_) => {
+                let takes_over = !matches!(intent, Intent::Past { .. });
+                let renew = matches!(attempt, Attempt::Replayed(_)).then_some(ttl);
+                let checked = store.check(session.name(), before, takes_over, renew);
+                checked.await
+            }
+        }
+    }
+}
+
+impl Attempt {
+    /// What the store is asked on behalf of, where the copy stands at this frame.
+    fn intent(&self, batch: &FrameBatch, latest: u64, is_told: bool) -> Intent {
+        match self {
+            _ if batch.is_unordered() => Intent::Unordered,
+            Self::Tracked(..) => Intent::Newest,
+            _ if batch.number.is_some_and(|number| number <= latest) => Intent::Past { is_told },
+            _ => Intent::Newest,
+        }
+    }
+
+    /// The copy becomes the session's state.
+    fn accept(self, locked: &mut LockedSession, was_late: bool) -> Result<Tracked, FramesError> {
+        let session = locked.session().clone();
+        let mut tracked = match self {
+            Self::Tracked(state, tracked, bytes) => {
+                let version = session.version();
+                let frame = state.latest_frame();
+                let after = version.map(|version| version.committed(frame, bytes.is_some()));
+                locked.replace(*state, after);
+                tracked
+            }
+            Self::Replayed(tracked) => tracked,
+            // Another frame with its number won, at another replica.
+            Self::Misnumbered(ReplayError::Differs { got, expected }) if was_late => {
+                return Err(ReplayError::OutOfOrder { got, expected }.into());
+            }
+            Self::Misnumbered(error) => return Err(error.into()),
+        };
+        session.renew();
+        tracked.checkpoint = session.checkpoint();
+        Ok(tracked)
+    }
+}

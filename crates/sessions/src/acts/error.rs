@@ -1,0 +1,225 @@
+//! Why an act was not done. None of them changes a session.
+
+use super::box_check::ImplausibleBox;
+use crate::{
+    InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
+    StartError, Stopped, StoreUnavailable, TooManySessions, WorkPanicked,
+};
+use bagtrack_ingest::IngestError;
+use bagtrack_tracker::TrackerError;
+
+/// Why an act was not done, whatever it was about.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum ActError {
+    /// There is no session.
+    #[error(transparent)]
+    NoSession(#[from] NoSession),
+    /// Too many requests are at the session.
+    #[error(transparent)]
+    Busy(#[from] SessionBusy),
+    /// The queue before the workers is full.
+    #[error(transparent)]
+    QueueFull(#[from] QueueFull),
+    /// The store gives no answer.
+    #[error(transparent)]
+    Store(#[from] StoreUnavailable),
+    /// The work was stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// The work panicked.
+    #[error(transparent)]
+    Panicked(#[from] WorkPanicked),
+    /// There is no room for one more session in memory.
+    #[error(transparent)]
+    TooManySessions(#[from] TooManySessions),
+    /// The state that the store has cannot be read.
+    #[error("the stored state cannot be read: {0}")]
+    StoredState(SnapshotError),
+}
+
+impl From<SessionClosed> for ActError {
+    fn from(_: SessionClosed) -> Self {
+        Self::NoSession(NoSession::Unknown)
+    }
+}
+
+impl ActError {
+    /// Whether trying again soon makes sense: only the service is to blame, or the time was too short.
+    pub fn is_temporary(&self) -> bool {
+        match self {
+            Self::Busy(_) | Self::QueueFull(_) | Self::Store(_) | Self::TooManySessions(_) => true,
+            Self::Stopped(stopped) => !matches!(stopped, Stopped::Cost(_)),
+            Self::NoSession(_) | Self::Panicked(_) | Self::StoredState(_) => false,
+        }
+    }
+}
+
+/// Why one frame cannot be tracked.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrameFault {
+    /// The file cannot be decoded.
+    #[error(transparent)]
+    Ingest(#[from] IngestError),
+    /// The tracker does not take it.
+    #[error(transparent)]
+    Tracker(#[from] TrackerError),
+}
+
+/// Why frames were not tracked: none of them was.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum FramesError {
+    /// See [`ActError`].
+    #[error(transparent)]
+    Act(#[from] ActError),
+    /// The frame number does not fit.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// Frames without numbers came at the same time.
+    #[error("another request with frames was at the session")]
+    NotInOrder,
+    /// A newer stream has the place of the one that the frames came over.
+    #[error("a newer stream has taken the place of this one")]
+    StreamReplaced,
+    /// It is not told which target is meant, or there is none of this number.
+    #[error("the session has {count} targets")]
+    NoSuchTarget {
+        /// How many there are.
+        count: usize,
+    },
+    /// One of the frames cannot be tracked.
+    #[error("frame {index} of {count}: {fault}")]
+    Frame {
+        /// Which one, counted from 0.
+        index: usize,
+        /// How many there are.
+        count: usize,
+        /// Why.
+        fault: FrameFault,
+    },
+    /// The corrected box cannot be meant.
+    #[error(transparent)]
+    Box(#[from] ImplausibleBox),
+    /// The frames have too many pixels together.
+    #[error("the frames have {pixels} pixels together, over {limit}")]
+    TooManyPixels {
+        /// How many they have.
+        pixels: u64,
+        /// How many they may have.
+        limit: u64,
+    },
+}
+
+impl FramesError {
+    /// See [`ActError::is_temporary`].
+    pub fn is_temporary(&self) -> bool {
+        match self {
+            Self::Act(error) => error.is_temporary(),
+            Self::StreamReplaced => true,
+            _ => false,
+        }
+    }
+}
+
+/// An error of one frame, the only one.
+impl From<FrameFault> for FramesError {
+    fn from(fault: FrameFault) -> Self {
+        Self::Frame {
+            index: 0,
+            count: 1,
+            fault,
+        }
+    }
+}
+
+/// A client has as many sessions as it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the client has {limit} sessions, which is its maximum")]
+pub struct QuotaExhausted {
+    /// How many it may have.
+    pub limit: usize,
+}
+
+/// Why no session was opened.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum OpenError {
+    /// See [`ActError`].
+    #[error(transparent)]
+    Act(#[from] ActError),
+    /// The frame cannot be decoded.
+    #[error(transparent)]
+    Frame(#[from] FramesError),
+    /// The tracker does not take a box, or a parameter. With a list of boxes, how many there are.
+    #[error("{error}")]
+    Start {
+        /// Why.
+        error: StartError,
+        /// How many boxes were given, where they were given as a list.
+        listed: Option<usize>,
+    },
+    /// A box cannot be meant.
+    #[error("{error}")]
+    Box {
+        /// Why.
+        error: ImplausibleBox,
+        /// Which of how many, where they were given as a list.
+        listed: Option<(usize, usize)>,
+    },
+    /// The snapshot cannot be restored.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
+    /// The service is about to end.
+    #[error("the service is about to end")]
+    Draining,
+    /// The client has as many sessions as it may.
+    #[error(transparent)]
+    Quota(#[from] QuotaExhausted),
+    /// A live session that another request opened has the id.
+    #[error("another session has this id")]
+    Exists,
+    /// The idempotency key was used for another request.
+    #[error("the idempotency key was used for another request")]
+    KeyReused,
+}
+
+impl From<InsertError> for OpenError {
+    fn from(error: InsertError) -> Self {
+        match error {
+            InsertError::Full(full) => Self::Act(full.into()),
+            InsertError::Taken => Self::Exists,
+        }
+    }
+}
+
+/// Why nothing was tracked without a session.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum TrackError {
+    /// The frames.
+    #[error(transparent)]
+    Frames(#[from] FramesError),
+    /// The beginning of the track.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+}
+
+macro_rules! through {
+    ($from:ty => $through:ident in $to:ty) => {
+        impl From<$from> for $to {
+            fn from(error: $from) -> Self {
+                Self::$through(error.into())
+            }
+        }
+    };
+}
+
+through!(Stopped => Act in FramesError);
+through!(WorkPanicked => Act in FramesError);
+through!(StoreUnavailable => Act in FramesError);
+through!(SessionBusy => Act in FramesError);
+through!(SessionClosed => Act in FramesError);
+through!(QueueFull => Act in FramesError);
+through!(Stopped => Act in OpenError);
+through!(WorkPanicked => Act in OpenError);
+through!(StoreUnavailable => Act in OpenError);
+through!(TooManySessions => Act in OpenError);
+through!(Stopped => Frames in TrackError);
+through!(WorkPanicked => Frames in TrackError);

@@ -1,0 +1,150 @@
+//! Finds sessions, in memory or in the store, and ends them.
+
+use super::error::ActError;
+use super::service::SessionService;
+use crate::store::{Intent, Local, Record, Step, StoreUnavailable, reconcile};
+use crate::{Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState};
+use std::sync::Arc;
+use uuid::Uuid;
+
+impl SessionService {
+    /// The live session of this id and owner, from memory or from the store.
+    ///
+    /// # Errors
+    /// There is none, or the store gives no answer.
+    pub async fn find(
+        &self,
+        id: Uuid,
+        owner: &Owner,
+        flow: Flow,
+    ) -> Result<Arc<Session>, ActError> {
+        let missing = match self.registry.find(id, owner) {
+            Ok(session) => return Ok(session),
+            Err(missing) => missing,
+        };
+        let session = self.load(id, flow).await?.ok_or(missing)?;
+        match session.owner() == owner {
+            true => Ok(session),
+            false => Err(NoSession::Unknown.into()),
+        }
+    }
+
+    /// The session that has this id by what the store says, whoever it belongs to.
+    pub(super) async fn find_authoritative(
+        &self,
+        id: Uuid,
+        flow: Flow,
+    ) -> Result<Option<Arc<Session>>, ActError> {
+        let Some(session) = self.registry.live(id) else {
+            return self.load(id, flow).await;
+        };
+        let (Some(store), Some(version)) = (&self.store, session.version()) else {
+            return Ok(Some(session));
+        };
+        let name = session.name();
+        let local = Local {
+            incarnation: name.incarnation,
+            intent: Intent::Newest,
+        };
+        match reconcile(local, store.check(name, version, false, None).await) {
+            Step::Commit(_) | Step::GoOn(_) | Step::Conflict(_) => Ok(Some(session)),
+            Step::Replaced(record) => self.insert(id, *record, flow).await.map(Some),
+            Step::Gone(_) => {
+                self.registry.forget(&session);
+                Ok(None)
+            }
+            Step::Unavailable(unavailable) => Err(unavailable.into()),
+        }
+    }
+
+    /// The session of this id from the store, which is then in memory too.
+    async fn load(&self, id: Uuid, flow: Flow) -> Result<Option<Arc<Session>>, ActError> {
+        let Some(store) = &self.store else {
+            return Ok(None);
+        };
+        match store.load(id).await? {
+            Some(record) => self.insert(id, record, flow).await.map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// The session of a record, which is then in memory.
+    async fn insert(&self, id: Uuid, record: Record, flow: Flow) -> Result<Arc<Session>, ActError> {
+        let (state, record) = self.decode(record, flow).await?;
+        if let Some(session) = self.registry.live(id)
+            && session.name().incarnation != record.opening.incarnation
+        {
+            self.registry.forget(&session);
+        }
+        let new = NewSession {
+            id,
+            opening: record.opening,
+            owner: record.owner,
+            version: Some(record.version),
+            ttl: record.ttl,
+            state,
+            held: Box::new(()),
+        };
+        match self.registry.insert(new) {
+            Ok(session) => Ok(session),
+            // Another request has loaded it in the meantime.
+            Err(_) => {
+                let live = self.registry.live(id);
+                live.ok_or_else(|| self.registry.full().into())
+            }
+        }
+    }
+
+    /// Reads a record's state on a worker.
+    async fn decode(&self, record: Record, flow: Flow) -> Result<(SessionState, Record), ActError> {
+        let queue = self.admission.enter(flow, Box::new(()))?;
+        let max_recent = self.settings.max_frames;
+        self.run(queue, move |_| {
+            let state = SessionState::from_stored(&record.state, max_recent);
+            let state = state.map_err(ActError::StoredState)?;
+            Ok((state, record))
+        })
+        .await
+    }
+
+    /// Goes on from a record of the store, which is of this session.
+    pub(super) async fn take_over(
+        &self,
+        locked: &mut LockedSession,
+        record: Record,
+        flow: Flow,
+    ) -> Result<(), ActError> {
+        let (newest, record) = self.decode(record, flow).await?;
+        locked.replace(newest, Some(record.version));
+        locked.session().set_ttl(record.ttl);
+        Ok(())
+    }
+
+    /// Ends the session of this id and owner everywhere. Work that has begun still gets its answer.
+    ///
+    /// # Errors
+    /// There is none, or the store gives no answer.
+    pub async fn end(&self, id: Uuid, owner: &Owner, flow: Flow) -> Result<(), ActError> {
+        // What is in memory may be a session that had the id before.
+        for _ in 0..2 {
+            let session = self.find(id, owner, flow).await?;
+            if self.end_one(&session).await? {
+                tracing::info!(session = session.short_id(), "deleted");
+                return Ok(());
+            }
+        }
+        Err(NoSession::Unknown.into())
+    }
+
+    /// False where it had ended before: another one may have its id.
+    async fn end_one(&self, session: &Arc<Session>) -> Result<bool, StoreUnavailable> {
+        if let Some(store) = &self.store {
+            let ttl = self.registry.idle_lease();
+            if !store.end(session.name(), ttl).await? {
+                self.registry.forget(session);
+                return Ok(false);
+            }
+        }
+        Ok(self.registry.remove(session.id()))
+    }
+}

@@ -1,0 +1,248 @@
+//! The next frames of a session, as they were received: decode them, then track through them, or take the box that the
+//! user gives.
+
+use super::box_check;
+use super::error::{FrameFault, FramesError};
+use super::tracking_metrics::TrackingMetrics;
+use crate::streams::StreamPlace;
+use crate::{
+    ByteCharge, Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError,
+    WorkMeter,
+};
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::{Frame, FrameFormat, Rect, Seen, TrackerError};
+use bytes::Bytes;
+use std::sync::Arc;
+
+/// The next frames of a session, as they were received.
+#[derive(Debug, Default)]
+pub struct FrameBatch {
+    /// What the client calls the first of them, where it numbers them.
+    pub number: Option<u64>,
+    /// The files, at least one.
+    pub files: Vec<Bytes>,
+    /// The box in the only frame, where the user corrects it.
+    pub correction: Option<GivenBox>,
+    /// How many of the last answers are kept at least, for a client that takes up where its line broke.
+    pub min_answers: usize,
+    /// Whether the client wants to know what the trackers saw.
+    pub with_diagnostics: bool,
+    /// The stream that they came over. It tells their order, and tracks none after a newer one has taken its place.
+    pub stream: Option<Arc<StreamPlace>>,
+    /// The memory of the files, where the place in the queue does not hold it.
+    pub charge: Option<Arc<ByteCharge>>,
+}
+
+/// The box of a target, given by the user.
+#[derive(Debug, Clone, Copy)]
+pub struct GivenBox {
+    /// Which target, counted from 0, where the user says it.
+    pub target: Option<usize>,
+    /// The box.
+    pub to: Rect,
+}
+
+impl GivenBox {
+    /// The correction in a session with so many targets and frames of this size.
+    fn of(self, count: usize, size: (u32, u32)) -> Result<Correction, FramesError> {
+        box_check::check(&self.to, size)?;
+        match self.target {
+            None if count != 1 => Err(FramesError::NoSuchTarget { count }),
+            Some(target) if target >= count => Err(FramesError::NoSuchTarget { count }),
+            target => Ok(Correction {
+                target: target.unwrap_or(0),
+                to: self.to,
+            }),
+        }
+    }
+}
+
+/// The answers to frames.
+#[derive(Debug)]
+pub struct Tracked {
+    /// One for each frame, in the order of the frames.
+    pub estimates: Vec<Estimates>,
+    /// Whether they were given before.
+    pub replayed: bool,
+    /// What the tracker of each target saw in the last frame, where that was asked for and the frame was tracked now.
+    pub diagnostics: Vec<Seen>,
+    /// The last frame whose state is in the store, where there is one.
+    pub checkpoint: Option<u64>,
+}
+
+/// What the frames of one request may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct RequestLimits {
+    /// The limits of each frame.
+    pub frame: Limits,
+    /// Most pixels of several frames together. A single frame has its own limit.
+    pub max_pixels: u64,
+}
+
+impl FrameBatch {
+    /// The frames of a plain request.
+    pub fn posted(number: Option<u64>, files: Vec<Bytes>, correction: Option<GivenBox>) -> Self {
+        Self {
+            number,
+            files,
+            correction,
+            ..Self::default()
+        }
+    }
+
+    /// Whether nothing tells their order.
+    pub(super) fn is_unordered(&self) -> bool {
+        self.number.is_none() && self.stream.is_none()
+    }
+
+    /// Takes the frames into `state`: the stored answers if the request was answered before, else those of the tracker.
+    /// The sizes of all frames are checked before the first is decoded, and all are decoded before the first is tracked.
+    /// Between frames `meter` says whether to go on.
+    ///
+    /// # Errors
+    /// That of the first bad frame, or of a request that costs too much. The state is to be dropped then.
+    pub(super) fn track(
+        &self,
+        state: &mut SessionState,
+        limits: &RequestLimits,
+        meter: &mut WorkMeter,
+        metrics: &TrackingMetrics,
+    ) -> Result<Tracked, FramesError> {
+        let fingerprints = self.files.iter().map(|file| Fingerprint::of(file));
+        let fingerprints: Vec<Fingerprint> = fingerprints.collect();
+        let correction = self
+            .correction
+            .map(|given| given.of(state.target_count(), state.source_size()));
+        let correction = correction.transpose()?;
+        let decision = state.replay_decision(self.number, &fingerprints, correction)?;
+        if let ReplayDecision::Replay(estimates) = decision {
+            return Ok(Tracked {
+                estimates,
+                replayed: true,
+                diagnostics: Vec::new(),
+                checkpoint: None,
+            });
+        }
+        self.check_sizes(limits, state.source_size())?;
+        let format = state.frame_format();
+        let decoded = decode(&self.files, &limits.frame, &|_| format, meter, metrics)?;
+        let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
+        let before = state.latest();
+        let mut diagnostics = Vec::new();
+        let wanted = self.with_diagnostics && correction.is_none();
+        let seen = wanted.then_some(&mut diagnostics);
+        let estimates = state.advance(&frames, correction, meter, self.min_answers, seen);
+        frames
+            .into_iter()
+            .for_each(|(_, frame)| bagtrack_ingest::recycle(frame));
+        let estimates = estimates.map_err(|error| match error {
+            StepError::Refused { index, error } => self.fault(index, error),
+            StepError::Stopped(stopped) => stopped.into(),
+        })?;
+        metrics.tracked(&before, &estimates, &meter.take_steps());
+        Ok(Tracked {
+            estimates,
+            replayed: false,
+            diagnostics,
+            checkpoint: None,
+        })
+    }
+
+    /// Refuses a frame whose size is not the session's, and a request with too many pixels, by their headers alone.
+    ///
+    /// # Errors
+    /// It is one of these, or no image.
+    pub fn check_sizes(
+        &self,
+        limits: &RequestLimits,
+        (width, height): (u32, u32),
+    ) -> Result<(), FramesError> {
+        let mut pixels = 0;
+        for (index, file) in self.files.iter().enumerate() {
+            let size = bagtrack_ingest::size(file, &limits.frame);
+            let (got_width, got_height) = size.map_err(|error| self.fault(index, error))?;
+            if (got_width, got_height) != (width, height) {
+                let error = TrackerError::FrameSize {
+                    width,
+                    height,
+                    got_width,
+                    got_height,
+                };
+                return Err(self.fault(index, error));
+            }
+            pixels += u64::from(width) * u64::from(height);
+        }
+        limits.check_pixels(pixels, self.files.len())
+    }
+
+    fn fault(&self, index: usize, fault: impl Into<FrameFault>) -> FramesError {
+        fault_of(index, self.files.len(), fault)
+    }
+}
+
+fn fault_of(index: usize, count: usize, fault: impl Into<FrameFault>) -> FramesError {
+    FramesError::Frame {
+        index,
+        count,
+        fault: fault.into(),
+    }
+}
+
+impl RequestLimits {
+    fn check_pixels(&self, pixels: u64, files: usize) -> Result<(), FramesError> {
+        match files > 1 && pixels > self.max_pixels {
+            true => Err(FramesError::TooManyPixels {
+                pixels,
+                limit: self.max_pixels,
+            }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Refuses a request whose frames have too many pixels together, by their headers alone.
+///
+/// # Errors
+/// They have, or one of them is no image.
+pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
+    let mut pixels = 0;
+    for (index, file) in files.iter().enumerate() {
+        let size = bagtrack_ingest::size(file, &limits.frame);
+        let (width, height) = size.map_err(|error| fault_of(index, files.len(), error))?;
+        pixels += u64::from(width) * u64::from(height);
+    }
+    limits.check_pixels(pixels, files.len())
+}
+
+/// The same where each frame is answered for itself: one that is no image is refused in its turn.
+///
+/// # Errors
+/// Those that are images have too many pixels.
+pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
+    let sizes = files
+        .iter()
+        .filter_map(|file| bagtrack_ingest::size(file, &limits.frame).ok());
+    let pixels = sizes.map(|(width, height)| u64::from(width) * u64::from(height));
+    limits.check_pixels(pixels.sum(), files.len())
+}
+
+/// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says
+/// whether to go on.
+///
+/// # Errors
+/// That of the first bad file, or that the work was stopped.
+pub(super) fn decode(
+    files: &[Bytes],
+    limits: &Limits,
+    format: &dyn Fn((u32, u32)) -> FrameFormat,
+    meter: &mut WorkMeter,
+    metrics: &TrackingMetrics,
+) -> Result<Vec<Frame>, FramesError> {
+    let decode_one = |(index, file): (usize, &Bytes)| {
+        meter.check()?;
+        metrics
+            .decoding(|| bagtrack_ingest::decode_to(file, limits, format))
+            .map_err(|error| fault_of(index, files.len(), error))
+    };
+    files.iter().enumerate().map(decode_one).collect()
+}

@@ -1,0 +1,92 @@
+//! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
+//! `Idempotency-Key`, or an id that its client made.
+//!
+//! A name is kept as long as its session ttl, so there are never more of them than sessions. Requests with one name
+//! are served one after the other. Problems are not stored: the request can be sent again after them.
+
+use crate::Owner;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::Mutex as AsyncMutex;
+use uuid::Uuid;
+
+/// What a client calls a session before it is open.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum CreationKey {
+    /// An idempotency key. Each owner has keys of its own.
+    Key(Owner, String),
+    /// The session's id, which the client has made.
+    Id(Uuid),
+}
+
+/// The session that a request of one name opened, once there is one. Whoever holds the lock is about to open it.
+pub type Entry = Arc<AsyncMutex<Option<Uuid>>>;
+
+/// The sessions by the names under which they were opened.
+#[derive(Debug)]
+pub struct IdempotencyStore {
+    entries: Mutex<HashMap<CreationKey, Entry>>,
+    max_entries: usize,
+}
+
+impl IdempotencyStore {
+    /// No sessions yet. `max_entries` is more than the sessions and the requests inside together: requests that were
+    /// refused leave entries, which go when there are so many.
+    pub fn new(max_entries: usize) -> Self {
+        let entries = Mutex::default();
+        Self {
+            entries,
+            max_entries,
+        }
+    }
+
+    /// The entry of a name: the one that is there, or a new one.
+    pub fn entry(&self, name: CreationKey, is_live: impl Fn(Uuid) -> bool) -> Entry {
+        if self.map().len() >= self.max_entries {
+            self.prune(is_live);
+        }
+        self.map().entry(name).or_default().clone()
+    }
+
+    /// Drops the entries whose sessions have ended.
+    pub fn prune(&self, is_live: impl Fn(Uuid) -> bool) {
+        self.map().retain(|_, entry| {
+            // A request that holds the entry or waits for it holds a clone.
+            let in_use = Arc::strong_count(entry) > 1;
+            let stored = entry.try_lock();
+            in_use || stored.is_ok_and(|stored| stored.is_some_and(&is_live))
+        });
+    }
+
+    fn map(&self) -> MutexGuard<'_, HashMap<CreationKey, Entry>> {
+        // Nothing panics while it is held.
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn answers_go_with_their_sessions_and_entries_in_use_stay() {
+        let store = IdempotencyStore::new(4);
+        let name = |key: &str| CreationKey::Key(Owner::default(), key.to_owned());
+        let live = |id| id == Uuid::from_u128(1);
+        for (key, session) in [("a", 1), ("b", 2)] {
+            *store.entry(name(key), live).lock().await = Some(Uuid::from_u128(session));
+        }
+        drop(store.entry(name("refused"), live));
+        let used = store.entry(name("used"), live);
+        assert_eq!(store.map().len(), 4);
+        drop(store.entry(name("one more"), live));
+        let left = store.map().len();
+        assert_eq!(
+            left, 3,
+            "the live session's, the one in use, and the new one"
+        );
+        drop(used);
+        store.prune(|_| false);
+        assert_eq!(store.map().len(), 0);
+    }
+}

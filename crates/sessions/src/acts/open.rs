@@ -1,0 +1,204 @@
+//! Opens sessions: once for each name, so that a request that comes again gets the same answer.
+
+use super::error::{OpenError, QuotaExhausted};
+use super::idempotency::CreationKey;
+use super::service::SessionService;
+use super::start::Start;
+use crate::store::{Outcome, Record, Version};
+use crate::{
+    ActError, NewSession, Owner, QueuePermit, Reservation, Session, SessionState, Stopped,
+    WorkMeter,
+};
+use std::fmt::Debug;
+use std::sync::Arc;
+use tokio::time::timeout;
+use uuid::Uuid;
+
+/// How many sessions a client may have.
+pub trait SessionQuota: Debug + Send + Sync {
+    /// Whether it may have one more.
+    ///
+    /// # Errors
+    /// It may not.
+    fn check(&self) -> Result<(), QuotaExhausted>;
+
+    /// Takes the places of a session with so many targets, until what is returned is dropped.
+    ///
+    /// # Errors
+    /// There are not so many left.
+    fn reserve(&self, targets: usize) -> Result<Reservation, QuotaExhausted>;
+}
+
+/// A request to open a session.
+#[derive(Debug)]
+pub struct OpenRequest {
+    /// What the client calls the session, where it gives it a name.
+    pub key: Option<CreationKey>,
+    /// Whose the session will be.
+    pub owner: Owner,
+    /// A digest of what the session begins with: a request of the same name is the same request where this is equal.
+    pub digest: [u8; 32],
+    /// What it begins with.
+    pub start: Start,
+    /// How many sessions the client may have.
+    pub quota: Arc<dyn SessionQuota>,
+    /// The place in the queue.
+    pub queue: QueuePermit,
+}
+
+/// An open session.
+#[derive(Debug)]
+pub struct Opened {
+    /// The session.
+    pub session: Arc<Session>,
+    /// Whether it was opened by the same request before.
+    pub replayed: bool,
+}
+
+impl SessionService {
+    /// Opens a session, or finds the one that the same request opened before.
+    ///
+    /// # Errors
+    /// What it begins with cannot be used, there is no room, or another request has opened one under this name.
+    pub async fn open(&self, request: OpenRequest) -> Result<Opened, OpenError> {
+        let Some(key) = request.key.clone() else {
+            let session = self.open_as(request, Uuid::new_v4()).await?;
+            return Ok(Opened {
+                session,
+                replayed: false,
+            });
+        };
+        let entry = self
+            .opened
+            .entry(key.clone(), |id| self.registry.is_live(id));
+        // Another request of this name may be about to open the session.
+        let locked = timeout(self.settings.work_timeout, entry.lock_owned());
+        let mut opened = locked.await.map_err(|_| Stopped::Deadline)?;
+        let id = match &key {
+            CreationKey::Id(id) => *id,
+            CreationKey::Key(owner, key) => self.id_of_key(owner, key, *opened).await?,
+        };
+        let (flow, owner, digest) = (request.queue.flow(), request.owner.clone(), request.digest);
+        if let Some(session) = self.find_authoritative(id, flow).await? {
+            check_same(&session, &owner, digest, &key)?;
+            return Ok(Opened {
+                session,
+                replayed: true,
+            });
+        }
+        self.check_room(&*request.quota)?;
+        match self.open_as(request, id).await {
+            // Another replica was first.
+            Err(OpenError::Exists) => {
+                let session = self.find_authoritative(id, flow).await?;
+                let session = session.ok_or(OpenError::Exists)?;
+                check_same(&session, &owner, digest, &key)?;
+                Ok(Opened {
+                    session,
+                    replayed: true,
+                })
+            }
+            session => {
+                let session = session?;
+                *opened = Some(session.id());
+                Ok(Opened {
+                    session,
+                    replayed: false,
+                })
+            }
+        }
+    }
+
+    /// Refuses new sessions where there is no room for them, or when the service is about to end.
+    ///
+    /// # Errors
+    /// There is no room here, the client has as many as it may, or the service is about to end.
+    pub fn check_room(&self, quota: &dyn SessionQuota) -> Result<(), OpenError> {
+        if self.is_draining() {
+            return Err(OpenError::Draining);
+        }
+        self.registry.check_room()?;
+        Ok(quota.check()?)
+    }
+
+    /// The id of the session that an idempotency key names: of the one that is open, or a new one. With a store, all
+    /// replicas find the same.
+    async fn id_of_key(
+        &self,
+        owner: &Owner,
+        key: &str,
+        opened: Option<Uuid>,
+    ) -> Result<Uuid, ActError> {
+        if let Some(live) = opened.filter(|id| self.registry.is_live(*id)) {
+            return Ok(live);
+        }
+        let new = Uuid::new_v4();
+        match &self.store {
+            None => Ok(new),
+            Some(store) => Ok(store.claim(owner, key, new).await?),
+        }
+    }
+
+    /// Opens a session under this id.
+    async fn open_as(&self, request: OpenRequest, id: Uuid) -> Result<Arc<Session>, OpenError> {
+        let OpenRequest {
+            owner,
+            digest,
+            start,
+            quota,
+            queue,
+            ..
+        } = request;
+        let (service, queue) = (self.clone(), queue.for_frames(start.target_count()));
+        let begin = move |meter: &mut WorkMeter| {
+            let state = start.run(&service, meter)?;
+            let bytes = service.store.is_some().then(|| state.stored());
+            Ok((state, bytes))
+        };
+        let (state, bytes): (SessionState, _) = self.run::<_, OpenError, _>(queue, begin).await?;
+        let held = quota.reserve(state.target_count())?;
+        let opening = self.registry.opening(digest, &state);
+        let ttl = self.registry.first_lease();
+        let mut version = None;
+        if let (Some(store), Some(bytes)) = (&self.store, bytes) {
+            let record = Record {
+                version: Version::first(state.latest_frame()),
+                owner: owner.clone(),
+                opening: opening.clone(),
+                state: bytes,
+                ttl,
+            };
+            match store.create(id, &record).await? {
+                Outcome::Committed(_) => version = Some(record.version),
+                _ => return Err(OpenError::Exists),
+            }
+        }
+        let new = NewSession {
+            id,
+            opening,
+            owner,
+            version,
+            ttl,
+            state,
+            held,
+        };
+        let session = self.registry.insert(new)?;
+        tracing::info!(session = session.short_id(), "opened");
+        Ok(session)
+    }
+}
+
+/// Whether the open session of this name was opened by the same request.
+fn check_same(
+    session: &Session,
+    owner: &Owner,
+    digest: [u8; 32],
+    key: &CreationKey,
+) -> Result<(), OpenError> {
+    let is_same = session.owner() == owner && session.opening().request == digest;
+    match (is_same, key) {
+        (true, _) => Ok(()),
+        (false, CreationKey::Id(_)) => Err(OpenError::Exists),
+        (false, CreationKey::Key(..)) => Err(OpenError::KeyReused),
+    }
+}

@@ -1,0 +1,82 @@
+//! What a session begins with.
+
+use super::box_check;
+use super::error::OpenError;
+use super::frames;
+use super::service::SessionService;
+use crate::{Boxes, Fingerprint, PerTarget, SessionState, Stopped, WorkMeter, frame_format};
+use bagtrack_tracker::Params;
+use bytes::Bytes;
+
+/// What a session begins with.
+#[derive(Debug)]
+pub enum Start {
+    /// A first frame, and the targets in it.
+    Frame {
+        /// The file.
+        file: Bytes,
+        /// The targets' boxes.
+        boxes: Boxes,
+        /// The trackers' parameters, with the seed of the first one.
+        params: Box<Params>,
+    },
+    /// A signed snapshot.
+    Snapshot(Bytes),
+}
+
+impl Start {
+    /// How many targets there will be, as far as that is known.
+    pub(super) fn target_count(&self) -> usize {
+        match self {
+            Self::Frame { boxes, .. } => boxes.as_slice().len(),
+            Self::Snapshot(_) => 1,
+        }
+    }
+
+    /// The state of the session that begins so.
+    ///
+    /// # Errors
+    /// The frame, a box, a parameter or the snapshot cannot be used, or the work was stopped.
+    pub(super) fn run(
+        &self,
+        service: &SessionService,
+        meter: &mut WorkMeter,
+    ) -> Result<SessionState, OpenError> {
+        let (file, boxes, params) = match self {
+            Self::Snapshot(bytes) => {
+                let max_recent = service.settings.max_frames;
+                return Ok(SessionState::restore(bytes, &service.keys, max_recent)?);
+            }
+            Self::Frame {
+                file,
+                boxes,
+                params,
+            } => (file, boxes, params),
+        };
+        let format = |source| frame_format(params, source, boxes);
+        let files = std::slice::from_ref(file);
+        let limits = &service.settings.frame;
+        let frame = &frames::decode(files, limits, &format, meter, &service.tracking)?[0];
+        for (target, given) in boxes.as_slice().iter().enumerate() {
+            box_check::check(given, frame.source_size()).map_err(|error| OpenError::Box {
+                error,
+                listed: match boxes {
+                    PerTarget::One(_) => None,
+                    PerTarget::List(list) => Some((target, list.len())),
+                },
+            })?;
+        }
+        let check = || meter.check();
+        let started = SessionState::start(frame, Fingerprint::of(file), boxes, params, check);
+        started.map_err(|error| match error {
+            crate::StartError::Stopped(stopped) => Stopped::into(stopped),
+            error => OpenError::Start {
+                error,
+                listed: match boxes {
+                    PerTarget::One(_) => None,
+                    PerTarget::List(list) => Some(list.len()),
+                },
+            },
+        })
+    }
+}

@@ -1,0 +1,205 @@
+//! Synchronises a cached session with the store, and renews its time to live.
+//!
+//! Memory is a cache of the store: another replica may have gone on with a session that is in memory here.
+
+use super::error::ActError;
+use super::service::SessionService;
+use crate::store::{Gone, Intent, Local, Outcome, Step, reconcile};
+use crate::{
+    Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
+    Stopped, WorkMeter, WorkPanicked,
+};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::timeout;
+
+/// How often a session is fenced: other replicas may be there first each time.
+const MAX_ATTEMPTS: usize = 4;
+/// A session without a record has expired if it had so little time left: answers and clocks are not exact.
+const LATE: Duration = Duration::from_secs(1);
+
+impl SessionService {
+    /// Waits for the session, and brings its state up to the store's. `takes_over` says that frames follow here.
+    pub(super) async fn lock_newest(
+        &self,
+        permit: SessionPermit,
+        flow: Flow,
+        takes_over: bool,
+    ) -> Result<LockedSession, ActError> {
+        let mut locked = permit.lock().await?;
+        let step = self.ask(locked.session(), takes_over).await;
+        self.follow(&mut locked, step, flow).await?;
+        Ok(locked)
+    }
+
+    /// Waits for the session, brings its state up to the store's, and runs `read` with it on a worker.
+    ///
+    /// # Errors
+    /// The session has ended, the store gives no answer, time is over, or that of `read`.
+    pub async fn read<T, E, F>(
+        &self,
+        permit: SessionPermit,
+        queue: QueuePermit,
+        read: F,
+    ) -> Result<T, E>
+    where
+        T: Send + 'static,
+        E: From<ActError> + From<Stopped> + From<WorkPanicked> + Send + 'static,
+        F: FnOnce(&SessionState) -> Result<T, E> + Send + 'static,
+    {
+        let newest = self.lock_newest(permit, queue.flow(), false);
+        let newest = timeout(self.settings.work_timeout, newest).await;
+        let mut locked = newest.map_err(|_| Stopped::Deadline)??;
+        self.run(queue, move |_: &mut WorkMeter| read(locked.state()))
+            .await
+    }
+
+    /// The session as a signed snapshot.
+    ///
+    /// # Errors
+    /// See [`Self::read`].
+    pub async fn snapshot(
+        &self,
+        permit: SessionPermit,
+        queue: QueuePermit,
+    ) -> Result<Vec<u8>, ActError> {
+        let keys = self.keys.clone();
+        self.read(permit, queue, move |state| Ok(state.snapshot(&keys)))
+            .await
+    }
+
+    /// Brings the last answer of a session up to the store's. Waits for no frame that is being tracked here, unless the
+    /// store has a newer one. `permit` is that of a request that is at the session already.
+    ///
+    /// # Errors
+    /// The session has ended, or the store gives no answer.
+    pub async fn refresh(
+        &self,
+        session: &Arc<Session>,
+        permit: Option<&SessionPermit>,
+        flow: Flow,
+    ) -> Result<(), ActError> {
+        match self.ask(session, false).await {
+            Step::Commit(ttl) => {
+                if self.store.is_some() {
+                    session.set_ttl(ttl);
+                }
+                Ok(())
+            }
+            // It may be this replica that is about to note the newer frame.
+            Step::GoOn(_) | Step::Conflict(_) => {
+                let permit = match permit {
+                    Some(permit) => permit.share(),
+                    None => session.read_permit()?,
+                };
+                self.lock_newest(permit, flow, false).await.map(drop)
+            }
+            step => Err(self.refusal(session, step)),
+        }
+    }
+
+    /// Waits for the session with its newest state, and lets no other replica go on from its own copy.
+    ///
+    /// # Errors
+    /// The session has ended, the store gives no answer, or time is over.
+    pub async fn fence(
+        &self,
+        permit: SessionPermit,
+        flow: Flow,
+    ) -> Result<LockedSession, ActError> {
+        let fenced = timeout(self.settings.work_timeout, self.lock_fenced(permit, flow));
+        fenced.await.map_err(|_| Stopped::Deadline)?
+    }
+
+    async fn lock_fenced(
+        &self,
+        permit: SessionPermit,
+        flow: Flow,
+    ) -> Result<LockedSession, ActError> {
+        let mut locked = permit.lock().await?;
+        let Some(store) = &self.store else {
+            return Ok(locked);
+        };
+        for _ in 0..MAX_ATTEMPTS {
+            let session = locked.session().clone();
+            let Some(version) = session.version() else {
+                return Ok(locked);
+            };
+            let outcome = store.fence(session.name(), version).await;
+            let step = reconcile(local(&session), outcome);
+            let is_fenced = matches!(step, Step::Commit(_));
+            self.follow(&mut locked, step, flow).await?;
+            if is_fenced {
+                locked.fenced();
+                return Ok(locked);
+            }
+        }
+        Err(SessionBusy.into())
+    }
+
+    /// A session lives on where there was no room or time for its frame. Otherwise a refused frame does not keep it alive.
+    pub async fn renew(&self, session: &Session, in_store: bool) {
+        session.renew();
+        if let (true, Some(store), Some(version)) = (in_store, &self.store, session.version()) {
+            let ttl = Some(self.registry.idle_lease());
+            // Without an answer it lives as long as before.
+            let _ = store.check(session.name(), version, false, ttl).await;
+        }
+    }
+
+    /// Asks the store whether the copy of a session is the newest.
+    async fn ask(&self, session: &Session, takes_over: bool) -> Step {
+        let outcome = match (&self.store, session.version()) {
+            (Some(store), Some(version)) => {
+                let checked = store.check(session.name(), version, takes_over, None);
+                checked.await
+            }
+            _ => Ok(Outcome::Committed(session.ttl())),
+        };
+        reconcile(local(session), outcome)
+    }
+
+    /// Does a step with a locked session.
+    async fn follow(
+        &self,
+        locked: &mut LockedSession,
+        step: Step,
+        flow: Flow,
+    ) -> Result<(), ActError> {
+        match step {
+            Step::Commit(ttl) => {
+                if self.store.is_some() {
+                    locked.session().set_ttl(ttl);
+                }
+                Ok(())
+            }
+            Step::GoOn(record) | Step::Conflict(record) => {
+                self.take_over(locked, *record, flow).await
+            }
+            step => Err(self.refusal(locked.session(), step)),
+        }
+    }
+
+    /// Why a session cannot be used after this step. It leaves memory where it has gone from the store.
+    pub(super) fn refusal(&self, session: &Arc<Session>, step: Step) -> ActError {
+        let error = match step {
+            Step::Unavailable(unavailable) => return unavailable.into(),
+            Step::Gone(Gone::Ended) => NoSession::Unknown.into(),
+            Step::Gone(Gone::NoRecord) if session.ttl() > LATE => NoSession::Lost.into(),
+            Step::Gone(Gone::NoRecord) => NoSession::Expired.into(),
+            // The next request finds the new one.
+            Step::Replaced(_) | Step::Commit(_) | Step::GoOn(_) | Step::Conflict(_) => {
+                SessionBusy.into()
+            }
+        };
+        self.registry.forget(session);
+        error
+    }
+}
+
+fn local(session: &Session) -> Local {
+    Local {
+        incarnation: session.name().incarnation,
+        intent: Intent::Newest,
+    }
+}

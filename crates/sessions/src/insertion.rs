@@ -1,0 +1,105 @@
+//! Adding a session to the map, and making room for it.
+
+use super::new_session::NewSession;
+use super::opening::Opening;
+use super::registry::{Registry, TooManySessions};
+use super::scheduler::queue_permit::Reservation;
+use super::session::Session;
+use super::state::SessionState;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+use tokio::sync::OwnedSemaphorePermit;
+use uuid::Uuid;
+
+/// Of the sessions in the map, one in so many goes where there is no room.
+const EVICTED: usize = 16;
+
+/// Why a session cannot be added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum InsertError {
+    /// There is no room, or no memory for a state with its parameters.
+    #[error(transparent)]
+    Full(#[from] TooManySessions),
+    /// A live session has its id.
+    #[error("a live session has this id")]
+    Taken,
+}
+
+impl Registry {
+    /// How long a new session waits for its first frame.
+    pub fn first_lease(&self) -> Duration {
+        self.lease.first.min(self.lease.idle)
+    }
+
+    /// How long a session waits for its next frame.
+    pub fn idle_lease(&self) -> Duration {
+        self.lease.idle
+    }
+
+    /// How a session is opened now, by a request with this digest.
+    pub fn opening(&self, request: [u8; 32], state: &SessionState) -> Opening {
+        let expires = self.clock.wall(self.clock.now() + self.first_lease());
+        let expires = expires.duration_since(SystemTime::UNIX_EPOCH);
+        Opening {
+            request,
+            estimates: state.latest(),
+            expires: expires.map_or(0, |time| time.as_secs()),
+            incarnation: rand::random(),
+        }
+    }
+
+    /// Adds a session.
+    ///
+    /// # Errors
+    /// See [`InsertError`].
+    pub fn insert(&self, mut new: NewSession) -> Result<Arc<Session>, InsertError> {
+        self.check_room()?;
+        if self.evicts && self.len() >= self.max_sessions {
+            self.evict();
+        }
+        let full = TooManySessions(self.max_sessions);
+        let held = (new.held, self.hold(&new.state).ok_or(full)?);
+        let held: Reservation = Box::new(held);
+        new.held = held;
+        let session = Session::new(new, self.max_requests, self.lease, self.clock.clone());
+        let before = {
+            let mut sessions = self.map();
+            match sessions.get(&session.id()) {
+                Some(live) if !self.has_ended(live) => return Err(InsertError::Taken),
+                None if sessions.len() >= self.max_sessions => return Err(full.into()),
+                _ => sessions.insert(session.id(), session.clone()),
+            }
+        };
+        // The lock has been released: this may free the session that had the id.
+        before.into_iter().for_each(|ended| ended.close());
+        Ok(session)
+    }
+
+    /// Memory for a state.
+    fn hold(&self, state: &SessionState) -> Option<OwnedSemaphorePermit> {
+        let bytes = state.session_bytes();
+        let held = self.memory.hold(bytes);
+        if held.is_none() && self.evicts {
+            self.evict();
+            return self.memory.hold(bytes);
+        }
+        held
+    }
+
+    /// Removes those sessions that were not used for longest, unless they are in use. They go on living in the store.
+    fn evict(&self) {
+        let idle = |session: &&Arc<Session>| !session.is_busy() && session.version().is_some();
+        let mut oldest: Vec<(Duration, Uuid)> = {
+            let sessions = self.map();
+            let idle = sessions.values().filter(idle);
+            idle.map(|session| (session.expires(), session.id()))
+                .collect()
+        };
+        let count = oldest.len().div_ceil(EVICTED);
+        oldest.sort_unstable();
+        for (_, id) in oldest.into_iter().take(count) {
+            // What is freed is freed after the lock.
+            let _evicted = self.map().remove(&id);
+        }
+    }
+}

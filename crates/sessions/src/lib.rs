@@ -1,0 +1,80 @@
+//! The live sessions: a map of them, and what keeps them apart.
+//!
+//! In: a [`SessionState`], which is a tracker for each target and the answers to the last request. Out: a [`Session`] in the
+//! [`Registry`], found by its id.
+//!
+//! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
+//! its owner, [`Session::enter`] takes one of its few permits, [`ByteCharge::grow`] charges the bytes of its body as they
+//! arrive, [`Admission::enter`] takes a place in the queue before the workers, and [`SessionService::advance`] waits for
+//! the session in order of arrival, and works with a copy of its state on a worker thread.
+//!
+//! What can go wrong, and what is done about it:
+//! - Requests wait for the map. Its lock is held for a look-up only, never during work, and nothing is freed under it.
+//! - Two requests step one tracker at once. A session has a lock of its own, taken in order of arrival.
+//! - Work outlives the request that asked for it. It keeps its permits until it has really ended.
+//! - A client loses the answer to a frame. It sends the frame again with its number: see [`ReplayDecision`].
+//! - A client never ends its session. It expires when no frame came for a while, by a [`Clock`] that tests can move
+//!   forward; sooner where none came at all.
+//! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
+//!   is checked and bounded: see [`SnapshotError`].
+
+mod acts;
+mod clock;
+mod compression;
+mod expired;
+mod insertion;
+mod lease;
+mod mac;
+mod new_session;
+mod opening;
+mod owner;
+mod per_target;
+mod registry;
+mod replay;
+mod scheduler;
+mod session;
+mod session_permit;
+mod short_id;
+mod snapshot;
+mod state;
+mod store;
+mod streams;
+mod targets;
+
+pub use acts::{
+    ActError, CreationKey, FrameBatch, FrameFault, FramesError, GivenBox, IdempotencyStore,
+    ImplausibleBox, OpenError, OpenRequest, Opened, QuotaExhausted, RequestLimits, ServiceParts,
+    ServiceSettings, SessionQuota, SessionService, Start, TrackError, TrackFrom, Tracked,
+    TrackedAway, TrackingMetrics, box_warnings, check_readable_pixels,
+};
+pub use clock::Clock;
+pub use insertion::InsertError;
+pub use lease::Lease;
+pub use mac::{MAC_BYTES, MacKeys};
+pub use new_session::NewSession;
+pub use opening::Opening;
+pub use owner::Owner;
+pub use per_target::{MAX_TARGETS, PerTarget};
+pub use registry::{NoSession, Registry, TooManySessions};
+pub use replay::{Fingerprint, ReplayDecision, ReplayError};
+pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
+pub use scheduler::byte_budget::{ByteBudget, ByteCharge, BytesFull};
+pub use scheduler::fair_queue::WorkerSlot;
+pub use scheduler::flows::Flow;
+pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};
+pub use scheduler::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
+pub use session::Session;
+pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
+pub use short_id::short_id;
+pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
+pub use state::{SessionState, StepError};
+pub use store::{
+    AddressError, Commit, Gone, Intent, Local, Outcome, Record, RedisStore, SessionName,
+    SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
+    reconcile,
+};
+pub use streams::{OpenStreams, StreamPlace};
+pub use targets::{
+    Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
+    target_seed,
+};

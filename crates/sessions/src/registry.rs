@@ -1,0 +1,294 @@
+//! The map of live sessions. Its lock is held for a look-up only: no work is done and no session is freed under it.
+
+use super::clock::Clock;
+use super::expired::ExpiredIds;
+use super::lease::Lease;
+use super::owner::Owner;
+use super::scheduler::byte_budget::ByteBudget;
+use super::session::Session;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+use uuid::Uuid;
+
+/// The service holds as many sessions as it may; try again later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("there are {0} sessions, which is the maximum")]
+pub struct TooManySessions(pub usize);
+
+/// Why there is no session for a client under an id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoSession {
+    /// There was none, or it was deleted, or it belongs to another client.
+    #[error("there is no such session")]
+    Unknown,
+    /// It was not used for too long.
+    #[error("the session has expired")]
+    Expired,
+    /// The store has no record of it, and its time was not over.
+    #[error("the store has lost the session")]
+    Lost,
+}
+
+/// The live sessions.
+#[derive(Debug)]
+pub struct Registry {
+    sessions: Mutex<HashMap<Uuid, Arc<Session>>>,
+    pub(super) max_sessions: usize,
+    /// Whether sessions go where there is no room: a store has them.
+    pub(super) evicts: bool,
+    /// Locked for a moment only, and never together with the map.
+    expired: Mutex<ExpiredIds>,
+    pub(super) max_requests: usize,
+    pub(super) lease: Lease,
+    pub(super) clock: Clock,
+    pub(super) memory: ByteBudget,
+}
+
+impl Registry {
+    /// At most `max_sessions` sessions, each with at most `max_requests` requests at once. A session expires when no
+    /// frame comes within its lease.
+    pub fn new(max_sessions: usize, max_requests: usize, lease: Lease, clock: Clock) -> Self {
+        Self {
+            sessions: Mutex::default(),
+            expired: Mutex::default(),
+            max_sessions,
+            evicts: false,
+            max_requests,
+            lease,
+            clock,
+            memory: ByteBudget::new(usize::MAX),
+        }
+    }
+
+    /// The states of all sessions together take at most so many bytes.
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = ByteBudget::new(bytes);
+        self
+    }
+
+    /// Sessions that are not in use go where there is no room. A store has them.
+    pub fn with_eviction(mut self) -> Self {
+        self.evicts = true;
+        self
+    }
+
+    /// There is no room for one more session.
+    pub(super) fn full(&self) -> TooManySessions {
+        TooManySessions(self.max_sessions)
+    }
+
+    /// Whether there is room for one more session, after the expired ones have gone.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn check_room(&self) -> Result<(), TooManySessions> {
+        if self.len() >= self.max_sessions {
+            self.sweep();
+        }
+        if self.len() >= self.max_sessions && !self.evicts {
+            return Err(TooManySessions(self.max_sessions));
+        }
+        Ok(())
+    }
+
+    /// The live session of this id, whoever it belongs to.
+    pub fn live(&self, id: Uuid) -> Option<Arc<Session>> {
+        let session = self.map().get(&id).cloned();
+        session.filter(|session| !self.has_ended(session))
+    }
+
+    /// The live session of this id and owner. This does not count as use.
+    ///
+    /// # Errors
+    /// See [`NoSession`]. Of another owner's session nothing is told.
+    pub fn find(&self, id: Uuid, owner: &Owner) -> Result<Arc<Session>, NoSession> {
+        let ended = {
+            let mut sessions = self.map();
+            match sessions.get(&id) {
+                Some(session) if session.owner() != owner => return Err(NoSession::Unknown),
+                Some(session) if !self.has_ended(session) => return Ok(session.clone()),
+                _ => sessions.remove(&id),
+            }
+        };
+        // The lock has been released: this may free the session.
+        if let Some(ended) = ended {
+            self.end(&ended);
+        }
+        match self.expired().contains(id, owner, self.clock.now()) {
+            true => Err(NoSession::Expired),
+            false => Err(NoSession::Unknown),
+        }
+    }
+
+    /// Whether the session of this id lives, whoever it belongs to.
+    pub fn is_live(&self, id: Uuid) -> bool {
+        self.live(id).is_some()
+    }
+
+    /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
+    /// there is no such session.
+    pub fn remove(&self, id: Uuid) -> bool {
+        let removed = self.map().remove(&id);
+        let Some(session) = removed else { return false };
+        let live = !self.has_ended(&session);
+        session.close();
+        live
+    }
+
+    /// Removes this session from memory, unless another one has its id by now. It may live on in the store.
+    pub fn forget(&self, session: &Arc<Session>) {
+        // What is freed is freed after the lock.
+        let _forgotten = match self.map().entry(session.id()) {
+            Entry::Occupied(entry) if Arc::ptr_eq(entry.get(), session) => Some(entry.remove()),
+            _ => None,
+        };
+    }
+
+    /// Removes the sessions that have expired. Returns their number.
+    pub fn sweep(&self) -> usize {
+        let ended: Vec<Arc<Session>> = {
+            let mut sessions = self.map();
+            let ended = sessions.extract_if(|_, session| self.has_ended(session));
+            ended.map(|(_, session)| session).collect()
+        };
+        ended.iter().for_each(|session| self.end(session));
+        ended.len()
+    }
+
+    /// All sessions in the map.
+    pub fn all(&self) -> Vec<Arc<Session>> {
+        self.map().values().cloned().collect()
+    }
+
+    /// Number of sessions in the map, those included that have expired since the last sweep.
+    pub fn len(&self) -> usize {
+        self.map().len()
+    }
+
+    /// Whether there are no sessions.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The wall-clock time at which the session expires when it is not used again.
+    pub fn expires_at(&self, session: &Session) -> SystemTime {
+        self.clock.wall(session.expires())
+    }
+
+    pub(super) fn has_ended(&self, session: &Session) -> bool {
+        let expired = self.clock.now() >= session.expires();
+        session.is_closed() || (expired && !session.is_busy())
+    }
+
+    /// Closes a session that has ended and is no longer in the map.
+    fn end(&self, session: &Session) {
+        if !session.is_closed() {
+            let (owner, now) = (session.owner().clone(), self.clock.now());
+            self.expired().note(session.id(), owner, now);
+        }
+        session.close();
+    }
+
+    fn expired(&self) -> MutexGuard<'_, ExpiredIds> {
+        // Nothing panics while it is held.
+        self.expired.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn map(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Session>>> {
+        // Nothing panics while it is held; were it so, the map itself would still be whole.
+        self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Admission, Fingerprint, Flow, NewSession, PerTarget, SessionState, WorkerSlot};
+    use bagtrack_tracker::{Frame, Preset, Rect};
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    const IDLE: Duration = Duration::from_secs(600);
+    const LEASE: Lease = Lease {
+        first: IDLE,
+        idle: IDLE,
+    };
+
+    fn insert(registry: &Registry) -> Arc<Session> {
+        let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
+        let frame = Frame::from_luma(64, 48, luma).unwrap();
+        let target = Rect {
+            x: 10.0,
+            y: 10.0,
+            width: 20.0,
+            height: 16.0,
+        };
+        let (print, params) = (Fingerprint::of(b"first"), Preset::Paper.params());
+        let state = SessionState::start(&frame, print, &PerTarget::One(target), &params, || Ok(()))
+            .unwrap();
+        let new = NewSession {
+            id: Uuid::new_v4(),
+            opening: registry.opening([0; 32], &state),
+            owner: Owner::default(),
+            version: None,
+            ttl: registry.first_lease(),
+            state,
+            held: Box::new(()),
+        };
+        registry.insert(new).unwrap()
+    }
+
+    /// A session in a new registry, which notes whether the map's lock was free when the session was freed.
+    fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
+        let clock = Clock::default();
+        let registry = Arc::new(Registry::new(9, 9, LEASE, clock.clone()));
+        let session = insert(&registry);
+        let (freed, was_free) = mpsc::channel();
+        let map = registry.clone();
+        let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
+        *session.on_drop.lock().unwrap() = Some(Box::new(probe));
+        (registry, clock, session.id(), was_free)
+    }
+
+    #[test]
+    fn no_session_is_freed_under_the_lock_of_the_map() {
+        let (registry, clock, id, was_free) = watched();
+        clock.advance(IDLE);
+        let owner = Owner::default();
+        assert_eq!(registry.find(id, &owner).unwrap_err(), NoSession::Expired);
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is looked up");
+
+        let (registry, _, id, was_free) = watched();
+        assert!(registry.remove(id));
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is removed");
+
+        let (registry, clock, id, was_free) = watched();
+        clock.advance(IDLE);
+        assert_eq!(registry.sweep(), 1);
+        assert_eq!(was_free.try_recv(), Ok(true), "when it is swept");
+        let swept = registry.find(id, &Owner::default());
+        assert_eq!(swept.unwrap_err(), NoSession::Expired);
+    }
+
+    #[tokio::test]
+    async fn a_session_whose_work_panicked_has_ended() {
+        let registry = Registry::new(9, 9, LEASE, Clock::default());
+        let session = insert(&registry);
+        let mut locked = session.enter().unwrap().lock().await.unwrap();
+        let waiting = session.enter().unwrap();
+        let admission = Admission::new(9, 1).unwrap();
+        let work = move |_: &mut WorkerSlot| {
+            let _state = locked.state();
+            panic!("a test panics in the work");
+        };
+        let place = admission.enter(Flow(0), Box::new(())).unwrap();
+        let panicked: Result<(), _> = admission.run(place, work).await;
+        assert!(panicked.is_err());
+        assert!(waiting.lock().await.is_err(), "those who wait are told");
+        let found = registry.find(session.id(), &Owner::default());
+        assert_eq!(found.unwrap_err(), NoSession::Unknown);
+        assert!(registry.is_empty());
+    }
+}

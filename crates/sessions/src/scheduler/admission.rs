@@ -1,0 +1,269 @@
+//! Which requests may work: a queue before the workers.
+//!
+//! A request whose body has arrived takes a place in the queue; it is refused at once when there is none. Then it waits
+//! for a worker, which clients get [in turns](super::fair_queue). All its permits move into the work itself. A request
+//! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
+//! has ended, and never more threads work than there are workers.
+
+use super::fair_queue::{FairQueue, WorkerSlot};
+use super::flows::{Flow, SizeClass};
+use super::queue_permit::{QueuePermit, Reservation, Ticket};
+use super::workers::Workers;
+use std::any::Any;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, PoisonError};
+use tokio::sync::{Semaphore, oneshot};
+
+/// The queue is full; try again later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the queue is full")]
+pub struct QueueFull;
+
+/// The work panicked: what the panic said. The panic hook has already reported it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the work panicked: {0}")]
+pub struct WorkPanicked(String);
+
+impl WorkPanicked {
+    fn of(panic: &(dyn Any + Send)) -> Self {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+        Self(text.unwrap_or("a value that is not text").to_owned())
+    }
+}
+
+/// Work that waits for a worker. Dropping it drops the work, if no worker has taken it.
+struct Unstarted<W>(Arc<Mutex<Option<W>>>);
+
+impl<W> Drop for Unstarted<W> {
+    fn drop(&mut self) {
+        drop(take(&self.0));
+    }
+}
+
+/// Takes the work that waits, if nobody did before.
+fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
+    // Nothing panics while it is held.
+    waiting
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .take()
+}
+
+/// A queue before the workers. Clones share both.
+#[derive(Debug, Clone)]
+pub struct Admission {
+    queue: Arc<Semaphore>,
+    workers: FairQueue,
+    threads: Arc<[Workers; 2]>,
+}
+
+impl Admission {
+    /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work.
+    ///
+    /// # Errors
+    /// The system gives no threads for the workers.
+    pub fn new(queue: usize, workers: usize) -> io::Result<Self> {
+        // As many again may wait between two frames.
+        let threads = |pace: SizeClass| Workers::new(2 * workers, pace.niceness());
+        Ok(Self {
+            queue: Arc::new(Semaphore::new(queue)),
+            workers: FairQueue::new(workers),
+            threads: Arc::new([threads(SizeClass::Small)?, threads(SizeClass::Large)?]),
+        })
+    }
+
+    /// Whether there is a place in the queue now. It may be gone when it is asked for.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn check_place(&self) -> Result<(), QueueFull> {
+        match self.queue.available_permits() {
+            0 => Err(QueueFull),
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes a place in the queue for a client's request, which holds `held` until its work has ended.
+    ///
+    /// # Errors
+    /// All places are taken.
+    pub fn enter(&self, flow: Flow, held: Reservation) -> Result<QueuePermit, QueueFull> {
+        self.rejoin(Ticket::new(flow, held))
+    }
+
+    /// Takes a place in the queue for a request that has left it.
+    ///
+    /// # Errors
+    /// All places are taken.
+    pub fn rejoin(&self, request: Ticket) -> Result<QueuePermit, QueueFull> {
+        let place = self.queue.clone().try_acquire_owned();
+        Ok(QueuePermit::new(request, place.map_err(|_| QueueFull)?))
+    }
+
+    /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is
+    /// dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
+    ///
+    /// # Errors
+    /// The work panicked.
+    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkPanicked>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut WorkerSlot) -> T + Send + 'static,
+    {
+        let (flow, length) = queue.turn();
+        let span = tracing::Span::current();
+        let (send, outcome) = oneshot::channel();
+        // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
+        let unstarted = Unstarted(Arc::new(Mutex::new(Some((queue, work)))));
+        let (taken, threads) = (unstarted.0.clone(), self.threads.clone());
+        let start = move |mut turn: WorkerSlot| {
+            let Some((queue, work)) = take(&taken) else {
+                return Err(turn);
+            };
+            let threads = &threads[turn.pace() as usize];
+            threads.start(Box::new(move || {
+                turn.begin();
+                // A panic drops `work`, so no half-changed value is read.
+                let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut turn))));
+                drop(queue);
+                Box::new(move || {
+                    drop(turn);
+                    // It cannot be sent when the client has gone.
+                    let _ = send.send(outcome);
+                })
+            }));
+            Ok(())
+        };
+        self.workers.enter(flow, length, Box::new(start));
+        let outcome = outcome.await.expect("all work ends, and says how");
+        outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()))
+    }
+
+    /// Places free in the queue.
+    pub fn queue_places(&self) -> usize {
+        self.queue.available_permits()
+    }
+
+    /// Workers that have work.
+    pub fn busy_workers(&self) -> usize {
+        self.workers.running()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::flows::Job;
+    use super::*;
+    use std::sync::mpsc;
+
+    fn enter(admission: &Admission) -> Result<QueuePermit, QueueFull> {
+        admission.enter(Flow(0), Box::new(()))
+    }
+
+    #[tokio::test]
+    async fn the_queue_refuses_when_full_and_frees_on_drop() {
+        let admission = Admission::new(1, 1).unwrap();
+        let permit = enter(&admission).unwrap();
+        assert_eq!(admission.check_place(), Err(QueueFull));
+        assert_eq!(enter(&admission).unwrap_err(), QueueFull);
+        drop(permit);
+        assert!(enter(&admission).is_ok());
+    }
+
+    #[tokio::test]
+    async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
+        let admission = Admission::new(1, 1).unwrap();
+        let (started_tx, started) = mpsc::channel();
+        let (finish, finish_rx) = mpsc::channel::<()>();
+        let queue = enter(&admission).unwrap();
+        let request = tokio::spawn({
+            let admission = admission.clone();
+            async move {
+                let work = move |_: &mut WorkerSlot| {
+                    started_tx.send(()).unwrap();
+                    finish_rx.recv().unwrap();
+                };
+                admission.run(queue, work).await
+            }
+        });
+        tokio::task::spawn_blocking(move || started.recv().unwrap())
+            .await
+            .unwrap();
+        request.abort();
+        assert!(request.await.unwrap_err().is_cancelled());
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (0, 1));
+        finish.send(()).unwrap();
+        drop(admission.workers.ask(Flow(0), Job::Single).await);
+        assert_eq!(admission.busy_workers(), 0);
+    }
+
+    #[tokio::test]
+    async fn work_is_never_done_on_the_thread_that_asks_for_it() {
+        let admission = Admission::new(9, 2).unwrap();
+        let here = std::thread::current().id();
+        for _ in 0..20 {
+            let queue = enter(&admission).unwrap();
+            let there = admission.run(queue, |_| std::thread::current().id());
+            assert_ne!(there.await.unwrap(), here);
+        }
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (9, 0));
+    }
+
+    #[tokio::test]
+    async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
+        let admission = Admission::new(9, 1).unwrap();
+        // A thread that starts late would be the one that became idle last.
+        while format!("{:?}", admission.threads[0]) != "Workers(2 idle)" {
+            tokio::task::yield_now().await;
+        }
+        let (go, wait) = mpsc::channel::<()>();
+        let first = enter(&admission).unwrap();
+        let mut first = Box::pin(admission.run(first, move |_| {
+            wait.recv().unwrap();
+            std::thread::current().id()
+        }));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        let mut others: Vec<_> = (0..5)
+            .map(|_| enter(&admission).unwrap())
+            .map(|queue| Box::pin(admission.run(queue, |_| std::thread::current().id())))
+            .collect();
+        for other in &mut others {
+            assert!(futures_util::poll!(other).is_pending());
+        }
+        go.send(()).unwrap();
+        let thread = first.await.unwrap();
+        for other in others {
+            assert_eq!(other.await.unwrap(), thread);
+        }
+    }
+
+    #[tokio::test]
+    async fn work_whose_client_has_gone_before_it_began_is_not_done() {
+        let admission = Admission::new(2, 1).unwrap();
+        let (go, wait) = mpsc::channel::<()>();
+        let first = enter(&admission).unwrap();
+        let mut first = Box::pin(admission.run(first, move |_| wait.recv().unwrap()));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        let second = enter(&admission).unwrap();
+        let mut second = Box::pin(admission.run(second, |_| panic!("nobody waits for it")));
+        assert!(futures_util::poll!(&mut second).is_pending());
+        assert_eq!(admission.queue_places(), 0);
+        drop(second);
+        assert_eq!(admission.queue_places(), 1, "its place is free at once");
+        go.send(()).unwrap();
+        first.await.unwrap();
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (2, 0));
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_an_error_and_frees_the_permits() {
+        let admission = Admission::new(1, 1).unwrap();
+        let queue = enter(&admission).unwrap();
+        let result = admission.run(queue, |_| panic!("a test panics")).await;
+        let panicked: Result<(), WorkPanicked> = result;
+        assert_eq!(panicked, Err(WorkPanicked("a test panics".to_owned())));
+        assert_eq!((admission.queue_places(), admission.busy_workers()), (1, 0));
+    }
+}

@@ -1,0 +1,16 @@
+//! Which work runs when: the queue before the workers, the turns of clients, and the bounds of one request's work.
+//!
+//! In: work on frames, with the client that it is for. Out: its result, after it ran on a worker thread.
+//!
+//! What can go wrong: there is more work than the workers do ([`Admission::enter`](admission::Admission::enter) refuses
+//! it), one client sends most of it ([`fair_queue`] gives the others their turns), or one request costs too much
+//! ([`work_limit`] stops it between two frames). Work whose client has gone keeps its permits until it has ended.
+
+pub(crate) mod admission;
+pub(crate) mod byte_budget;
+mod cpu_time;
+pub(crate) mod fair_queue;
+pub(crate) mod flows;
+pub(crate) mod queue_permit;
+pub(crate) mod work_limit;
+mod workers;

@@ -1,0 +1,91 @@
+//! A request's place in the queue, and what it is to the workers.
+
+use super::flows::{Flow, Job};
+use super::work_limit::CpuSpent;
+use std::any::Any;
+use std::sync::Arc;
+use tokio::sync::OwnedSemaphorePermit;
+
+/// What a request holds until its work has ended: its share of memory, its place in a quota.
+pub type Reservation = Box<dyn Any + Send + Sync>;
+
+/// A place in the queue, given back when the last clone is dropped.
+#[derive(Debug, Clone)]
+pub struct QueuePermit {
+    // The place is free before what is held.
+    _place: Arc<OwnedSemaphorePermit>,
+    request: Ticket,
+}
+
+/// A request without a place in the queue: it has not come there, or waits for something else than a worker.
+#[derive(Debug, Clone)]
+pub struct Ticket {
+    flow: Flow,
+    length: Job,
+    cpu_share: u32,
+    spent: CpuSpent,
+    _held: Arc<Reservation>,
+}
+
+impl Ticket {
+    /// A client's request, which holds `held` until its work has ended.
+    pub(super) fn new(flow: Flow, held: Reservation) -> Self {
+        Self {
+            flow,
+            length: Job::Single,
+            cpu_share: 1,
+            spent: CpuSpent::default(),
+            _held: Arc::new(held),
+        }
+    }
+}
+
+impl QueuePermit {
+    /// The place of this request.
+    pub(super) fn new(request: Ticket, place: OwnedSemaphorePermit) -> Self {
+        Self {
+            _place: Arc::new(place),
+            request,
+        }
+    }
+
+    /// Whose turn the request's work is done in, and how much work it is.
+    pub(super) fn turn(&self) -> (Flow, Job) {
+        (self.request.flow, self.request.length)
+    }
+
+    /// Whose turn the request's work is done in.
+    pub fn flow(&self) -> Flow {
+        self.request.flow
+    }
+
+    /// For work on so many frames, which gives way to shorter work between two of them.
+    pub fn for_frames(mut self, count: usize) -> Self {
+        self.request.length = match count {
+            0 | 1 => Job::Single,
+            _ => Job::Batch,
+        };
+        self
+    }
+
+    /// The request may take the processor time of so many requests.
+    pub fn with_cpu_of(mut self, requests: u32) -> Self {
+        self.request.cpu_share = requests;
+        self
+    }
+
+    /// Of how many requests it may take the processor time.
+    pub fn cpu_share(&self) -> u32 {
+        self.request.cpu_share
+    }
+
+    /// Processor time that the request has taken.
+    pub fn spent(&self) -> &CpuSpent {
+        &self.request.spent
+    }
+
+    /// Gives the place back, as far as no work of the request has it, and keeps what the request holds.
+    pub fn yield_place(self) -> Ticket {
+        self.request
+    }
+}

@@ -1,0 +1,172 @@
+//! When work on several frames stops early: between two of them.
+//!
+//! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
+//! it also lets other clients' requests go first.
+
+use super::cpu_time::thread_cpu_time;
+use super::fair_queue::WorkerSlot;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Why work was stopped. What it had done was undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Stopped {
+    /// Nobody waits for the answer any more.
+    #[error("the client has gone")]
+    Abandoned,
+    /// The time of the request is over.
+    #[error("the deadline has passed")]
+    Deadline,
+    /// The work took more processor time than a request may; the number is that maximum.
+    #[error("the work took more than {0:?} of processor time")]
+    Cost(Duration),
+}
+
+/// Processor time that the work of one request has taken. Clones are the same request's.
+#[derive(Debug, Clone, Default)]
+pub struct CpuSpent(Arc<AtomicU64>);
+
+impl CpuSpent {
+    fn total(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Ordering::Relaxed))
+    }
+
+    fn add(&self, time: Duration) {
+        let nanos = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.0.fetch_add(nanos, Ordering::Relaxed);
+    }
+}
+
+/// What a request's work may take. Clones share whether it was abandoned.
+#[derive(Debug, Clone)]
+pub struct WorkLimit {
+    deadline: Instant,
+    max_cpu: Duration,
+    spent: CpuSpent,
+    abandoned: Arc<AtomicBool>,
+}
+
+impl WorkLimit {
+    /// Until `deadline`, with at most `max_cpu` of processor time, of which the request has `spent` some before.
+    pub fn new(deadline: Instant, max_cpu: Duration, spent: CpuSpent) -> Self {
+        Self {
+            deadline,
+            max_cpu,
+            spent,
+            abandoned: Arc::default(),
+        }
+    }
+
+    /// The work counts as abandoned when the returned value is dropped.
+    pub fn abandon_on_drop(&self) -> AbandonOnDrop {
+        AbandonOnDrop(self.abandoned.clone())
+    }
+
+    /// Begins to count this thread's processor time, while the work has this turn.
+    pub fn start<'a>(&'a self, turn: &'a mut WorkerSlot) -> WorkMeter<'a> {
+        WorkMeter {
+            limit: self,
+            turn,
+            started: thread_cpu_time(),
+            steps: Vec::new(),
+        }
+    }
+}
+
+/// Marks work as abandoned when it is dropped.
+#[derive(Debug)]
+pub struct AbandonOnDrop(Arc<AtomicBool>);
+
+impl Drop for AbandonOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// Counts what work takes on this thread.
+#[derive(Debug)]
+pub struct WorkMeter<'a> {
+    limit: &'a WorkLimit,
+    turn: &'a mut WorkerSlot,
+    started: Duration,
+    steps: Vec<Duration>,
+}
+
+impl WorkMeter<'_> {
+    /// Does a step of the work, and notes its processor time.
+    pub fn step<T>(&mut self, step: impl FnOnce() -> T) -> T {
+        let before = thread_cpu_time();
+        let result = step();
+        self.steps.push(thread_cpu_time().saturating_sub(before));
+        result
+    }
+
+    /// The processor time of each step since this was asked last.
+    pub fn take_steps(&mut self) -> Vec<Duration> {
+        std::mem::take(&mut self.steps)
+    }
+
+    /// Processor time that the work has taken.
+    pub fn cpu_time(&self) -> Duration {
+        thread_cpu_time().saturating_sub(self.started)
+    }
+
+    /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.
+    ///
+    /// # Errors
+    /// It may not.
+    pub fn check(&mut self) -> Result<(), Stopped> {
+        let limit = self.limit;
+        self.turn.yield_to_others();
+        if limit.abandoned.load(Ordering::Acquire) {
+            return Err(Stopped::Abandoned);
+        }
+        if Instant::now() >= limit.deadline {
+            return Err(Stopped::Deadline);
+        }
+        if limit.spent.total() + self.cpu_time() > limit.max_cpu {
+            return Err(Stopped::Cost(limit.max_cpu));
+        }
+        Ok(())
+    }
+}
+
+impl Drop for WorkMeter<'_> {
+    fn drop(&mut self) {
+        self.limit.spent.add(self.cpu_time());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fair_queue::FairQueue;
+    use super::super::flows::{Flow, Job};
+    use super::*;
+
+    const LONG: Duration = Duration::from_secs(600);
+
+    #[tokio::test]
+    async fn each_limit_stops_the_work() {
+        let mut turn = FairQueue::new(1).ask(Flow(0), Job::Single).await.unwrap();
+        let soon = || Instant::now() + LONG;
+        let limit = WorkLimit::new(soon(), LONG, CpuSpent::default());
+        let client = limit.abandon_on_drop();
+        assert_eq!(limit.start(&mut turn).check(), Ok(()));
+        drop(client);
+        assert_eq!(limit.start(&mut turn).check(), Err(Stopped::Abandoned));
+        let late = WorkLimit::new(Instant::now(), LONG, CpuSpent::default());
+        assert_eq!(late.start(&mut turn).check(), Err(Stopped::Deadline));
+        let limit = WorkLimit::new(soon(), Duration::from_micros(10), CpuSpent::default());
+        let mut meter = limit.start(&mut turn);
+        let mut checked = meter.check();
+        while checked.is_ok() {
+            checked = meter.check();
+        }
+        assert_eq!(checked, Err(Stopped::Cost(Duration::from_micros(10))));
+        // What the request's next work would take is used up, too.
+        drop(meter);
+        let next = limit.start(&mut turn).check();
+        assert_eq!(next, Err(Stopped::Cost(Duration::from_micros(10))));
+    }
+}

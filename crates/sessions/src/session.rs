@@ -1,0 +1,213 @@
+//! One session: its trackers behind a lock, and what can be read of it without the lock.
+
+use super::clock::Clock;
+use super::lease::Lease;
+use super::new_session::NewSession;
+use super::opening::Opening;
+use super::owner::Owner;
+use super::scheduler::queue_permit::Reservation;
+use super::short_id::short_id;
+use super::state::SessionState;
+use super::store::{SessionName, Version};
+use super::targets::Estimates;
+use bagtrack_tracker::Params;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::sync::{Mutex as AsyncMutex, Semaphore, watch};
+use uuid::Uuid;
+
+/// One session.
+#[cfg_attr(not(test), derive(Debug))]
+pub struct Session {
+    id: Uuid,
+    owner: Owner,
+    opening: Opening,
+    source_size: (u32, u32),
+    target_count: usize,
+    params: Params,
+    pub(super) state: Arc<AsyncMutex<SessionState>>,
+    /// The permits that are free. Each request at this session has one, the one at work included.
+    pub(super) permits: Arc<Semaphore>,
+    max_requests: usize,
+    /// The place of the session in its client's quota.
+    _held: Reservation,
+    /// The last answer, to be read and waited for without the lock.
+    pub(super) latest: watch::Sender<Estimates>,
+    /// Requests with frames at this session.
+    pub(super) frame_requests: AtomicUsize,
+    /// Which version of the record in the store the state goes on from. It changes under the lock of the state.
+    version: Mutex<Option<Version>>,
+    clock: Clock,
+    idle: Duration,
+    /// When the session expires, by its clock.
+    expires_ms: AtomicU64,
+    closed: AtomicBool,
+    /// Called when the session is freed.
+    #[cfg(test)]
+    pub(super) on_drop: Mutex<Option<Box<dyn FnOnce() + Send>>>,
+}
+
+#[cfg(test)]
+impl std::fmt::Debug for Session {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Session({})", self.id)
+    }
+}
+
+#[cfg(test)]
+impl Drop for Session {
+    fn drop(&mut self) {
+        let on_drop = self.on_drop.get_mut().expect("no probe panics");
+        on_drop.take().into_iter().for_each(|probe| probe());
+    }
+}
+
+impl Session {
+    pub(super) fn new(
+        new: NewSession,
+        max_requests: usize,
+        lease: Lease,
+        clock: Clock,
+    ) -> Arc<Self> {
+        let NewSession {
+            id,
+            opening,
+            owner,
+            version,
+            ttl,
+            state,
+            held,
+        } = new;
+        let expires = clock.now() + ttl;
+        Arc::new(Self {
+            id,
+            owner,
+            opening,
+            source_size: state.source_size(),
+            target_count: state.target_count(),
+            params: state.params().clone(),
+            latest: watch::Sender::new(state.latest()),
+            frame_requests: AtomicUsize::new(0),
+            version: Mutex::new(version),
+            state: Arc::new(AsyncMutex::new(state)),
+            permits: Arc::new(Semaphore::new(max_requests)),
+            max_requests,
+            _held: held,
+            clock,
+            idle: lease.idle,
+            expires_ms: AtomicU64::new(milliseconds(expires)),
+            closed: AtomicBool::new(false),
+            #[cfg(test)]
+            on_drop: Mutex::default(),
+        })
+    }
+
+    /// The session's id.
+    pub fn id(&self) -> Uuid {
+        self.id
+    }
+
+    /// The beginning of the id, for the log: whoever reads it cannot use the session.
+    pub fn short_id(&self) -> String {
+        short_id(self.id)
+    }
+
+    /// Whose the session is.
+    pub fn owner(&self) -> &Owner {
+        &self.owner
+    }
+
+    /// How the session was opened.
+    pub fn opening(&self) -> &Opening {
+        &self.opening
+    }
+
+    /// What the store calls it.
+    pub fn name(&self) -> SessionName {
+        SessionName {
+            id: self.id,
+            incarnation: self.opening.incarnation,
+        }
+    }
+
+    /// Width and height of the session's frames as uploaded.
+    pub fn source_size(&self) -> (u32, u32) {
+        self.source_size
+    }
+
+    /// How many targets it has.
+    pub fn target_count(&self) -> usize {
+        self.target_count
+    }
+
+    /// The trackers' parameters, with the seed of the first one.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// The last answer.
+    pub fn latest(&self) -> Estimates {
+        self.latest.borrow().clone()
+    }
+
+    /// The number of the last frame that was answered.
+    pub fn latest_frame(&self) -> u64 {
+        self.latest.borrow().first().frame
+    }
+
+    /// Which version of the record in the store the state goes on from; none where there is no record.
+    pub fn version(&self) -> Option<Version> {
+        *self.version.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The state is that of the record in the store, or goes on from it.
+    pub(super) fn set_version(&self, version: Option<Version>) {
+        *self.version.lock().unwrap_or_else(PoisonError::into_inner) = version;
+    }
+
+    /// The last frame whose state is in the store, where there is one.
+    pub fn checkpoint(&self) -> Option<u64> {
+        self.version().map(|version| version.checkpoint)
+    }
+
+    /// When the session expires unless a frame comes, by its clock.
+    pub fn expires(&self) -> Duration {
+        Duration::from_millis(self.expires_ms.load(Ordering::Relaxed))
+    }
+
+    /// How long the session lives without a frame.
+    pub fn ttl(&self) -> Duration {
+        self.expires().saturating_sub(self.clock.now())
+    }
+
+    /// The session expires after this time without a frame.
+    pub fn set_ttl(&self, ttl: Duration) {
+        let expires = milliseconds(self.clock.now() + ttl);
+        self.expires_ms.store(expires, Ordering::Relaxed);
+    }
+
+    /// The session expires an idle time from now: a frame was taken, or only the service is to blame that it was not.
+    pub fn renew(&self) {
+        let expires = milliseconds(self.clock.now() + self.idle);
+        self.expires_ms.fetch_max(expires, Ordering::Relaxed);
+    }
+
+    /// Whether a request is at the session.
+    pub fn is_busy(&self) -> bool {
+        self.permits.available_permits() < self.max_requests
+    }
+
+    /// Whether the session has ended.
+    pub fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
+    }
+
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+    }
+}
+
+fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,222 @@
+//! A store in Redis or Valkey: each call is one script.
+
+use super::super::record::{Record, SessionName, Version};
+use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+use super::address::StoreAddress;
+use super::connection::{Call, Connection};
+use super::scripts::Scripts;
+use crate::owner::Owner;
+use redis::{FromRedisValue, Script, ScriptInvocation};
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+use tokio::time::sleep;
+use uuid::Uuid;
+
+/// How long an idempotency key names its session.
+const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+/// How often the store is asked whether it is there.
+const PROBE: Duration = Duration::from_millis(250);
+
+/// The store. Clones are the same store.
+#[derive(Clone)]
+pub struct RedisStore(Arc<Shared>);
+
+/// A record's fields as the scripts tell them: generation, checkpoint, head, state.
+type Fields = (u64, u64, Vec<u8>, Vec<u8>);
+
+struct Shared {
+    connection: Connection,
+    scripts: Scripts,
+    prefix: String,
+}
+
+impl Shared {
+    async fn probe(&self) {
+        let key = format!("{}:probe", self.prefix);
+        let write = self.scripts.probe.key(key);
+        self.connection.probe(Call::Script(write)).await;
+    }
+}
+
+/// Finds out whether the store is there, as long as somebody uses it.
+async fn probe(store: Weak<Shared>) {
+    while let Some(store) = store.upgrade() {
+        store.probe().await;
+        drop(store);
+        sleep(PROBE).await;
+    }
+}
+
+/// What scripts answer.
+struct Answer(Outcome);
+
+impl FromRedisValue for Answer {
+    fn from_redis_value(value: redis::Value) -> Result<Self, redis::ParsingError> {
+        let parts: Vec<redis::Value> = FromRedisValue::from_redis_value(value)?;
+        let mut parts = parts.into_iter();
+        let mut next = || parts.next().ok_or("too few values");
+        let kind = i64::from_redis_value(next()?)?;
+        if kind == 0 {
+            return Ok(Self(Outcome::NotFound));
+        }
+        if kind == 3 {
+            return Ok(Self(Outcome::Tombstoned));
+        }
+        let ttl = i64::from_redis_value(next()?)?;
+        let ttl = Duration::from_millis(u64::try_from(ttl).unwrap_or(0));
+        if kind == 1 {
+            return Ok(Self(Outcome::Committed(ttl)));
+        }
+        let (generation, checkpoint, head, state) = Fields::from_redis_value(next()?)?;
+        let record = Record::at_checkpoint(generation, checkpoint, &head, state, ttl);
+        let record = record.map_err(|error| error.to_string())?;
+        Ok(Self(Outcome::Conflict(Box::new(record))))
+    }
+}
+
+impl RedisStore {
+    /// The store at this address. The keys of its records begin with `prefix`. Calls end after `timeout`. It waits for
+    /// the first answer, and goes on without one.
+    ///
+    /// # Errors
+    /// The address cannot be used.
+    pub async fn connect(
+        address: StoreAddress,
+        prefix: &str,
+        timeout: Duration,
+    ) -> Result<Self, StoreUnavailable> {
+        let connection = Connection::new(address, timeout);
+        let connection = connection.map_err(|error| StoreUnavailable(error.to_string()))?;
+        let shared = Arc::new(Shared {
+            connection,
+            scripts: Scripts::new(),
+            prefix: prefix.to_owned(),
+        });
+        shared.probe().await;
+        tokio::spawn(probe(Arc::downgrade(&shared)));
+        Ok(Self(shared))
+    }
+
+    async fn about_record(
+        &self,
+        script: ScriptInvocation<'_>,
+    ) -> Result<Outcome, StoreUnavailable> {
+        let Answer(outcome) = self.0.connection.call(Call::Script(script)).await?;
+        Ok(outcome)
+    }
+
+    /// Of a record. Braces make a cluster keep the keys of a session at one node.
+    fn key(&self, id: Uuid) -> String {
+        format!("{}:session:{{{id}}}", self.0.prefix)
+    }
+
+    /// Runs a script on a session.
+    fn on<'a>(&self, script: &'a Script, name: SessionName) -> ScriptInvocation<'a> {
+        let SessionName { id, incarnation } = name;
+        let mut invocation = script.key(self.key(id));
+        let ended = format!("{}:ended:{{{id}}}:{incarnation:016x}", self.0.prefix);
+        invocation.key(ended);
+        invocation
+    }
+}
+
+impl SessionStore for RedisStore {
+    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome> {
+        let (version, incarnation) = (record.version, record.opening.incarnation);
+        let mut script = self.on(&self.0.scripts.create, SessionName { id, incarnation });
+        script.arg(version.generation).arg(version.frame);
+        script.arg(token()).arg(incarnation);
+        script.arg(record.head()).arg(&record.state[..]);
+        script.arg(milliseconds(record.ttl));
+        Box::pin(self.about_record(script))
+    }
+
+    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
+        let mut script = self.0.scripts.check.key(self.key(id));
+        // Whether a session was ended does not matter, and no record has this version.
+        script.key(self.key(id));
+        script.arg("").arg("").arg("");
+        Box::pin(async move {
+            Ok(match self.about_record(script).await? {
+                Outcome::Conflict(record) => Some(*record),
+                Outcome::NotFound | Outcome::Tombstoned | Outcome::Committed(_) => None,
+            })
+        })
+    }
+
+    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+        let before = commit.before;
+        let mut script = self.on(&self.0.scripts.commit, commit.name);
+        script.arg(before.generation).arg(before.frame);
+        script.arg(commit.frame).arg(token());
+        script.arg(milliseconds(commit.ttl));
+        script.arg(if commit.takes_over { "1" } else { "" });
+        if let Some(state) = commit.state {
+            script.arg(state);
+        }
+        Box::pin(self.about_record(script))
+    }
+
+    fn check(
+        &self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        renew: Option<Duration>,
+    ) -> StoreFuture<'_, Outcome> {
+        let mut script = self.on(&self.0.scripts.check, name);
+        script.arg(version.generation).arg(version.frame);
+        script.arg(if takes_over { "1" } else { "" });
+        if let Some(ttl) = renew {
+            script.arg(milliseconds(ttl));
+        }
+        Box::pin(self.about_record(script))
+    }
+
+    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
+        let mut script = self.on(&self.0.scripts.fence, name);
+        script.arg(version.generation).arg(version.frame);
+        Box::pin(self.about_record(script))
+    }
+
+    fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool> {
+        let mut script = self.on(&self.0.scripts.end, name);
+        script.arg(name.incarnation).arg(milliseconds(ttl));
+        Box::pin(self.0.connection.call(Call::Script(script)))
+    }
+
+    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
+        let owned = serde_json::json!([owner.name(), key]).to_string();
+        let name = blake3::hash(owned.as_bytes()).to_hex();
+        let name = format!("{}:key:{name}", self.0.prefix);
+        let mut script = self.0.scripts.claim.key(&name);
+        script.arg(id.to_string()).arg(milliseconds(CLAIMED));
+        Box::pin(async move {
+            let claimed: String = self.0.connection.call(Call::Script(script)).await?;
+            Ok(claimed.parse().unwrap_or(id))
+        })
+    }
+
+    fn is_ready(&self) -> bool {
+        self.0.connection.is_ready()
+    }
+
+    fn failures(&self) -> u64 {
+        self.0.connection.failures()
+    }
+}
+
+/// A name for one write.
+fn token() -> String {
+    format!("{:016x}", rand::random::<u64>())
+}
+
+fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
+}
+
+impl std::fmt::Debug for RedisStore {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "RedisStore(ready: {})", self.is_ready())
+    }
+}

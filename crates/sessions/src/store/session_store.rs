@@ -1,0 +1,83 @@
+//! What a store of sessions does, whatever keeps them.
+
+use super::record::{Record, SessionName, Version};
+use crate::owner::Owner;
+use futures_util::future::BoxFuture;
+use std::fmt::Debug;
+use std::time::Duration;
+use uuid::Uuid;
+
+/// The store gave no answer in time. It may have done what it was asked for nevertheless.
+#[derive(Debug, Clone, Default, thiserror::Error)]
+#[error("the store gives no answer: {0}")]
+pub struct StoreUnavailable(pub String);
+
+/// What the store says to a call about a record.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It was done, or the version is the newest. The record lives as long as this without a frame.
+    Committed(Duration),
+    /// The record has another version, or is another session's; nothing was written.
+    Conflict(Box<Record>),
+    /// There is no such record: its time to live is over, or the store has lost it.
+    NotFound,
+    /// The session was ended.
+    Tombstoned,
+}
+
+/// A frame that is to be committed.
+#[derive(Debug, Clone, Copy)]
+pub struct Commit<'a> {
+    /// Which session.
+    pub name: SessionName,
+    /// The version that the frame was tracked from.
+    pub before: Version,
+    /// The number of the frame.
+    pub frame: u64,
+    /// The state after it, where it is written.
+    pub state: Option<&'a [u8]>,
+    /// Whether this replica goes on from the record that a conflict tells.
+    pub takes_over: bool,
+    /// How long the record lives from now without a frame.
+    pub ttl: Duration,
+}
+
+/// The answer to a call.
+pub type StoreFuture<'a, T> = BoxFuture<'a, Result<T, StoreUnavailable>>;
+
+/// A store of sessions. Each call is done as a whole or not at all, and ends within a bounded time.
+pub trait SessionStore: Debug + Send + Sync {
+    /// Adds a record, unless there is one under this id or the session was ended.
+    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome>;
+
+    /// The record of this id at its checkpoint, if there is one.
+    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>>;
+
+    /// Moves a record from one version to a frame.
+    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome>;
+
+    /// Asks whether this version is the newest. `takes_over` says that this replica goes on from the record that a conflict
+    /// tells; `renew` sets the record's time to live.
+    fn check(
+        &self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        renew: Option<Duration>,
+    ) -> StoreFuture<'_, Outcome>;
+
+    /// Begins the next generation of a record, if this version is the newest: no other replica goes on from its own copy.
+    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome>;
+
+    /// Ends a session, and remembers for `ttl` that it was ended. False where it had ended before.
+    fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool>;
+
+    /// The id that an owner's idempotency key names: `id`, if it names none yet.
+    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid>;
+
+    /// Whether the store answers and takes writes.
+    fn is_ready(&self) -> bool;
+
+    /// How many calls got no answer or were refused since the start.
+    fn failures(&self) -> u64;
+}

@@ -1,0 +1,115 @@
+//! Which session has a stream: at most one, the newest. With a store, a stream at another replica has begun a new
+//! generation of the session's record.
+
+use crate::Session;
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::Notify;
+use uuid::Uuid;
+
+/// The open streams by their sessions. Clones are the same.
+#[derive(Debug, Clone, Default)]
+pub struct OpenStreams(Arc<Mutex<HashMap<Uuid, Arc<Replacement>>>>);
+
+/// Tells a stream that another one has taken its place.
+#[derive(Debug, Default)]
+struct Replacement {
+    done: AtomicBool,
+    told: Notify,
+}
+
+/// A stream's place at its session, given back when this is dropped.
+#[derive(Debug)]
+pub struct StreamPlace {
+    streams: OpenStreams,
+    session: Uuid,
+    replacement: Arc<Replacement>,
+    /// The generation of the session's record in the store, which began with the stream.
+    generation: Mutex<Option<u64>>,
+}
+
+impl OpenStreams {
+    /// Takes the place at this session. The stream that has it is told, and tracks no further frame.
+    pub fn take(&self, session: Uuid) -> StreamPlace {
+        let replacement = Arc::new(Replacement::default());
+        let before = self.lock().insert(session, replacement.clone());
+        if let Some(before) = before {
+            before.done.store(true, Ordering::Release);
+            before.told.notify_one();
+        }
+        StreamPlace {
+            streams: self.clone(),
+            session,
+            replacement,
+            generation: Mutex::default(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<Replacement>>> {
+        // Nothing panics while it is held.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl StreamPlace {
+    /// The stream begins at the session as it stands, or goes on with it after the store has lost its record.
+    pub fn begin(&self, session: &Session) {
+        *self.generation() = session.version().map(|version| version.generation);
+    }
+
+    fn generation(&self) -> MutexGuard<'_, Option<u64>> {
+        // Nothing panics while it is held.
+        let own = self.generation.lock();
+        own.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the stream has ended, since another one has the place now, here or at another replica.
+    pub fn has_ended(&self, session: &Session) -> bool {
+        let own = *self.generation();
+        let now = session.version().map(|version| version.generation);
+        if own.is_some() && own != now {
+            self.replacement.done.store(true, Ordering::Release);
+        }
+        self.is_replaced()
+    }
+
+    /// Whether another stream has the place now.
+    pub fn is_replaced(&self) -> bool {
+        self.replacement.done.load(Ordering::Acquire)
+    }
+
+    /// Waits until another stream takes the place.
+    pub async fn replaced(&self) {
+        self.replacement.told.notified().await;
+    }
+}
+
+impl Drop for StreamPlace {
+    fn drop(&mut self) {
+        let mut open = self.streams.lock();
+        let own = open.get(&self.session);
+        if own.is_some_and(|own| Arc::ptr_eq(own, &self.replacement)) {
+            open.remove(&self.session);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_stream_has_the_place_and_gives_it_back() {
+        let streams = OpenStreams::default();
+        let session = Uuid::from_u128(1);
+        let old = streams.take(session);
+        let new = streams.take(session);
+        let other = streams.take(Uuid::from_u128(2));
+        assert!(old.is_replaced() && !new.is_replaced() && !other.is_replaced());
+        drop(old);
+        assert_eq!(streams.lock().len(), 2, "the new one keeps its place");
+        drop((new, other));
+        assert!(streams.lock().is_empty());
+    }
+}

@@ -1,0 +1,183 @@
+//! The targets of a session: a tracker for each, which all see the same frames.
+//!
+//! A frame is decoded once, in the format that the smallest target asks for. The trackers of larger ones reduce it to
+//! their own. Each target has draws of its own; the first one's are those of a session with this target alone.
+
+use super::per_target::PerTarget;
+use super::scheduler::work_limit::{Stopped, WorkMeter};
+use bagtrack_tracker::{Estimate, Frame, FrameFormat, Params, Rect, Seen, Tracker, TrackerError};
+
+/// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
+const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+/// Most bytes that the trackers of a list of targets keep together. The work on a frame holds a copy of them.
+pub const MAX_LIST_BYTES: usize = 8 << 20;
+
+/// The answer to a frame: where each target is.
+pub type Estimates = PerTarget<Estimate>;
+/// The box of each target.
+pub type Boxes = PerTarget<Rect>;
+
+/// The user says where a target is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correction {
+    /// Which target, counted from 0.
+    pub target: usize,
+    /// Its box.
+    pub to: Rect,
+}
+
+/// Why a frame was not taken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum TargetsError {
+    #[error(transparent)]
+    Refused(TrackerError),
+    #[error(transparent)]
+    Stopped(Stopped),
+}
+
+/// Why no session begins.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StartError {
+    /// The tracker of one of the targets, counted from 0, does not take its box, or a parameter.
+    #[error("target {target}: {error}")]
+    Refused {
+        /// Which target.
+        target: usize,
+        /// Why.
+        error: TrackerError,
+    },
+    /// With these parameters the targets keep too much together.
+    #[error("{count} targets with these parameters keep more than {MAX_LIST_BYTES} bytes")]
+    TooLarge {
+        /// How many targets there were to be.
+        count: usize,
+    },
+    /// The work was stopped before all of them began.
+    #[error(transparent)]
+    Stopped(Stopped),
+}
+
+/// The trackers.
+#[derive(Debug, Clone)]
+pub(super) struct Targets(PerTarget<Tracker>);
+
+/// The format that serves all of `boxes` in uploads of the size `source`.
+pub fn frame_format(params: &Params, source: (u32, u32), boxes: &Boxes) -> FrameFormat {
+    let formats = boxes.as_slice().iter();
+    largest_format(formats.map(|target| params.frame_format(source, target)))
+}
+
+/// The format that no other exceeds on either side: all are reductions of one size.
+pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat {
+    let none = FrameFormat {
+        size: (1, 1),
+        has_color: false,
+    };
+    formats.fold(none, |most, format| FrameFormat {
+        size: (
+            most.size.0.max(format.size.0),
+            most.size.1.max(format.size.1),
+        ),
+        has_color: most.has_color || format.has_color,
+    })
+}
+
+/// The seed of a target, counted from 0, where `seed` is that of the first.
+pub fn target_seed(seed: u64, target: usize) -> u64 {
+    seed.wrapping_add(SEED_STEP.wrapping_mul(target as u64))
+}
+
+impl Targets {
+    /// A tracker for each box in `frame`. Before each of them `check` says whether to go on.
+    ///
+    /// # Errors
+    /// See [`StartError`].
+    pub(super) fn start(
+        frame: &Frame,
+        boxes: &Boxes,
+        params: &Params,
+        mut check: impl FnMut() -> Result<(), Stopped>,
+    ) -> Result<Self, StartError> {
+        let count = boxes.as_slice().len();
+        if matches!(boxes, PerTarget::List(_)) && count * params.session_bytes() > MAX_LIST_BYTES {
+            return Err(StartError::TooLarge { count });
+        }
+        let start = |target: usize, given: &Rect| {
+            check().map_err(StartError::Stopped)?;
+            let mut params = params.clone();
+            params.seed = target_seed(params.seed, target);
+            Tracker::new(frame, *given, params)
+                .map_err(|error| StartError::Refused { target, error })
+        };
+        boxes.try_map(start).map(Self)
+    }
+
+    /// These trackers, if they see frames of one size and keep no more than they may.
+    pub(super) fn restored(trackers: PerTarget<Tracker>) -> Option<Self> {
+        let (all, targets) = (trackers.as_slice(), Self(trackers.clone()));
+        let same = |tracker: &Tracker| tracker.source_size() == all[0].source_size();
+        let fits = all.len() == 1 || targets.session_bytes() <= MAX_LIST_BYTES;
+        (all.iter().all(same) && fits).then_some(targets)
+    }
+
+    /// The trackers.
+    pub(super) fn trackers(&self) -> &PerTarget<Tracker> {
+        &self.0
+    }
+
+    /// The last answer.
+    pub(super) fn estimates(&self) -> Estimates {
+        self.0.map(Tracker::estimate)
+    }
+
+    /// How frames are decoded.
+    pub(super) fn frame_format(&self) -> FrameFormat {
+        largest_format(self.0.as_slice().iter().map(Tracker::frame_format))
+    }
+
+    /// Bytes that the trackers keep at most.
+    pub(super) fn session_bytes(&self) -> usize {
+        let trackers = self.0.as_slice().iter();
+        trackers
+            .map(|tracker| tracker.params().session_bytes())
+            .sum()
+    }
+
+    /// Tracks through a frame, in which the user may correct one target. Between targets `meter` says whether to go on.
+    /// `seen` becomes what each tracker saw.
+    ///
+    /// # Errors
+    /// See [`TargetsError`]. With more than one target, some may have taken the frame then.
+    pub(super) fn advance(
+        &mut self,
+        frame: &Frame,
+        correction: Option<Correction>,
+        meter: &mut WorkMeter,
+        seen: Option<&mut Vec<Seen>>,
+    ) -> Result<(), TargetsError> {
+        let trackers = self.0.as_mut_slice();
+        let mut all_saw = Vec::new();
+        if let Some(Correction { target, to }) = correction {
+            let corrected = trackers[target].retarget(frame, to);
+            corrected.map_err(TargetsError::Refused)?;
+        }
+        for (target, tracker) in trackers.iter_mut().enumerate() {
+            if correction.is_some_and(|correction| correction.target == target) {
+                continue;
+            }
+            meter.check().map_err(TargetsError::Stopped)?;
+            if seen.is_some() {
+                let stepped = meter.step(|| tracker.step_seeing(frame));
+                let (_, saw) = stepped.map_err(TargetsError::Refused)?;
+                all_saw.push(saw);
+            } else {
+                let stepped = meter.step(|| tracker.step(frame).map(drop));
+                stepped.map_err(TargetsError::Refused)?;
+            }
+        }
+        if let Some(seen) = seen {
+            *seen = all_saw;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,270 @@
+//! A store whose calls and replies are on their way for as long as a test wants. They can be lost or done twice.
+
+use crate::memory::Records;
+use bagtrack_sessions::{
+    Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, StoreUnavailable,
+    Version,
+};
+use std::any::Any;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+use tokio::sync::{Notify, oneshot};
+use uuid::Uuid;
+
+type Reply = Box<dyn Any + Send>;
+type Script = Arc<dyn Fn(&mut Records) -> Reply + Send + Sync>;
+type Sender = oneshot::Sender<Option<Reply>>;
+
+/// A call on its way to the store.
+pub struct Call {
+    script: Script,
+    /// None for one that was sent again by the connection: nobody waits for its reply.
+    sender: Option<Sender>,
+    creates: bool,
+}
+
+#[derive(Default)]
+struct Wire {
+    records: Records,
+    calls: Vec<Call>,
+    replies: Vec<(Sender, Reply)>,
+    /// Requests that neither wait for the store nor have ended.
+    busy: usize,
+}
+
+/// The store. Clones are the same.
+#[derive(Clone, Default)]
+pub struct HostileStore {
+    wire: Arc<Mutex<Wire>>,
+    idle: Arc<Notify>,
+}
+
+impl std::fmt::Debug for HostileStore {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("HostileStore")
+    }
+}
+
+/// A request at work.
+pub struct Busy(HostileStore);
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        self.0.wire().busy -= 1;
+        self.0.idle.notify_one();
+    }
+}
+
+impl HostileStore {
+    fn wire(&self) -> MutexGuard<'_, Wire> {
+        self.wire.lock().unwrap()
+    }
+
+    /// A request begins.
+    pub fn begin(&self) -> Busy {
+        self.wire().busy += 1;
+        Busy(self.clone())
+    }
+
+    /// Waits until all requests wait for the store or have ended.
+    pub async fn settles(&self) {
+        while self.wire().busy > 0 {
+            self.idle.notified().await;
+        }
+    }
+
+    pub fn calls(&self) -> usize {
+        self.wire().calls.len()
+    }
+
+    pub fn replies(&self) -> usize {
+        self.wire().replies.len()
+    }
+
+    /// The store does a call.
+    pub fn run(&self, pick: usize) {
+        let mut wire = self.wire();
+        let call = wire.calls.remove(pick);
+        let reply = (call.script)(&mut wire.records);
+        wire.replies
+            .extend(call.sender.map(|sender| (sender, reply)));
+    }
+
+    /// A reply arrives, or is lost: then the replica gives up.
+    pub fn deliver(&self, pick: usize, arrives: bool) {
+        let mut wire = self.wire();
+        let (sender, reply) = wire.replies.remove(pick);
+        wire.busy += 1;
+        if sender.send(arrives.then_some(reply)).is_err() {
+            // The request was given up.
+            wire.busy -= 1;
+        }
+    }
+
+    /// A call is lost.
+    pub fn lose_call(&self, pick: usize) {
+        let mut wire = self.wire();
+        let Some(sender) = wire.calls.remove(pick).sender else {
+            return;
+        };
+        wire.busy += 1;
+        if sender.send(None).is_err() {
+            wire.busy -= 1;
+        }
+    }
+
+    /// A call was sent twice.
+    pub fn repeat(&self, pick: usize) {
+        let mut wire = self.wire();
+        let Call {
+            script, creates, ..
+        } = &wire.calls[pick];
+        let again = Call {
+            script: script.clone(),
+            sender: None,
+            creates: *creates,
+        };
+        wire.calls.push(again);
+    }
+
+    /// The record is lost.
+    pub fn forget(&self) {
+        self.wire().records.forget();
+        self.drop_creates();
+    }
+
+    pub fn has(&self, id: Uuid) -> bool {
+        self.wire().records.has(id)
+    }
+
+    /// What makes a record is not on its way for so long that one that was there is lost or ended meanwhile.
+    pub fn drop_creates(&self) {
+        let mut wire = self.wire();
+        let calls = wire.calls.drain(..);
+        let (creates, others): (Vec<Call>, Vec<Call>) = calls.partition(|call| call.creates);
+        wire.calls = others;
+        for call in creates {
+            if let Some(sender) = call.sender {
+                wire.busy += 1;
+                if sender.send(None).is_err() {
+                    wire.busy -= 1;
+                }
+            }
+        }
+    }
+
+    fn call<'a, T: Send + 'static>(
+        &'a self,
+        creates: bool,
+        script: impl Fn(&mut Records) -> T + Send + Sync + 'static,
+    ) -> StoreFuture<'a, T> {
+        let (sender, reply) = oneshot::channel();
+        let script: Script = Arc::new(move |records| Box::new(script(records)));
+        Box::pin(async move {
+            {
+                let mut wire = self.wire();
+                let sender = Some(sender);
+                wire.calls.push(Call {
+                    script,
+                    sender,
+                    creates,
+                });
+                wire.busy -= 1;
+            }
+            self.idle.notify_one();
+            // Dropped while it waits, the request no longer counts; see `Given`.
+            let given = Given(self, true);
+            let reply = reply.await;
+            given.up();
+            let lost = StoreUnavailable("a test lost it".to_owned());
+            let reply = reply.ok().flatten().ok_or(lost)?;
+            Ok(*reply.downcast::<T>().expect("the reply to its own call"))
+        })
+    }
+}
+
+/// A request that waits for the store. Where it is given up meanwhile, its end counts nothing.
+struct Given<'a>(&'a HostileStore, bool);
+
+impl Given<'_> {
+    fn up(mut self) {
+        self.1 = false;
+    }
+}
+
+impl Drop for Given<'_> {
+    fn drop(&mut self) {
+        if self.1 {
+            // The `Busy` of the request takes it back.
+            self.0.wire().busy += 1;
+        }
+    }
+}
+
+impl SessionStore for HostileStore {
+    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome> {
+        let (token, record) = (rand::random(), record.clone());
+        self.call(true, move |records| records.create(token, id, &record))
+    }
+
+    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
+        self.call(false, move |records| records.load(id))
+    }
+
+    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+        let Commit {
+            name,
+            before,
+            frame,
+            takes_over,
+            ttl,
+            ..
+        } = commit;
+        let (token, state) = (rand::random(), commit.state.map(<[u8]>::to_vec));
+        self.call(false, move |records| {
+            let state = state.as_deref();
+            let commit = Commit {
+                name,
+                before,
+                frame,
+                state,
+                takes_over,
+                ttl,
+            };
+            records.commit(token, commit)
+        })
+    }
+
+    fn check(
+        &self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        _renew: Option<Duration>,
+    ) -> StoreFuture<'_, Outcome> {
+        self.call(false, move |records| {
+            records.check(name, version, takes_over)
+        })
+    }
+
+    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
+        self.call(false, move |records| records.fence(name, version))
+    }
+
+    fn end(&self, name: SessionName, _ttl: Duration) -> StoreFuture<'_, bool> {
+        self.call(false, move |records| records.end(name))
+    }
+
+    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
+        let (owner, key) = (owner.clone(), key.to_owned());
+        self.call(false, move |records| records.claim(&owner, &key, id))
+    }
+
+    fn is_ready(&self) -> bool {
+        true
+    }
+
+    fn failures(&self) -> u64 {
+        0
+    }
+}

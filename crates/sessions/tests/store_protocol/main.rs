@@ -1,0 +1,11 @@
+//! Stores of sessions, and what two replicas make of one that misbehaves.
+//!
+//! [`suite`] holds for every store. [`schedule`] drives the real service, with trackers and workers, over a store that
+//! delays, drops, repeats and forgets.
+
+mod hostile;
+mod memory;
+mod pictures;
+mod schedule;
+mod suite;
+mod world;

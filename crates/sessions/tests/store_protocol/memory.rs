@@ -1,0 +1,204 @@
+//! A store in memory, with the rules of the scripts that Redis runs.
+
+use bagtrack_sessions::{
+    Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, Version,
+};
+use std::collections::{BTreeSet, HashMap};
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+use uuid::Uuid;
+
+/// A record, its last frame that was committed, and the token of the last write.
+#[derive(Debug, Clone)]
+struct Kept {
+    record: Record,
+    frame: u64,
+    token: u64,
+}
+
+/// What the store holds. Each write has a token: one that comes again does nothing.
+#[derive(Debug, Default)]
+pub struct Records {
+    kept: HashMap<Uuid, Kept>,
+    ended: BTreeSet<SessionName>,
+    claimed: HashMap<(Option<String>, String), Uuid>,
+}
+
+impl Kept {
+    fn is_at(&self, version: Version) -> bool {
+        (self.record.version.generation, self.frame) == (version.generation, version.frame)
+    }
+
+    /// The record at its checkpoint. Whoever goes on from there takes it over.
+    fn tell(&mut self, takes_over: bool) -> Outcome {
+        let version = &mut self.record.version;
+        if takes_over && self.frame != version.checkpoint {
+            version.generation += 1;
+            (self.frame, self.token) = (version.checkpoint, 0);
+        }
+        version.frame = version.checkpoint;
+        Outcome::Conflict(Box::new(self.record.clone()))
+    }
+}
+
+impl Records {
+    fn find(&mut self, name: SessionName) -> Result<&mut Kept, Outcome> {
+        match self.kept.get_mut(&name.id) {
+            Some(kept) => Ok(kept),
+            None if self.ended.contains(&name) => Err(Outcome::Tombstoned),
+            None => Err(Outcome::NotFound),
+        }
+    }
+
+    pub fn create(&mut self, token: u64, id: Uuid, record: &Record) -> Outcome {
+        let incarnation = record.opening.incarnation;
+        match self.find(SessionName { id, incarnation }) {
+            Ok(kept) if kept.token == token => Outcome::Committed(record.ttl),
+            Ok(kept) => kept.tell(false),
+            Err(Outcome::Tombstoned) => Outcome::Tombstoned,
+            Err(_) => {
+                let (record, frame) = (record.clone(), record.version.frame);
+                let ttl = record.ttl;
+                self.kept.insert(
+                    id,
+                    Kept {
+                        record,
+                        frame,
+                        token,
+                    },
+                );
+                Outcome::Committed(ttl)
+            }
+        }
+    }
+
+    pub fn load(&self, id: Uuid) -> Option<Record> {
+        let mut kept = self.kept.get(&id)?.clone();
+        match kept.tell(false) {
+            Outcome::Conflict(record) => Some(*record),
+            _ => None,
+        }
+    }
+
+    pub fn commit(&mut self, token: u64, commit: Commit<'_>) -> Outcome {
+        let kept = match self.find(commit.name) {
+            Ok(kept) => kept,
+            Err(outcome) => return outcome,
+        };
+        if kept.token == token {
+            return Outcome::Committed(commit.ttl);
+        }
+        if !kept.is_at(commit.before) {
+            return kept.tell(commit.takes_over);
+        }
+        (kept.frame, kept.token) = (commit.frame, token);
+        if let Some(state) = commit.state {
+            kept.record.version.checkpoint = commit.frame;
+            kept.record.state = state.to_vec();
+        }
+        kept.record.ttl = commit.ttl;
+        Outcome::Committed(commit.ttl)
+    }
+
+    pub fn check(&mut self, name: SessionName, version: Version, takes_over: bool) -> Outcome {
+        match self.find(name) {
+            Ok(kept) if kept.is_at(version) => Outcome::Committed(kept.record.ttl),
+            Ok(kept) => kept.tell(takes_over),
+            Err(outcome) => outcome,
+        }
+    }
+
+    pub fn fence(&mut self, name: SessionName, version: Version) -> Outcome {
+        match self.find(name) {
+            Ok(kept) if kept.is_at(version) => {
+                kept.record.version.generation += 1;
+                Outcome::Committed(kept.record.ttl)
+            }
+            Ok(kept) => kept.tell(true),
+            Err(outcome) => outcome,
+        }
+    }
+
+    pub fn end(&mut self, name: SessionName) -> bool {
+        let is_own = |kept: &Kept| kept.record.opening.incarnation == name.incarnation;
+        let is_here = match self.kept.get(&name.id) {
+            Some(kept) => is_own(kept),
+            None => !self.ended.contains(&name),
+        };
+        self.kept.retain(|id, kept| *id != name.id || !is_own(kept));
+        self.ended.insert(name);
+        is_here
+    }
+
+    pub fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid {
+        let name = (owner.name().map(str::to_owned), key.to_owned());
+        *self.claimed.entry(name).or_insert(id)
+    }
+
+    /// Loses all records.
+    pub fn forget(&mut self) {
+        self.kept.clear();
+    }
+
+    pub fn has(&self, id: Uuid) -> bool {
+        self.kept.contains_key(&id)
+    }
+}
+
+/// A store that answers at once.
+#[derive(Debug, Default)]
+pub struct MemoryStore(Mutex<Records>);
+
+impl MemoryStore {
+    fn records(&self) -> MutexGuard<'_, Records> {
+        self.0.lock().unwrap()
+    }
+}
+
+fn at_once<'a, T: Send + 'a>(value: T) -> StoreFuture<'a, T> {
+    Box::pin(std::future::ready(Ok(value)))
+}
+
+impl SessionStore for MemoryStore {
+    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome> {
+        at_once(self.records().create(rand::random(), id, record))
+    }
+
+    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
+        at_once(self.records().load(id))
+    }
+
+    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+        at_once(self.records().commit(rand::random(), commit))
+    }
+
+    fn check(
+        &self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        _renew: Option<Duration>,
+    ) -> StoreFuture<'_, Outcome> {
+        at_once(self.records().check(name, version, takes_over))
+    }
+
+    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
+        at_once(self.records().fence(name, version))
+    }
+
+    fn end(&self, name: SessionName, _ttl: Duration) -> StoreFuture<'_, bool> {
+        at_once(self.records().end(name))
+    }
+
+    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
+        at_once(self.records().claim(owner, key, id))
+    }
+
+    fn is_ready(&self) -> bool {
+        true
+    }
+
+    fn failures(&self) -> u64 {
+        0
+    }
+}

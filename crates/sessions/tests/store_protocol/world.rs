@@ -1,0 +1,240 @@
+//! Two replicas with one store, a client, and its rival that sends other frames under the same numbers.
+
+use crate::hostile::HostileStore;
+use crate::pictures::{FIRST, params, picture};
+use bagtrack_sessions::{
+    ActError, Admission, Boxes, Clock, CreationKey, Estimates, Flow, FrameBatch, FramesError,
+    IdempotencyStore, Lease, MacKeys, OpenRequest, OpenStreams, Owner, QuotaExhausted, Registry,
+    ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
+    Start, StreamPlace, TrackingMetrics,
+};
+use metrics::{Counter, Histogram};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::task::JoinHandle;
+use uuid::Uuid;
+
+const LONG: Duration = Duration::from_secs(3600);
+const FLOW: Flow = Flow(0);
+pub const ID: Uuid = Uuid::from_u128(1);
+
+/// What is asked of a replica.
+#[derive(Debug, Clone)]
+pub enum Asked {
+    /// This frame, as the client (0) or its rival (1) sends it.
+    Frame(u8, u64),
+    /// The client's next frame, over the replica's stream.
+    Streamed(Arc<StreamPlace>),
+    OpenStream,
+    /// A session with this seed.
+    Open(u64),
+    End,
+}
+
+/// A request, with what its client knew when it was sent.
+#[derive(Debug, Clone)]
+pub struct Request {
+    pub asked: Asked,
+    /// How many frames had been promised.
+    pub promised: usize,
+    /// How many sessions the client had ended or lost.
+    pub ended: u64,
+}
+
+#[derive(Debug)]
+pub enum Answer {
+    /// Where the session with this seed stands, and its checkpoint.
+    Tracked(u64, Estimates, u64),
+    /// The number of the next frame.
+    Expected(u64),
+    /// A stream that begins with this frame.
+    Opened(Arc<StreamPlace>, u64),
+    /// The session with this seed is open.
+    Born(u64),
+    Ended,
+    /// Why there is none.
+    Nothing(String),
+}
+
+#[derive(Debug)]
+struct NoQuota;
+
+impl SessionQuota for NoQuota {
+    fn check(&self) -> Result<(), QuotaExhausted> {
+        Ok(())
+    }
+
+    fn reserve(&self, _targets: usize) -> Result<Reservation, QuotaExhausted> {
+        Ok(Box::new(()))
+    }
+}
+
+pub struct Replica {
+    pub service: SessionService,
+    pub job: Option<JoinHandle<()>>,
+    pub stream: Option<Arc<StreamPlace>>,
+}
+
+impl Replica {
+    pub fn new(store: &HostileStore, store_every: u64) -> Self {
+        let lease = Lease {
+            first: LONG,
+            idle: LONG,
+        };
+        let counter = Counter::noop;
+        let service = SessionService::new(ServiceParts {
+            settings: ServiceSettings {
+                work_timeout: LONG,
+                max_request_cpu: LONG,
+                frame: bagtrack_ingest::Limits::default(),
+                max_request_pixels: u64::MAX,
+                max_frames: 64,
+                store_every,
+            },
+            registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
+            store: Some(Arc::new(store.clone())),
+            admission: Admission::new(64, 1).unwrap(),
+            streams: OpenStreams::default(),
+            opened: IdempotencyStore::new(64),
+            keys: Arc::new(MacKeys::new("bagtrack tests of stores", &["secret"])),
+            tracking: TrackingMetrics {
+                decode: Histogram::noop(),
+                step: Histogram::noop(),
+                tracking: counter(),
+                uncertain: counter(),
+                lost: counter(),
+                losses: counter(),
+            },
+            queue_wait: Histogram::noop(),
+            draining: AtomicBool::new(false),
+        });
+        Self {
+            service,
+            job: None,
+            stream: None,
+        }
+    }
+
+    pub fn is_idle(&self) -> bool {
+        self.job.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// The client gives its request up.
+    pub async fn give_up(&mut self) {
+        if let Some(job) = self.job.take() {
+            job.abort();
+            let _ = job.await;
+        }
+    }
+}
+
+/// The seed of a session, from the digest of the request that opened it.
+fn seed_of(session: &Session) -> u64 {
+    session.opening().request[0].into()
+}
+
+/// What the service answers.
+pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
+    match asked {
+        Asked::Frame(sender, number) => {
+            let batch =
+                FrameBatch::posted(Some(*number), vec![picture(*sender, *number).into()], None);
+            track(service, batch).await
+        }
+        Asked::Streamed(place) => {
+            let session = match service.find(ID, &Owner::default(), FLOW).await {
+                Ok(session) => session,
+                Err(error) => return Answer::Nothing(error.to_string()),
+            };
+            let mut batch = FrameBatch::posted(None, Vec::new(), None);
+            let number = session.latest_frame() + 1;
+            batch.files = vec![picture(0, number).into()];
+            batch.stream = Some(place.clone());
+            match track(service, batch).await {
+                // Another picture than the frame's own: its session went on meanwhile.
+                Answer::Tracked(_, estimates, _) if estimates.first().frame != number => {
+                    Answer::Nothing("it went on meanwhile".to_owned())
+                }
+                answer => answer,
+            }
+        }
+        Asked::OpenStream => {
+            let opened = open_stream(service).await;
+            opened.unwrap_or_else(|error| Answer::Nothing(error.to_string()))
+        }
+        Asked::Open(seed) => {
+            let request = OpenRequest {
+                key: Some(CreationKey::Id(ID)),
+                owner: Owner::default(),
+                digest: [u8::try_from(*seed).unwrap(); 32],
+                start: Start::Frame {
+                    file: picture(0, 0).into(),
+                    boxes: Boxes::One(FIRST),
+                    params: Box::new(params(*seed)),
+                },
+                quota: Arc::new(NoQuota),
+                queue: service.admission.enter(FLOW, Box::new(())).unwrap(),
+            };
+            match service.open(request).await {
+                Ok(opened) => Answer::Born(seed_of(&opened.session)),
+                Err(error) => Answer::Nothing(error.to_string()),
+            }
+        }
+        Asked::End => match service.end(ID, &Owner::default(), FLOW).await {
+            Ok(()) => Answer::Ended,
+            Err(error) => Answer::Nothing(error.to_string()),
+        },
+    }
+}
+
+async fn track(service: &SessionService, batch: FrameBatch) -> Answer {
+    let session = match service.find(ID, &Owner::default(), FLOW).await {
+        Ok(session) => session,
+        Err(error) => return Answer::Nothing(error.to_string()),
+    };
+    let seed = seed_of(&session);
+    let permit = match session.enter() {
+        Ok(permit) => permit,
+        Err(error) => return Answer::Nothing(error.to_string()),
+    };
+    let queue = service.admission.enter(FLOW, Box::new(())).unwrap();
+    match service.advance(permit, queue, batch).await {
+        Ok(mut tracked) => {
+            let checkpoint = tracked.checkpoint.expect("there is a store");
+            Answer::Tracked(seed, tracked.estimates.remove(0), checkpoint)
+        }
+        Err(FramesError::Replay(
+            ReplayError::OutOfOrder { expected, .. } | ReplayError::Differs { expected, .. },
+        )) => Answer::Expected(expected),
+        Err(error) => Answer::Nothing(error.to_string()),
+    }
+}
+
+async fn open_stream(service: &SessionService) -> Result<Answer, ActError> {
+    let session = service.find(ID, &Owner::default(), FLOW).await?;
+    let place = Arc::new(service.streams.take(ID));
+    let permit = session.read_permit()?;
+    let mut locked = service.fence(permit, FLOW).await?;
+    place.begin(&session);
+    let next = locked.state().latest_frame() + 1;
+    Ok(Answer::Opened(place, next))
+}
+
+/// The answers that were given, in their order.
+pub type Answers = Arc<Mutex<Vec<(usize, Request, Answer)>>>;
+
+/// Begins with a request at a replica.
+pub fn begin(
+    store: &HostileStore,
+    answers: &Answers,
+    (number, replica): (usize, &mut Replica),
+    request: Request,
+) {
+    let (service, answers, busy) = (replica.service.clone(), answers.clone(), store.begin());
+    replica.job = Some(tokio::spawn(async move {
+        let answered = answer(&service, &request.asked).await;
+        answers.lock().unwrap().push((number, request, answered));
+        drop(busy);
+    }));
+}

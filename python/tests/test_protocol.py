@@ -1,0 +1,79 @@
+"""The clients do what docs/PROTOCOL.md says: the exchanges of tests/protocol/exchanges.json."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+
+import pytest
+
+import bagtrack
+from scripted_service import TABLE, ScriptedService
+
+
+@pytest.fixture
+def service() -> Iterator[ScriptedService]:
+    service = ScriptedService()
+    yield service
+    service.close()
+
+
+def call(client: bagtrack.Client | bagtrack.AsyncClient, wait: Callable, what: dict) -> dict | None:
+    """Makes a call; what it gives, in the words of the table."""
+    try:
+        match what:
+            case {"open": frame}:
+                wait(client.init(frame.encode(), TABLE["box"]))
+            case {"track": frame}:
+                ok, box = wait(client.update(frame.encode()))
+                assert ok and (client.frame, client.box) == (box[0], box)
+                return {"frame": client.frame}
+            case {"correct": frame, "box": box}:
+                wait(client.retarget(frame.encode(), box))
+                return {"frame": client.frame}
+            case {"snapshot": True}:
+                return {"snapshot": wait(client.save()).decode()}
+            case {"end": True}:
+                wait(client.close())
+            case _:
+                raise AssertionError(f"the table has an unknown call: {what}")
+    except bagtrack.ServiceError as error:
+        return {"refused": error.status, "kind": error.kind}
+    except bagtrack.ServiceUnavailable:
+        return {"unavailable": True}
+    return None
+
+
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+@pytest.mark.parametrize("scenario", TABLE["scenarios"], ids=lambda scenario: scenario["name"])
+def test_exchanges(service: ScriptedService, scenario: dict, is_async: bool) -> None:
+    loop = asyncio.new_event_loop()
+    wait = loop.run_until_complete if is_async else lambda value: value
+    make = bagtrack.AsyncClient if is_async else bagtrack.Client
+    client = make(service.url, **scenario.get("client", {}))
+    for step in scenario["steps"]:
+        service.expect(step["exchanges"])
+        given = call(client, wait, step["call"])
+        service.check()
+        assert given == step.get("gives"), step["call"]
+    loop.close()
+
+
+def test_a_client_that_could_not_move_goes_on_at_the_address_that_it_came_from(service: ScriptedService) -> None:
+    other = ScriptedService()
+    client = bagtrack.Client([service.url, other.url])
+    answer = {"status": 200, "answer": 1, "headers": {"Draining": "true"}}
+    service.expect(
+        [
+            {"request": "PUT /sessions/{1}", "frame": "a", "reply": {"status": 201, "created": 0}},
+            {"request": "POST /sessions/{1}/frames?frame=1", "frame": "b", "reply": answer},
+            {"request": "GET /sessions/{1}/snapshot", "reply": {"status": 200, "snapshot": "S1"}},
+            {"request": "POST /sessions/{1}/frames?frame=2", "frame": "c", "reply": {"status": 200, "answer": 2}},
+        ]
+    )
+    other.expect([{"request": "PUT /sessions/{2}", "snapshot": "S1", "reply": {"status": 503, "text": ""}}])
+    client.init(b"a", TABLE["box"])
+    assert [client.update(frame)[1][0] for frame in (b"b", b"c")] == [1, 2]
+    service.check()
+    other.check()
+    other.close()

@@ -1,0 +1,111 @@
+//! What `bagtrack track --draw` writes: a folder of pictures, or a video.
+
+use super::frames::FrameFile;
+use super::video_file::{self, VideoFile};
+use super::video_info::Rate;
+use bagtrack::drawing::{self, Picture};
+use bagtrack_cli::output;
+use bagtrack_ingest::Limits;
+use bagtrack_tracker::Estimate;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where drawn frames go.
+#[derive(Debug)]
+pub enum Destination {
+    /// Pictures, into this folder.
+    Folder(PathBuf),
+    /// A video, into this file.
+    Video(PathBuf),
+}
+
+/// Takes the drawn frames.
+pub enum Drawn {
+    /// Pictures in a folder.
+    Folder(PathBuf),
+    /// A video.
+    Video(VideoFile),
+}
+
+impl Destination {
+    /// What `out` names: a new folder if it has no ending, or a slash at its end; or a new video.
+    pub fn of(out: &Path) -> Result<Self, String> {
+        let shown = out.display();
+        let has_slash = out.to_string_lossy().ends_with(std::path::is_separator);
+        if has_slash || out.is_dir() || out.extension().is_none() {
+            output::new_folder(out)?;
+            return Ok(Self::Folder(out.to_owned()));
+        }
+        if !video_file::is_video(out) {
+            return Err(format!(
+                "--draw {shown}: it can write a video ({}), or a folder of JPEG files, as {shown}/",
+                video_file::endings()
+            ));
+        }
+        if out.exists() {
+            return Err(format!(
+                "--draw {shown}: it is there: choose another file, or remove it first"
+            ));
+        }
+        match out.parent() {
+            Some(parent) if parent != Path::new("") && !parent.is_dir() => Err(format!(
+                "--draw {shown}: there is no folder {}",
+                parent.display()
+            )),
+            _ => Ok(Self::Video(out.to_owned())),
+        }
+    }
+
+    /// Begins to write, so many frames a second, of which `first` is the first.
+    pub fn open(&self, rate: Rate, first: &FrameFile) -> Result<Drawn, Box<dyn Error>> {
+        match self {
+            Self::Folder(folder) => Ok(Drawn::Folder(folder.clone())),
+            Self::Video(path) => {
+                let picture = drawn(&first.bytes, &[])?;
+                let video = VideoFile::create(path, rate, &picture);
+                let video = video.map_err(|error| format!("--draw {error}"))?;
+                Ok(Drawn::Video(video))
+            }
+        }
+    }
+}
+
+impl Drawn {
+    /// Adds a frame with the boxes of its targets.
+    pub fn add(&mut self, frame: &FrameFile, estimates: &[Estimate]) -> Result<(), Box<dyn Error>> {
+        let picture = drawn(&frame.bytes, estimates)?;
+        match self {
+            Self::Folder(folder) => {
+                let name = frame.file.clone();
+                let name = name.unwrap_or_else(|| format!("{:06}.jpg", frame.index));
+                let file = folder.join(Path::new(&name).with_extension("jpg"));
+                fs::write(&file, picture)
+                    .map_err(|error| format!("{}: {error}", file.display()))?;
+            }
+            Self::Video(video) => video.add(&picture)?,
+        }
+        Ok(())
+    }
+
+    /// Waits until all is written.
+    pub fn finish(self) -> Result<(), String> {
+        match self {
+            Self::Folder(_) => Ok(()),
+            Self::Video(video) => video.finish(),
+        }
+    }
+}
+
+/// The frame as JPEG, upright, with the boxes and scores.
+fn drawn(bytes: &[u8], estimates: &[Estimate]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut picture = Picture::decode(bytes, &Limits::default(), u32::MAX)?;
+    let targets = estimates.iter().enumerate();
+    let targets = targets.map(|(number, estimate)| drawing::Drawn {
+        number: (estimates.len() > 1).then_some(number),
+        estimate,
+        particles: &[],
+    });
+    drawing::draw(&mut picture, &targets.collect::<Vec<_>>());
+    Ok(picture.jpeg()?)
+}

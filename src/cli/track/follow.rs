@@ -1,0 +1,113 @@
+//! The loop of `bagtrack track`: frame by frame, from the first to the last or to a signal.
+
+use super::drawn::{Destination, Drawn};
+use super::frames::{FrameFile, Frames};
+use super::interrupt::Interrupt;
+use super::rows::Rows;
+use super::targets::Targets;
+use crate::cli::formats::Row;
+use bagtrack_tracker::{Params, Rect};
+use indicatif::ProgressBar;
+use std::error::Error;
+use std::io::ErrorKind;
+
+/// What there is to do.
+pub struct Job {
+    /// The frames.
+    pub frames: Frames,
+    /// The targets in the first frame that is wanted.
+    pub boxes: Vec<Rect>,
+    /// The parameters of all trackers.
+    pub params: Params,
+    /// Where drawn frames go, if they are wanted.
+    pub destination: Option<Destination>,
+    /// Where boxes go.
+    pub rows: Rows,
+    /// Goes on by a step a frame.
+    pub bar: ProgressBar,
+}
+
+/// Whether to go on.
+enum Then {
+    GoOn,
+    Stop,
+}
+
+impl Job {
+    /// Follows the targets to the last frame, or to a signal, and closes what is drawn. Returns how many frames were
+    /// tracked.
+    pub fn run(mut self, interrupt: &Interrupt) -> Result<u64, Box<dyn Error>> {
+        let mut drawn = None;
+        let followed = self.follow(interrupt, &mut drawn);
+        // Also after an error: the frames before it are worth keeping.
+        let finished = drawn.map_or(Ok(()), Drawn::finish);
+        // An encoder that has ended is the cause of an error in the loop.
+        finished?;
+        followed
+    }
+
+    fn follow(
+        &mut self,
+        interrupt: &Interrupt,
+        drawn: &mut Option<Drawn>,
+    ) -> Result<u64, Box<dyn Error>> {
+        let mut targets: Option<Targets> = None;
+        let mut count = 0;
+        while !interrupt.came() {
+            if self.frames.are_before_first() {
+                self.frames.pass_over()?;
+                self.bar.inc(1);
+                continue;
+            }
+            let Some(frame) = self.frames.next()? else {
+                break;
+            };
+            if let Then::Stop = self.take(&frame, &mut targets, drawn)? {
+                break;
+            }
+            count += 1;
+            self.bar.inc(1);
+        }
+        Ok(count)
+    }
+
+    /// Tracks through a frame, draws and writes the boxes.
+    fn take(
+        &mut self,
+        frame: &FrameFile,
+        targets: &mut Option<Targets>,
+        drawn: &mut Option<Drawn>,
+    ) -> Result<Then, Box<dyn Error>> {
+        let named = |error: Box<dyn Error>| format!("{}: {error}", frame.shown);
+        let targets = match targets {
+            Some(targets) => {
+                targets.step(&frame.bytes).map_err(named)?;
+                targets
+            }
+            None => {
+                let started = Targets::start(&frame.bytes, &self.boxes, &self.params);
+                let started = started.map_err(named)?;
+                if let Some(destination) = &self.destination {
+                    *drawn = Some(destination.open(self.frames.rate(), frame)?);
+                }
+                targets.insert(started)
+            }
+        };
+        let estimates = targets.estimates();
+        if let Some(drawn) = drawn {
+            drawn.add(frame, &estimates)?;
+        }
+        let rows = estimates.iter().enumerate().map(|(target, estimate)| Row {
+            frame: frame.index,
+            time: frame.time,
+            file: frame.file.as_deref(),
+            target,
+            estimate,
+        });
+        match self.rows.write(rows) {
+            // The reader has seen enough: `bagtrack track … | head`.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Then::Stop),
+            written => Ok(written.map(|()| Then::GoOn)?),
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! `bagtrack track`: the tracker on a video or a folder of frames.
+//!
+//! In: frames, and a box for each target in the first of them. Out: a row for each target in each frame, and the frames
+//! with the boxes drawn on them.
+//!
+//! What can go wrong: a path that cannot be read or written is told before the first row. A frame that cannot be read,
+//! or a signal, ends the command; the rows and the drawn frames before it are kept, and the video gets its end.
+
+mod drawn;
+mod follow;
+mod frames;
+mod interrupt;
+mod rows;
+mod start;
+mod targets;
+mod video_file;
+mod video_info;
+
+use super::formats::{Columns, Format};
+use bagtrack_cli::{BOXES, ParamFlags, progress, read_boxes};
+use bagtrack_sessions::MAX_TARGETS;
+use bagtrack_tracker::Rect;
+use drawn::Destination;
+use follow::Job;
+use frames::Frames;
+use interrupt::Interrupt;
+use rows::Rows;
+use start::Start;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Flags of `track`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A folder of JPEG, PNG or WebP frames, taken in the order of their names; or one with them in img/; or a video
+    /// file, for which ffmpeg must be installed.
+    #[arg(value_name = "VIDEO|DIR")]
+    path: PathBuf,
+    /// The target in the first frame: x,y,width,height in pixels, 0-based from the top-left corner, as the service
+    /// takes it. Given several times, it is a target each, up to 16. Without it, the box of the first frame in
+    /// groundtruth_rect.txt in DIR is taken (1-based there).
+    #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rect, allow_hyphen_values = true)]
+    boxes: Vec<Rect>,
+    /// The first frame: its number, counted from 0, or its time in a video, like 12.5s, 1:30 or 0:01:30. The boxes hold
+    /// there, and the frames before it are passed over.
+    #[arg(long, value_name = "FRAME|TIME", value_parser = start::parse)]
+    start: Option<Start>,
+    #[command(flatten)]
+    params: ParamFlags,
+    /// Seed of all random draws: the same seed gives the same boxes.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// How boxes are written. Frames and targets count from 0 but for otb and mot.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Writes the boxes to a new file, not to standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
+    /// .m4v, .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it
+    /// has no ending, or a slash at its end.
+    #[arg(long, value_name = "OUT")]
+    draw: Option<PathBuf>,
+}
+
+/// Runs `track`. The exit status is that of a signal, if one ended it.
+pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
+    let interrupt = Interrupt::listen()?;
+    let mut params = args.params.params()?;
+    params.seed = args.seed.unwrap_or(params.seed);
+    check(&args)?;
+    let destination = args.draw.as_deref().map(Destination::of).transpose()?;
+    let frames = Frames::open(&args.path, args.start.unwrap_or(Start::Frame(0)))?;
+    let boxes = match args.boxes.is_empty() {
+        true => vec![annotated(&args.path, frames.first())?],
+        false => args.boxes,
+    };
+    let columns = Columns {
+        time: frames.have_times(),
+        target: boxes.len() > 1,
+    };
+    let rows = Rows::open(args.output.as_deref(), args.format, columns)?;
+    let bar = match rows.are_on_terminal() {
+        // The rows tell how far it is, and a bar would be among them.
+        true => indicatif::ProgressBar::hidden(),
+        false => progress::bar_or_count(frames.left(), "frames"),
+    };
+    let job = Job {
+        frames,
+        boxes,
+        params,
+        destination,
+        rows,
+        bar: bar.clone(),
+    };
+    let followed = job.run(&interrupt);
+    bar.finish_and_clear();
+    let count = followed?;
+    if interrupt.came() {
+        eprintln!("bagtrack: stopped by a signal after {count} frames");
+    }
+    Ok(interrupt.exit_code())
+}
+
+/// What can be told before any file is opened.
+fn check(args: &Args) -> Result<(), String> {
+    let count = args.boxes.len();
+    if count > MAX_TARGETS {
+        return Err(format!(
+            "--box is given {count} times; {MAX_TARGETS} targets are followed at most"
+        ));
+    }
+    if count > 1 && !args.format.has_target() {
+        return Err(
+            "--format otb has one target a file: take --format mot or csv, or run once for each box".to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// The box of frame `index` in the annotations of `dir`.
+fn annotated(dir: &Path, index: u64) -> Result<Rect, String> {
+    let needed = |why: String| {
+        format!(
+            "{}: --box x,y,width,height is needed ({why})",
+            dir.display()
+        )
+    };
+    let name = BOXES;
+    if !dir.join(name).is_file() {
+        return Err(needed(format!(
+            "there is no {name} to take the first box from"
+        )));
+    }
+    let boxes = read_boxes(dir).map_err(|error| error.to_string())?;
+    let found = usize::try_from(index)
+        .ok()
+        .and_then(|index| boxes.get(index).copied().flatten());
+    found.ok_or_else(|| needed(format!("frame {index} is not annotated in {name}")))
+}
+
+fn rect(text: &str) -> Result<Rect, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) => Ok(Rect {
+            x,
+            y,
+            width,
+            height,
+        }),
+        _ => Err("it must be four numbers: x,y,width,height".to_owned()),
+    }
+}

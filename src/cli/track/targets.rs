@@ -1,0 +1,58 @@
+//! The targets of `bagtrack track`: a tracker for each, which all see the same frames.
+
+use bagtrack_ingest::Limits;
+use bagtrack_sessions::{PerTarget, frame_format, largest_format, target_seed};
+use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
+use std::error::Error;
+
+/// A tracker for each target.
+pub struct Targets(Vec<Tracker>);
+
+impl Targets {
+    /// Trackers that start with `boxes` in a frame. They are those of a session of the service with these boxes.
+    pub fn start(bytes: &[u8], boxes: &[Rect], params: &Params) -> Result<Self, Box<dyn Error>> {
+        let list = PerTarget::List(boxes.to_vec());
+        let format = |source| frame_format(params, source, &list);
+        let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &format)?;
+        let start = |(target, given): (usize, &Rect)| {
+            let mut params = params.clone();
+            params.seed = target_seed(params.seed, target);
+            Tracker::new(&frame, *given, params).map_err(|error| match boxes.len() {
+                1 => error.to_string(),
+                _ => format!("target {target}: {error}"),
+            })
+        };
+        let trackers = boxes.iter().enumerate().map(start);
+        Ok(Self(trackers.collect::<Result<_, String>>()?))
+    }
+
+    /// Tracks through the next frame, which is decoded once for all targets.
+    pub fn step(&mut self, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+        let format = largest_format(self.0.iter().map(Tracker::frame_format));
+        let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &|_| format)?;
+        for tracker in &mut self.0 {
+            step(tracker, &frame)?;
+        }
+        Ok(())
+    }
+
+    /// The last answer for each.
+    pub fn estimates(&self) -> Vec<Estimate> {
+        self.0.iter().map(Tracker::estimate).collect()
+    }
+}
+
+fn step(tracker: &mut Tracker, frame: &Frame) -> Result<(), String> {
+    match tracker.step(frame) {
+        Ok(_) => Ok(()),
+        Err(TrackerError::FrameSize {
+            width,
+            height,
+            got_width,
+            got_height,
+        }) => Err(format!(
+            "the frame is {got_width} x {got_height}, the frames before it are {width} x {height}; all have one size"
+        )),
+        Err(error) => Err(error.to_string()),
+    }
+}

@@ -1,0 +1,134 @@
+//! A video that is written frame by frame, by an installed ffmpeg.
+
+use super::frames::FFMPEG;
+use super::video_info::Rate;
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::{self, JoinHandle};
+
+/// What a name may end with to be a video.
+const ENDINGS: [&str; 7] = ["mp4", "m4v", "mov", "mkv", "webm", "avi", "gif"];
+/// The usual encoders want even sides.
+const EVEN: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
+/// A GIF has 256 colours a frame: those that the frame needs.
+const PALETTE: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1";
+
+/// A video being encoded. Its last frames are written when it is [finished](Self::finish).
+pub struct VideoFile {
+    path: PathBuf,
+    encoder: Child,
+    said: JoinHandle<String>,
+}
+
+/// The names of videos, for messages.
+pub fn endings() -> String {
+    ENDINGS.map(|ending| format!(".{ending}")).join(", ")
+}
+
+/// Whether this is the name of a video.
+pub fn is_video(path: &Path) -> bool {
+    ENDINGS.contains(&ending(path).as_str())
+}
+
+fn ending(path: &Path) -> String {
+    let ending = path.extension().unwrap_or_default();
+    ending.to_string_lossy().to_ascii_lowercase()
+}
+
+impl VideoFile {
+    /// A new video of JPEG pictures like this one, with so many a second. It is tried first whether this ffmpeg can
+    /// write such a video there.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn create(path: &Path, rate: Rate, picture: &[u8]) -> Result<Self, String> {
+        let mut trial = Self::start(path, rate)?;
+        let added = trial.add(picture);
+        // It tells why nothing could be added, too.
+        let finished = trial.finish();
+        let _ = fs::remove_file(path);
+        finished.and(added)?;
+        Self::start(path, rate)
+    }
+
+    fn start(path: &Path, rate: Rate) -> Result<Self, String> {
+        let mut command = Command::new(FFMPEG);
+        command.args(["-hide_banner", "-nostdin", "-v", "error", "-n"]);
+        command.args([
+            "-f",
+            "mjpeg",
+            "-framerate",
+            &rate.to_string(),
+            "-i",
+            "pipe:0",
+        ]);
+        match ending(path).as_str() {
+            "gif" => command.args(["-vf", PALETTE]),
+            // Its usual encoder aims at 200 kbit/s otherwise.
+            "avi" => command.args(["-vf", EVEN, "-pix_fmt", "yuv420p", "-q:v", "3"]),
+            _ => command.args(["-vf", EVEN, "-pix_fmt", "yuv420p"]),
+        };
+        // With the folder, it cannot be taken for a flag or a URL.
+        let absolute = std::path::absolute(path);
+        command.arg(absolute.map_err(|error| format!("{}: {error}", path.display()))?);
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        // Ctrl-C goes to the whole group. The encoder has to go on, so that the file gets its end.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut encoder = command.spawn().map_err(|error| {
+            format!(
+                "{}: `{FFMPEG}` cannot be started: {error}; install ffmpeg",
+                path.display()
+            )
+        })?;
+        let mut stderr = encoder
+            .stderr
+            .take()
+            .expect("the command says that it is a pipe");
+        let said = thread::spawn(move || {
+            let mut said = String::new();
+            let _ = stderr.read_to_string(&mut said);
+            said
+        });
+        Ok(Self {
+            path: path.to_owned(),
+            encoder,
+            said,
+        })
+    }
+
+    /// Adds a picture, a JPEG file.
+    ///
+    /// # Errors
+    /// The encoder has ended; [`Self::finish`] tells why.
+    pub fn add(&mut self, picture: &[u8]) -> Result<(), String> {
+        let pipe = self.encoder.stdin.as_mut();
+        let pipe = pipe.expect("it is closed at the end only");
+        let written = pipe.write_all(picture);
+        written.map_err(|error| format!("{}: {error}", self.path.display()))
+    }
+
+    /// Waits until all is written.
+    ///
+    /// # Errors
+    /// It could not be; the text has what the encoder said last.
+    pub fn finish(mut self) -> Result<(), String> {
+        drop(self.encoder.stdin.take());
+        let ended = self.encoder.wait();
+        let said = self.said.join().unwrap_or_default();
+        if ended.is_ok_and(|status| status.success()) {
+            return Ok(());
+        }
+        let last = said.lines().rfind(|line| !line.trim().is_empty());
+        Err(format!(
+            "{}: this ffmpeg cannot write it: {}",
+            self.path.display(),
+            last.unwrap_or("it ended without a word")
+        ))
+    }
+}

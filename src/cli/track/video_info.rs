@@ -1,0 +1,204 @@
+//! What ffprobe tells about a video: its rate, and when each of its frames is shown.
+
+use std::fmt;
+use std::path::Path;
+use std::process::Command;
+
+/// The program that tells about videos.
+const FFPROBE: &str = "ffprobe";
+/// The first names of formats whose files have an index.
+const INDEXED: [&str; 2] = ["mov", "matroska"];
+/// Encoders of MPEG-4 take no larger parts of a fraction.
+const MAX_PART: u32 = 65535;
+
+/// Frames a second, as a fraction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rate {
+    numerator: u32,
+    denominator: u32,
+}
+
+/// What is known about a video.
+#[derive(Debug, Default)]
+pub struct VideoInfo {
+    /// Frames a second, on average.
+    pub rate: Rate,
+    /// When each frame is shown, in seconds; empty where that is not known of all.
+    times: Vec<f64>,
+    /// The start time of a file with an index, in which ffmpeg finds any frame.
+    indexed_from: Option<f64>,
+}
+
+impl Default for Rate {
+    /// The rate where nothing tells.
+    fn default() -> Self {
+        Self {
+            numerator: 25,
+            denominator: 1,
+        }
+    }
+}
+
+impl Rate {
+    /// Reads a fraction as ffprobe writes it. One with large parts, as the average of a phone's video is, becomes one
+    /// of thousandths.
+    fn parse(text: &str) -> Option<Self> {
+        let (numerator, denominator) = text.split_once('/')?;
+        let [numerator, denominator] = [numerator.parse().ok()?, denominator.parse().ok()?];
+        let exact = Self {
+            numerator,
+            denominator,
+        };
+        if numerator == 0 || denominator == 0 {
+            return None;
+        }
+        if numerator.max(denominator) <= MAX_PART {
+            return Some(exact);
+        }
+        let denominator = if exact.value() < 65.0 { 1000 } else { 1 };
+        let numerator = (exact.value() * f64::from(denominator)).round() as u32;
+        (1..=MAX_PART).contains(&numerator).then_some(Self {
+            numerator,
+            denominator,
+        })
+    }
+
+    fn value(self) -> f64 {
+        f64::from(self.numerator) / f64::from(self.denominator)
+    }
+}
+
+impl fmt::Display for Rate {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}/{}", self.numerator, self.denominator)
+    }
+}
+
+impl VideoInfo {
+    /// What ffprobe tells about the video at `path`; defaults where it cannot.
+    pub fn read(path: &Path) -> Self {
+        let mut command = Command::new(FFPROBE);
+        command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
+        let entries = "format=format_name,start_time:stream=avg_frame_rate:packet=pts_time,flags";
+        command.args(["-show_entries", entries]).arg(path);
+        let told = command.output().map(|output| output.stdout);
+        Self::parse(&String::from_utf8_lossy(&told.unwrap_or_default()))
+    }
+
+    /// Reads lines like `packet,0.040000,K__`, `stream,25/1` and `format,"mov,mp4",0.000000`.
+    fn parse(told: &str) -> Self {
+        let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let mut times = Vec::new();
+        let mut rate = None;
+        let mut indexed_from = None;
+        for line in told.lines().map(fields) {
+            match line.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+                // A packet that an edit list leaves out is decoded, but not shown.
+                ["packet", _, flags, ..] if flags.contains('D') => {}
+                ["packet", time, ..] => times.push(time.parse::<f64>()),
+                ["stream", fraction, ..] => rate = Rate::parse(fraction),
+                ["format", name, .., start] if INDEXED.contains(&name.trim_matches('"')) => {
+                    indexed_from = start.parse().ok();
+                }
+                _ => {}
+            }
+        }
+        let mut times: Vec<f64> = times
+            .into_iter()
+            .collect::<Result<_, _>>()
+            .unwrap_or_default();
+        times.sort_by(f64::total_cmp);
+        Self {
+            rate: rate.unwrap_or_default(),
+            times,
+            indexed_from,
+        }
+    }
+
+    /// From when on the file is to be decoded so that frame `index` is the first, in seconds after its start time:
+    /// between this frame and the one before it. None where it has to be decoded from its beginning.
+    pub fn seek_to(&self, index: u64) -> Option<f64> {
+        let index = usize::try_from(index).ok()?;
+        let before = self.times.get(index.checked_sub(1)?)?;
+        let middle = (before + self.times.get(index)?) / 2.0;
+        Some(middle - self.indexed_from?)
+    }
+
+    /// How many frames there are, where that is known.
+    pub fn count(&self) -> Option<u64> {
+        (!self.times.is_empty()).then_some(self.times.len() as u64)
+    }
+
+    /// When frame `index` is shown, in seconds after the first one, to a microsecond.
+    pub fn time(&self, index: u64) -> f64 {
+        let known = usize::try_from(index).ok();
+        let known = known.and_then(|index| Some(self.times.get(index)? - self.times[0]));
+        let seconds = known.unwrap_or(index as f64 / self.rate.value());
+        (seconds * 1e6).round() / 1e6
+    }
+
+    /// The first frame that is not before this time.
+    pub fn frame_at(&self, seconds: f64) -> u64 {
+        match self.times.first() {
+            // As many as there are: one that does not exist, where all are before it.
+            Some(first) => {
+                self.times
+                    .partition_point(|time| time - first < seconds - 1e-6) as u64
+            }
+            None => (seconds * self.rate.value() - 1e-6).ceil().max(0.0) as u64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_in_the_order_of_showing_and_count_from_the_first() {
+        // B-frames come before the frames that they are shown after; the first packet is cut off by an edit list.
+        let told = "packet,0.9,KD_\npacket,1.0,K__\npacket,1.2,___\npacket,1.1,___\nstream,10/1\n";
+        let info = VideoInfo::parse(told);
+        assert_eq!(info.count(), Some(3));
+        assert_eq!(
+            [0, 1, 2, 5].map(|index| info.time(index)),
+            [0.0, 0.1, 0.2, 0.5]
+        );
+        let at = |seconds| info.frame_at(seconds);
+        assert_eq!((at(0.0), at(0.1), at(0.11), at(0.3)), (0, 1, 2, 3));
+    }
+
+    #[test]
+    fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
+        let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,10/1\n";
+        let seek_to = |format: &str| {
+            let info = VideoInfo::parse(&format!("{packets}{format}\n"));
+            [0, 1, 2, 3].map(|index| info.seek_to(index).map(|time| (time * 1e6).round() / 1e6))
+        };
+        let expected = [None, Some(0.05), Some(0.25), None];
+        assert_eq!(seek_to("format,\"mov,mp4,m4a\",1.000000"), expected);
+        assert_eq!(seek_to("format,\"matroska,webm\",1.000000"), expected);
+        assert_eq!(seek_to("format,avi,1.000000"), [None; 4]);
+        assert_eq!(seek_to("format,\"matroska,webm\",N/A"), [None; 4]);
+    }
+
+    #[test]
+    fn without_times_the_rate_tells() {
+        let info = VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,30000/1001\n");
+        assert_eq!((info.count(), info.time(30)), (None, 1.001));
+        assert_eq!((info.frame_at(1.001), info.frame_at(1.0)), (30, 30));
+        assert_eq!(VideoInfo::parse("").time(50), 2.0);
+    }
+
+    #[test]
+    fn a_rate_has_parts_that_encoders_take() {
+        let rate = |text| Rate::parse(text).map(|rate| rate.to_string());
+        assert_eq!(rate("30000/1001").as_deref(), Some("30000/1001"));
+        assert_eq!(rate("10530000/350767").as_deref(), Some("30020/1000"));
+        assert_eq!(rate("12000000/100001").as_deref(), Some("120/1"));
+        assert_eq!(
+            (rate("0/0"), rate("N/A"), rate("90000/1")),
+            (None, None, None)
+        );
+    }
+}

@@ -1,0 +1,83 @@
+//! Files under another name than `frame`, which is the likeliest mistake of all, and settings in the wrong place.
+
+use super::settings::Settings;
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use bagtrack_ingest::{self as ingest, video};
+use bagtrack_tracker::Params;
+use serde_json::{Value, json};
+
+/// What files are called elsewhere, without `[]` at the end.
+const FILE_NAMES: [&str; 16] = [
+    "data", "file", "files", "frame", "frames", "image", "images", "img", "imgs", "media", "photo",
+    "photos", "picture", "pictures", "upload", "video",
+];
+
+fn is_name_of_file(name: &str) -> bool {
+    let name = name.trim_end_matches("[]").to_ascii_lowercase();
+    FILE_NAMES.contains(&&*name)
+}
+
+fn is_setting<S: Settings>(name: &str) -> bool {
+    let settings = S::into_params(|| None);
+    settings.iter().any(|setting| setting.name == name)
+}
+
+/// The problem of a part of a form that is called so and begins with these bytes, if it is a file and no setting.
+pub(super) fn part<S: Settings>(name: &str, has_file_name: bool, bytes: &[u8]) -> Option<Problem> {
+    if is_setting::<S>(name) {
+        return None;
+    }
+    let is_file = ingest::type_name(bytes).is_some() || video::video_format(bytes, "").is_some();
+    let is_named = is_name_of_file(name) && (has_file_name || bytes.is_empty());
+    (is_file || is_named).then(|| {
+        let name = shown(name);
+        let detail = format!(
+            "The file is in the part `{name}`; name it `frame`: `-F frame=@picture.jpg`. Several frames are several \
+             parts with this name."
+        );
+        Problem::new(Kind::MissingFrame, detail)
+    })
+}
+
+/// The problem of a field of a JSON object that is called so and has this value, if it holds a file.
+pub(super) fn field<S: Settings>(name: &str, value: &str) -> Option<Problem> {
+    let is_text = value.starts_with(['"', '[']);
+    (is_text && is_name_of_file(name) && !is_setting::<S>(name)).then(|| {
+        let name = shown(name);
+        let detail = match S::FRAMES {
+            super::settings::FrameCount::Several => format!(
+                "There is no field `{name}`. Send the file as base64 in `frame`, several in the array `frames`."
+            ),
+            super::settings::FrameCount::One => {
+                format!("There is no field `{name}`. Send the file as base64 in `frame`.")
+            }
+        };
+        Problem::new(Kind::MissingFrame, detail)
+    })
+}
+
+/// The problem of a parameter of the tracker that is given as a setting.
+pub(super) fn parameter<S: Settings>(name: &str, text: &str) -> Option<Problem> {
+    let is_parameter = Params::TABLE.iter().any(|row| row.name == name);
+    if !is_parameter || is_setting::<S>(name) {
+        return None;
+    }
+    let value = serde_json::from_str::<Value>(text).unwrap_or_else(|_| text.into());
+    let detail = match is_setting::<S>("parameters") {
+        true => format!(
+            "`{name}` is a parameter of the tracker: it goes into the JSON object `parameters`, like parameters={}.",
+            json!({ name: value })
+        ),
+        false => format!(
+            "`{name}` is a parameter of the tracker. It is given when the session is opened, in the JSON object \
+             `parameters`, and stays."
+        ),
+    };
+    Some(Problem::malformed(detail))
+}
+
+/// A name as it is told.
+fn shown(name: &str) -> String {
+    name.chars().take(64).collect()
+}

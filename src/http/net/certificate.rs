@@ -1,0 +1,168 @@
+//! The certificate that clients see, and its private key.
+
+use crate::http::config::tls::TlsConfig;
+use rustls::pki_types::pem::{Error as PemError, PemObject};
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::{ServerConfig, crypto::ring};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError, RwLock};
+use tokio_rustls::TlsAcceptor;
+
+/// The only protocol within TLS.
+const PROTOCOL: &[u8] = b"http/1.1";
+
+/// Why there is no certificate to show.
+#[derive(Debug, thiserror::Error)]
+pub enum CertificateError {
+    /// One of the two files is not named.
+    #[error(
+        "a certificate needs its key: give both --tls-cert (BAGTRACK_TLS_CERT) and --tls-key (BAGTRACK_TLS_KEY)"
+    )]
+    Half,
+    /// A file cannot be read.
+    #[error("{path} (--{flag}) cannot be read: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The flag that names it.
+        flag: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file of the certificate has none.
+    #[error(
+        "{path} (--tls-cert) has no certificate in PEM ({reason}): it must have the lines between \
+         `-----BEGIN CERTIFICATE-----` and `-----END CERTIFICATE-----`; `openssl x509 -inform DER -in FILE` makes them \
+         of a DER file"
+    )]
+    NoCertificate {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file of the key has none that can be used.
+    #[error(
+        "{path} (--tls-key) has no private key in PEM that can be used ({reason}): `openssl pkey -in FILE -out FILE` \
+         takes a passphrase off and makes PEM of other formats"
+    )]
+    NoKey {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// They are not a pair, or of a kind that is not supported.
+    #[error(
+        "{cert} (--tls-cert) and {key} (--tls-key) cannot be used together: {reason}. The first certificate of the file \
+         must be that of the key, ECDSA (P-256, P-384), RSA (2048 bits or more) or Ed25519"
+    )]
+    Pair {
+        /// The certificate's file.
+        cert: PathBuf,
+        /// The key's file.
+        key: PathBuf,
+        /// What is wrong with them.
+        reason: rustls::Error,
+    },
+}
+
+/// The certificate and its key. Clones are the same one.
+#[derive(Debug, Clone)]
+pub struct Certificate(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    cert: PathBuf,
+    key: PathBuf,
+    current: RwLock<Arc<ServerConfig>>,
+}
+
+impl Certificate {
+    /// That of these settings, where they name one.
+    ///
+    /// # Errors
+    /// See [`CertificateError`].
+    pub fn load(config: &TlsConfig) -> Result<Option<Self>, CertificateError> {
+        match (&config.tls_cert, &config.tls_key) {
+            (None, None) => Ok(None),
+            (Some(cert), Some(key)) => Ok(Some(Self(Arc::new(Inner {
+                current: RwLock::new(Arc::new(server_config(cert, key)?)),
+                cert: cert.clone(),
+                key: key.clone(),
+            })))),
+            _ => Err(CertificateError::Half),
+        }
+    }
+
+    /// Reads the files again. Connections that are open keep what they have.
+    ///
+    /// # Errors
+    /// See [`CertificateError`]. The certificate is then as before.
+    pub fn reload(&self) -> Result<(), CertificateError> {
+        let read = Arc::new(server_config(&self.0.cert, &self.0.key)?);
+        let current = self.0.current.write();
+        // Nothing panics while it is held.
+        *current.unwrap_or_else(PoisonError::into_inner) = read;
+        Ok(())
+    }
+
+    /// What takes a connection with the certificate as it is now.
+    pub fn acceptor(&self) -> TlsAcceptor {
+        let current = self.0.current.read();
+        TlsAcceptor::from(current.unwrap_or_else(PoisonError::into_inner).clone())
+    }
+}
+
+fn server_config(cert: &Path, key: &Path) -> Result<ServerConfig, CertificateError> {
+    let (chain, private) = (chain(cert)?, private_key(key)?);
+    let pair = |reason| CertificateError::Pair {
+        cert: cert.to_owned(),
+        key: key.to_owned(),
+        reason,
+    };
+    let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
+    let builder = builder
+        .with_safe_default_protocol_versions()
+        .map_err(pair)?;
+    let mut config = builder
+        .with_no_client_auth()
+        .with_single_cert(chain, private)
+        .map_err(pair)?;
+    config.alpn_protocols = vec![PROTOCOL.to_vec()];
+    Ok(config)
+}
+
+fn chain(path: &Path) -> Result<Vec<CertificateDer<'static>>, CertificateError> {
+    let text = read(path, "tls-cert")?;
+    let no_certificate = |reason| CertificateError::NoCertificate {
+        path: path.to_owned(),
+        reason,
+    };
+    let chain: Result<Vec<_>, PemError> = CertificateDer::pem_slice_iter(&text).collect();
+    match chain {
+        Ok(chain) if chain.is_empty() => Err(no_certificate("there is none".to_owned())),
+        Ok(chain) => Ok(chain),
+        Err(error) => Err(no_certificate(error.to_string())),
+    }
+}
+
+fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CertificateError> {
+    let text = read(path, "tls-key")?;
+    PrivateKeyDer::from_pem_slice(&text).map_err(|error| CertificateError::NoKey {
+        path: path.to_owned(),
+        reason: match error {
+            PemError::NoItemsFound => "there is none, or it has a passphrase".to_owned(),
+            other => other.to_string(),
+        },
+    })
+}
+
+fn read(path: &Path, flag: &'static str) -> Result<Vec<u8>, CertificateError> {
+    std::fs::read(path).map_err(|source| CertificateError::File {
+        path: path.to_owned(),
+        flag,
+        source,
+    })
+}

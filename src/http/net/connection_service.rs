@@ -1,0 +1,98 @@
+//! What a connection goes through from when it is accepted to its end.
+
+use super::connection_hold::ConnectionHold;
+use super::connection_io::ConnectionIo;
+use super::handshake::{Begun, Security, Transport};
+use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
+use crate::http::quotas::client::Peer;
+#[cfg(feature = "tls")]
+use crate::http::router::https_only;
+use crate::http::state::AppState;
+use axum::body::Body;
+use axum::{Extension, Router};
+use hyper::Request;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+/// How all connections of a service are served.
+#[derive(Debug)]
+pub struct ConnectionService {
+    state: AppState,
+    security: Security,
+    routes: Router,
+    /// For clients that speak plain HTTP where TLS is expected.
+    #[cfg(feature = "tls")]
+    https_only: Router,
+    http: http1::Builder,
+    handshake_timeout: Duration,
+}
+
+impl ConnectionService {
+    /// Of a service with these routes.
+    pub fn new(state: AppState, security: Security, routes: Router) -> Self {
+        let handshake_timeout = state.config.header_timeout;
+        let mut http = http1::Builder::new();
+        http.timer(TokioTimer::new())
+            .max_buf_size(MAX_BUFFER_BYTES)
+            .header_read_timeout(handshake_timeout);
+        Self {
+            #[cfg(feature = "tls")]
+            https_only: https_only(&state),
+            state,
+            security,
+            routes,
+            http,
+            handshake_timeout,
+        }
+    }
+
+    /// Whether connections begin with a TLS handshake.
+    pub fn has_tls(&self) -> bool {
+        self.security.has_tls()
+    }
+
+    /// Serves one connection until it ends, or a stream has taken it over.
+    pub async fn serve(&self, stream: TcpStream, peer: SocketAddr, mut hold: ConnectionHold) {
+        if let Err(error) = stream.set_nodelay(true) {
+            tracing::debug!(%error, "cannot set TCP_NODELAY");
+        }
+        let beginning = timeout(self.handshake_timeout, self.security.begin(stream));
+        let (transport, routes) = match hold.begin(beginning).await {
+            Some(Ok(Ok(Begun::AsConfigured(transport)))) => (transport, &self.routes),
+            #[cfg(feature = "tls")]
+            Some(Ok(Ok(Begun::WithoutTls(transport)))) => (transport, &self.https_only),
+            Some(Ok(Err(error))) => return tracing::debug!(%peer, %error, "no TLS handshake"),
+            Some(Err(_)) => return tracing::debug!(%peer, "the TLS handshake took too long"),
+            None => return tracing::debug!(%peer, "connection closed during its TLS handshake"),
+        };
+        self.speak_http(transport, peer, routes.clone(), hold).await;
+    }
+
+    async fn speak_http(
+        &self,
+        transport: Transport,
+        peer: SocketAddr,
+        routes: Router,
+        hold: ConnectionHold,
+    ) {
+        let activity = hold.activity().clone();
+        let io = ConnectionIo::new(transport, activity.clone(), &self.state.config.limits);
+        let service = routes.layer(Extension(Peer(peer)));
+        let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
+        let watched = service_fn(move |request: Request<Incoming>| {
+            let activity = activity.clone();
+            let request = request.map(|body| activity.receive(Body::new(body)));
+            let answer = service.call(request);
+            async move { answer.await.map(|answer| activity.answer(answer)) }
+        });
+        let connection = self.http.serve_connection(TokioIo::new(io), watched);
+        hold.serve(connection.with_upgrades()).await;
+    }
+}

@@ -1,0 +1,94 @@
+//! From an accepted connection to one over which HTTP is spoken: with TLS, its handshake.
+//!
+//! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It is served, too: by
+//! [routes](crate::http::resources::https_only) that tell it the right address.
+
+use std::io;
+use tokio::net::TcpStream;
+
+#[cfg(feature = "tls")]
+use super::certificate::Certificate;
+#[cfg(feature = "tls")]
+use crate::http::config::memory_bound::MAX_UNSENT_BYTES;
+#[cfg(feature = "tls")]
+use tokio_rustls::server::TlsStream;
+#[cfg(feature = "tls")]
+use tokio_util::either::Either;
+
+/// The first byte of a TLS handshake: the type of its record (RFC 8446, section 5.1).
+#[cfg(feature = "tls")]
+const HANDSHAKE_RECORD: u8 = 22;
+
+/// A connection's bytes, decrypted.
+#[cfg(feature = "tls")]
+pub type Transport = Either<TcpStream, Box<TlsStream<TcpStream>>>;
+
+/// A connection's bytes.
+#[cfg(not(feature = "tls"))]
+pub type Transport = TcpStream;
+
+/// How the connections of a service begin.
+#[derive(Debug, Clone)]
+pub enum Security {
+    /// With the request.
+    Plain,
+    /// With a TLS handshake, in which the client gets this certificate.
+    #[cfg(feature = "tls")]
+    Tls(Certificate),
+}
+
+/// What a connection turned out to be.
+#[derive(Debug)]
+pub enum Begun {
+    /// One that the service's requests come over.
+    AsConfigured(Transport),
+    /// One of a client that does not know that the service has TLS.
+    #[cfg(feature = "tls")]
+    WithoutTls(Transport),
+}
+
+impl Security {
+    /// The scheme of the service's address.
+    pub fn scheme(&self) -> &'static str {
+        match self {
+            Self::Plain => "http",
+            #[cfg(feature = "tls")]
+            Self::Tls(_) => "https",
+        }
+    }
+
+    /// Whether connections begin with a TLS handshake.
+    pub fn has_tls(&self) -> bool {
+        !matches!(self, Self::Plain)
+    }
+
+    /// Waits for the first bytes of a client, where the service has TLS, and makes the handshake.
+    ///
+    /// # Errors
+    /// The connection breaks, or the client and the service do not agree.
+    pub async fn begin(&self, stream: TcpStream) -> io::Result<Begun> {
+        match self {
+            #[cfg(not(feature = "tls"))]
+            Self::Plain => Ok(Begun::AsConfigured(stream)),
+            #[cfg(feature = "tls")]
+            Self::Plain => Ok(Begun::AsConfigured(Either::Left(stream))),
+            #[cfg(feature = "tls")]
+            Self::Tls(certificate) => {
+                let mut first = [0];
+                match stream.peek(&mut first).await? {
+                    0 => Err(io::ErrorKind::UnexpectedEof.into()),
+                    _ if first[0] != HANDSHAKE_RECORD => {
+                        Ok(Begun::WithoutTls(Either::Left(stream)))
+                    }
+                    _ => {
+                        let limit = |connection: &mut rustls::ServerConnection| {
+                            connection.set_buffer_limit(Some(MAX_UNSENT_BYTES));
+                        };
+                        let accepted = certificate.acceptor().accept_with(stream, limit).await?;
+                        Ok(Begun::AsConfigured(Either::Right(Box::new(accepted))))
+                    }
+                }
+            }
+        }
+    }
+}

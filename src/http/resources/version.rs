@@ -1,0 +1,40 @@
+//! `GET /version`.
+
+use crate::http::extract::texts::refuse_query;
+use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::problems::problem::Problem;
+use crate::http::respond::json::Json;
+use axum::http::Uri;
+use serde::Serialize;
+
+/// The program that answers.
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+pub struct Version {
+    /// Always `bagtrack`.
+    #[schema(example = "bagtrack")]
+    name: &'static str,
+    /// Its version. Snapshots of another one are refused.
+    #[schema(example = "0.1.0")]
+    version: &'static str,
+}
+
+operation_problems!(
+    Problems,
+    problem_responses::ALWAYS,
+    &[crate::http::problems::kind::Kind::MalformedRequest]
+);
+
+/// See which version answers
+///
+/// Needs no key.
+#[utoipa::path(
+    get, path = "/version", tag = "service", operation_id = "getVersion", security(()),
+    responses((status = 200, description = "The version", body = Version), Problems)
+)]
+pub async fn get(uri: Uri) -> Result<Json<Version>, Problem> {
+    refuse_query(&uri)?;
+    Ok(Json(Version {
+        name: env!("CARGO_PKG_NAME"),
+        version: env!("CARGO_PKG_VERSION"),
+    }))
+}

@@ -1,0 +1,177 @@
+//! `bagtrack serve` beside the other commands: what it says at its start, and that it answers as `track` does.
+
+use crate::command::{clip, folder, succeeds, text};
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+/// A running service, which ends with the test.
+struct Service {
+    process: Child,
+    /// The messages of the start.
+    messages: Vec<String>,
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Service {
+    /// Starts it, and reads its log up to the address for this machine, which is said last.
+    fn start(flags: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+        command.arg("serve").args(flags).env("NO_COLOR", "1");
+        let mut process = command
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("cargo has built it");
+        let mut log = BufReader::new(process.stderr.take().expect("it is a pipe")).lines();
+        let mut messages = Vec::new();
+        loop {
+            let line = log.next().expect("it starts").expect("text");
+            let is_last = line.contains("in a browser");
+            messages.push(line);
+            if is_last {
+                break;
+            }
+        }
+        // What is not read is dropped.
+        std::thread::spawn(move || log.for_each(drop));
+        Self { process, messages }
+    }
+
+    /// The address in the message with these words before and after it.
+    fn address(&self, before: &str, after: &str) -> Option<String> {
+        self.messages.iter().find_map(|line| {
+            let (_, rest) = line.split_once(before)?;
+            let (address, _) = rest.split_once(after)?;
+            Some(address.to_owned())
+        })
+    }
+}
+
+fn page(url: &str) -> String {
+    let answer = reqwest::blocking::get(url).expect("it answers");
+    assert!(answer.status().is_success(), "{url}: {}", answer.status());
+    answer.text().expect("text")
+}
+
+#[test]
+fn the_start_says_what_to_open_in_a_browser_and_the_page_is_there() {
+    for format in ["text", "json"] {
+        let flags = ["--listen", "127.0.0.1:0", "--log-format", format];
+        let service = Service::start(&flags);
+        let url = service.address("open ", " in a browser");
+        let url = url.unwrap_or_else(|| panic!("{:?}", service.messages));
+        assert!(url.starts_with("http://127.0.0.1:"), "{url}");
+        assert!(page(&url).contains("<html"), "{url}");
+        let others = service
+            .messages
+            .iter()
+            .any(|line| line.contains("other machines"));
+        assert!(
+            !others,
+            "only this machine reaches it: {:?}",
+            service.messages
+        );
+    }
+}
+
+#[test]
+fn the_address_has_the_base_path() {
+    let flags = ["--listen", "127.0.0.1:0", "--base-path", "/tracker"];
+    let service = Service::start(&flags);
+    let url = service
+        .address("open ", " in a browser")
+        .expect("it is said");
+    assert!(url.ends_with("/tracker"), "{url}");
+    assert!(page(&url).contains("<html"), "{url}");
+}
+
+/// Nobody can open http://0.0.0.0.
+#[test]
+fn for_all_interfaces_it_says_the_address_of_this_machine_in_its_network() {
+    let service = Service::start(&["--listen", "0.0.0.0:0", "--no-auth"]);
+    let here = service
+        .address("open ", " in a browser")
+        .expect("it is said");
+    assert!(here.starts_with("http://127.0.0.1:"), "{here}");
+    assert!(page(&here).contains("<html"), "{here}");
+    let mut elsewhere = service.messages.iter().filter_map(|line| {
+        let (_, url) = line.split_once("on other machines, open ")?;
+        Some(url)
+    });
+    let Some(url) = elsewhere.next() else {
+        eprintln!("left out: this machine is in no network");
+        return;
+    };
+    let is_here = ["0.0.0.0", "127.0.0.1"]
+        .iter()
+        .any(|name| url.contains(name));
+    assert!(!is_here, "{url}");
+    assert!(page(url).contains("<html"), "{url}");
+    let hint = service
+        .messages
+        .iter()
+        .any(|line| line.contains("camera to https only"));
+    assert!(hint, "{:?}", service.messages);
+}
+
+#[test]
+fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &["--frames", "6"]);
+    let boxes = ["44.1,101.4,46.1,57.6", "200,30,20,16"];
+    let flags = ["--seed", "5", "--format", "json"];
+    let targets = ["--box", boxes[0], "--box", boxes[1]];
+    let lines = succeeds(&[&["track", text(&dir)], &flags[..], &targets].concat());
+    let lines: Vec<Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let url = service
+        .address("open ", " in a browser")
+        .expect("it is said");
+    let client = reqwest::blocking::Client::new();
+    let post = |path: &str, index: usize| {
+        let frame = fs::read(dir.join(format!("img/{index:04}.jpg"))).expect("it is there");
+        let answer = client.post(format!("{url}{path}")).body(frame).send();
+        let answer = answer.expect("it answers");
+        assert!(answer.status().is_success(), "{}", answer.status());
+        answer
+    };
+    let opened = post(&format!("/sessions?seed=5&boxes={}", boxes.join(";")), 1);
+    let session = opened.headers()["location"]
+        .to_str()
+        .expect("text")
+        .to_owned();
+    for index in 2..=6 {
+        let answer = post(&format!("{session}/frames"), index);
+        let answer: Value = serde_json::from_str(&answer.text().expect("text")).expect("JSON");
+        for (target, found) in answer["targets"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .enumerate()
+        {
+            let line = &lines[2 * (index - 1) + target];
+            assert_eq!(
+                (&line["frame"], &line["target"]),
+                (&answer["frame"], &target.into())
+            );
+            // The service answers hundredths of a pixel.
+            for side in ["x", "y", "width", "height"] {
+                let exact = line["box"][side].as_f64().expect("a number");
+                let rounded = (100.0 * exact).round() / 100.0;
+                assert_eq!(found["box"][side], rounded, "{side}: {line} {found}");
+            }
+            assert_eq!(line["status"], found["status"]);
+        }
+        assert_eq!(answer["targets"].as_array().map(Vec::len), Some(2));
+    }
+}

@@ -1,0 +1,204 @@
+//! Likely mistakes, and the cure that their problems name.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::pictures;
+use crate::stream_client::StreamClient;
+use base64::prelude::{BASE64_STANDARD, Engine};
+use reqwest::multipart::{Form, Part};
+use reqwest::{Method, Response, StatusCode};
+use serde_json::{Value, json};
+
+/// The detail of a response that must be this problem.
+async fn detail(response: Response, slug: &str) -> String {
+    let problem = expect_problem(response, slug).await;
+    problem["detail"].as_str().unwrap().to_owned()
+}
+
+fn says(detail: &str, texts: &[&str]) {
+    for text in texts {
+        assert!(detail.contains(text), "{text}: {detail}");
+    }
+}
+
+#[tokio::test]
+async fn a_file_under_another_name_is_told_to_be_called_frame() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    for path in ["/sessions".to_owned(), format!("/sessions/{id}/frames")] {
+        for name in ["image", "file", "images[]", "picture", "bild"] {
+            let part = Part::bytes(pictures::png(0)).file_name("first.png");
+            let form = Form::new().part(name, part);
+            let request = app.request(Method::POST, &path, &[]).multipart(form);
+            let detail = detail(request.send().await.unwrap(), "missing-frame").await;
+            says(&detail, &[&format!("`{name}`"), "`frame`", "-F frame=@"]);
+        }
+        for name in ["image", "file", "images[]", "data"] {
+            let body = json!({ name: BASE64_STANDARD.encode(pictures::png(0)) });
+            let request = app.request(Method::POST, &path, &[]).json(&body);
+            let detail = detail(request.send().await.unwrap(), "missing-frame").await;
+            says(&detail, &[&format!("`{name}`"), "`frame`"]);
+        }
+    }
+    // A file may hold a setting.
+    let settings = Part::bytes(br#"{"alpha": 0.25}"#.to_vec()).file_name("parameters.json");
+    let frame = Part::bytes(pictures::png(0)).file_name("first.png");
+    let form = Form::new()
+        .part("parameters", settings)
+        .part("frame", frame);
+    let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+    let opened = request.multipart(form).send().await.unwrap();
+    assert_eq!(opened.status(), StatusCode::CREATED);
+}
+
+/// The first bytes of files as phones make them.
+const HEIC: &[u8] = b"\0\0\0\x24ftypheic\0\0\0\0mif1MiHEMiPrmiafMiHBheic\0\0\x0d\x5bmeta\0\0\0\0";
+const AVIF: &[u8] = b"\0\0\0\x20ftypavif\0\0\0\0avifmif1miafMA1B\0\0\0\xf2meta\0\0\0\0";
+
+#[tokio::test]
+async fn heic_and_avif_are_named_with_the_cure_at_the_opening_and_as_a_frame() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    for (file, texts) in [
+        (HEIC, ["HEIC", "Most Compatible", "JPEG"]),
+        (AVIF, ["AVIF", "not read", "JPEG"]),
+    ] {
+        let opening = app.create(file.to_vec(), &[("box", BOX)]).await;
+        says(&detail(opening, "unsupported-image").await, &texts);
+        let frame = app.post_frame(&id, file.to_vec()).await;
+        says(&detail(frame, "unsupported-image").await, &texts);
+        let form = Form::new().part(
+            "frame",
+            Part::bytes(file.to_vec()).file_name("IMG_0001.HEIC"),
+        );
+        let request = app.request(Method::POST, "/track", &[("box", BOX)]);
+        let track = request.multipart(form).send().await.unwrap();
+        says(&detail(track, "unsupported-image").await, &texts);
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+/// Three boxes for 96 x 72: two corners, fractions, and a negative side.
+#[tokio::test]
+async fn a_box_in_other_units_is_refused_with_the_box_that_is_meant() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    assert_eq!((pictures::WIDTH, pictures::HEIGHT), (96, 72));
+    for (given, texts) in [
+        ("70,50,90,65", ["x1,y1,x2,y2", "`box=70,50,20,15`"]),
+        ("0.25,0.25,0.5,0.5", ["fractions", "`box=24,18,48,36`"]),
+        ("30,30,-10,12", ["negative width", "top left"]),
+        ("30,30,10,-12", ["negative height", "top left"]),
+    ] {
+        let opening = app.create(pictures::png(0), &[("box", given)]).await;
+        says(&detail(opening, "invalid-box").await, &texts);
+        let correction = app
+            .put_target(&id, pictures::png(1), &[("box", given)])
+            .await;
+        says(&detail(correction, "invalid-box").await, &texts);
+        let request = app.request(Method::POST, "/track", &[("box", given)]);
+        let track = request.body(pictures::png(0)).send().await.unwrap();
+        says(&detail(track, "invalid-box").await, &texts);
+        let boxes = format!("{BOX};{given}");
+        let several = app.create(pictures::png(0), &[("boxes", &boxes)]).await;
+        let detail = detail(several, "invalid-box").await;
+        says(&detail, &["Target 1 of 2"]);
+        says(&detail, &texts);
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
+async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
+    let app = TestApplication::start().await;
+    let far = [("box", "90,20,20,12"), ("seed", "7")];
+    let has_warning = |answer: &Value| {
+        let warning = answer["warnings"][0].as_str().unwrap_or_default();
+        says(warning, &["70 % of the box", "outside"]);
+    };
+    let created = app.create(pictures::png(0), &far).await;
+    let created = expect(created, StatusCode::CREATED).await;
+    has_warning(&created);
+    let id = created["id"].as_str().unwrap();
+    let corrected = app.put_target(id, pictures::png(1), &far[..1]).await;
+    has_warning(&expect(corrected, StatusCode::OK).await);
+    let request = app.request(Method::POST, "/track", &far);
+    let track = request.body(pictures::png(0)).send().await.unwrap();
+    has_warning(&expect(track, StatusCode::OK).await);
+    let mut stream = StreamClient::open(&app, id, "").await;
+    stream.say(r#"{"box": [90, 20, 20, 12]}"#).await;
+    stream.send(pictures::png(2)).await;
+    has_warning(&stream.message().await);
+    // A box on the frame has none, nor has a plain answer.
+    let plain = app.create(pictures::png(0), &[("box", BOX)]).await;
+    let plain = expect(plain, StatusCode::CREATED).await;
+    assert_eq!(plain.get("warnings"), None, "{plain}");
+    let answer = app.post_frame(id, pictures::png(3)).await;
+    let answer = expect(answer, StatusCode::OK).await;
+    assert_eq!(answer.get("warnings"), None, "{answer}");
+    // It may be two corners, and may be a large box.
+    let doubtful = [("box", "40,30,58,44")];
+    let created = app.create(pictures::png(0), &doubtful).await;
+    let created = expect(created, StatusCode::CREATED).await;
+    says(
+        created["warnings"][0].as_str().unwrap(),
+        &["`box=40,30,18,14`"],
+    );
+}
+
+#[tokio::test]
+async fn a_url_in_place_of_base64_is_named() {
+    let app = TestApplication::start().await;
+    for url in [
+        "https://example.org/first.jpg",
+        "http://10.0.0.1/snapshot.cgi",
+        "s3://bucket/1.png",
+    ] {
+        let body = json!({"frame": url, "box": BOX});
+        let request = app.request(Method::POST, "/sessions", &[]).json(&body);
+        let detail = detail(request.send().await.unwrap(), "malformed-request").await;
+        says(&detail, &["URL", "not fetched", "base64"]);
+    }
+}
+
+#[tokio::test]
+async fn a_parameter_of_the_tracker_is_told_its_place() {
+    let app = TestApplication::start().await;
+    let query = [("box", BOX), ("particles", "300")];
+    let opening = app.create(pictures::png(0), &query).await;
+    let opening = detail(opening, "malformed-request").await;
+    says(
+        &opening,
+        &[
+            "`particles`",
+            "`parameters`",
+            r#"parameters={"particles":300}"#,
+        ],
+    );
+    let body =
+        json!({"frame": BASE64_STANDARD.encode(pictures::png(0)), "box": BOX, "particles": 300});
+    let request = app.request(Method::POST, "/sessions", &[]).json(&body);
+    let by_json = detail(request.send().await.unwrap(), "malformed-request").await;
+    assert_eq!(by_json, opening);
+    let id = app.open().await;
+    let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &query[1..]);
+    let frame = request.body(pictures::png(1)).send().await.unwrap();
+    says(
+        &detail(frame, "malformed-request").await,
+        &["when the session is opened"],
+    );
+}
+
+#[tokio::test]
+async fn a_slash_at_the_end_of_a_path_is_named() {
+    let app = TestApplication::start().await;
+    let request = app.request(Method::POST, "/sessions/", &[("box", BOX)]);
+    let refused = request.body(pictures::png(0)).send().await.unwrap();
+    says(
+        &detail(refused, "route-not-found").await,
+        &["slash", "`/sessions`"],
+    );
+    says(
+        &detail(app.get("/nothing").await, "route-not-found").await,
+        &["/docs"],
+    );
+}

@@ -1,0 +1,88 @@
+//! Certificates and their keys, in files.
+
+use rcgen::{
+    BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair, PKCS_ECDSA_P256_SHA256,
+    PKCS_ECDSA_P384_SHA384, PKCS_ED25519, SignatureAlgorithm,
+};
+use rustls::pki_types::CertificateDer;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Who signs certificates: a root that clients know, and an issuer that they do not know.
+pub struct Authority {
+    pub root: CertificateDer<'static>,
+    intermediate: String,
+    issuer: Issuer<'static, KeyPair>,
+}
+
+/// The files of a certificate for this machine.
+pub struct Files {
+    folder: TempDir,
+}
+
+/// The kinds of keys that are made here.
+pub fn kinds() -> [(&'static str, &'static SignatureAlgorithm); 3] {
+    [
+        ("ECDSA P-256", &PKCS_ECDSA_P256_SHA256),
+        ("ECDSA P-384", &PKCS_ECDSA_P384_SHA384),
+        ("Ed25519", &PKCS_ED25519),
+    ]
+}
+
+fn authority_params() -> CertificateParams {
+    let mut params = CertificateParams::new(Vec::new()).unwrap();
+    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    params
+}
+
+impl Authority {
+    pub fn new() -> Self {
+        let (root_key, key) = (KeyPair::generate().unwrap(), KeyPair::generate().unwrap());
+        let mut root_params = authority_params();
+        root_params
+            .distinguished_name
+            .push(rcgen::DnType::CommonName, "root");
+        let root = root_params.self_signed(&root_key).unwrap();
+        let root_issuer = Issuer::new(root_params, root_key);
+        let intermediate = authority_params().signed_by(&key, &root_issuer).unwrap();
+        Self {
+            root: root.der().clone(),
+            intermediate: intermediate.pem(),
+            issuer: Issuer::new(authority_params(), key),
+        }
+    }
+
+    /// A certificate of a new key, with that of its issuer after it.
+    pub fn issue(&self, kind: &'static SignatureAlgorithm) -> Files {
+        let files = Files {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        self.issue_into(&files, kind);
+        files
+    }
+
+    /// Writes another certificate of a new key into these files.
+    pub fn issue_into(&self, files: &Files, kind: &'static SignatureAlgorithm) {
+        let key = KeyPair::generate_for(kind).unwrap();
+        let names = ["localhost".to_owned(), "127.0.0.1".to_owned()];
+        let params = CertificateParams::new(names).unwrap();
+        let certificate = params.signed_by(&key, &self.issuer).unwrap();
+        let chain = certificate.pem() + &self.intermediate;
+        std::fs::write(files.certificate(), chain).unwrap();
+        std::fs::write(files.key(), key.serialize_pem()).unwrap();
+    }
+}
+
+impl Files {
+    pub fn certificate(&self) -> PathBuf {
+        self.folder.path().join("certificate.pem")
+    }
+
+    pub fn key(&self) -> PathBuf {
+        self.folder.path().join("key.pem")
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+}

@@ -1,0 +1,139 @@
+//! Clients that make no handshake, or make it slowly, and clients that do not read.
+
+use crate::certificates::{Authority, Files, kinds};
+use crate::client::{Client, PATIENCE, trusting};
+use crate::service::Service;
+use std::time::{Duration, Instant};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+/// The head of a TLS record of 512 bytes, and the head of the hello in it.
+const HELLO_BEGUN: [u8; 9] = [22, 3, 1, 2, 0, 1, 0, 1, 252];
+
+fn issued() -> (Authority, Files) {
+    let authority = Authority::new();
+    let files = authority.issue(kinds()[0].1);
+    (authority, files)
+}
+
+#[tokio::test]
+async fn a_handshake_has_to_end_in_time() {
+    let (authority, files) = issued();
+    let limit = Duration::from_millis(300);
+    let service = Service::start(Some(&files), |config| config.header_timeout = limit).await;
+    let started = Instant::now();
+    let mut slow = Vec::new();
+    for begun in [0, 1, HELLO_BEGUN.len()] {
+        let mut stream = TcpStream::connect(service.address).await.unwrap();
+        stream.write_all(&HELLO_BEGUN[..begun]).await.unwrap();
+        slow.push(Client(stream));
+    }
+    // A byte now and then does not help.
+    let trickle = async {
+        let mut stream = TcpStream::connect(service.address).await.unwrap();
+        stream.write_all(&HELLO_BEGUN).await.unwrap();
+        while stream.write_all(&[0]).await.is_ok() {
+            tokio::time::sleep(limit / 20).await;
+        }
+    };
+    timeout(PATIENCE, trickle).await.expect("it is cut off");
+    for client in &mut slow {
+        client.ends().await;
+    }
+    assert!(started.elapsed() >= limit);
+    let mut client = Client::open(&trusting(&authority.root, &[]), service.address).await;
+    assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
+    assert!(service.end().await);
+}
+
+#[tokio::test]
+async fn handshakes_count_as_connections_and_make_room_for_others() {
+    let (authority, files) = issued();
+    let service = Service::start(Some(&files), |config| {
+        config.max_connections = 3;
+        config.limits.client_connections = Some(3);
+        config.header_timeout = Duration::from_secs(600);
+    });
+    let service = service.await;
+    let mut slow = Vec::new();
+    for _ in 0..3 {
+        let mut stream = TcpStream::connect(service.address).await.unwrap();
+        stream.write_all(&HELLO_BEGUN).await.unwrap();
+        slow.push(Client(stream));
+    }
+    let connector = trusting(&authority.root, &[]);
+    let mut served = Vec::new();
+    for _ in 0..3 {
+        let mut client = Client::open(&connector, service.address).await;
+        assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
+        served.push(client);
+    }
+    for client in &mut slow {
+        assert_eq!(client.ends().await, b"");
+    }
+    let metrics = served[2].call("GET", "/metrics", b"").await;
+    let metrics = String::from_utf8(metrics.body).unwrap();
+    let shed = metrics
+        .lines()
+        .find(|line| line.contains("shed") && !line.starts_with('#'));
+    assert!(shed.is_some_and(|line| line.ends_with(" 3")), "{shed:?}");
+    assert!(service.end().await);
+}
+
+#[tokio::test]
+async fn a_connection_over_its_share_is_closed_without_a_word() {
+    let (authority, files) = issued();
+    let service = Service::start(Some(&files), |config| {
+        config.limits.client_connections = Some(1);
+    });
+    let service = service.await;
+    let connector = trusting(&authority.root, &[]);
+    let mut busy = Client::open(&connector, service.address).await;
+    let head = "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\nExpect: 100-continue\r\n\r\n";
+    busy.0.write_all(head.as_bytes()).await.unwrap();
+    let mut asked = [0; 25];
+    busy.0.read_exact(&mut asked).await.unwrap();
+    assert!(asked.starts_with(b"HTTP/1.1 100"));
+    let mut second = Client(TcpStream::connect(service.address).await.unwrap());
+    assert_eq!(second.ends().await, b"");
+    drop(busy);
+    assert!(service.end().await);
+}
+
+#[tokio::test]
+async fn a_handshake_does_not_hold_up_the_end() {
+    let (_, files) = issued();
+    let service = Service::start(Some(&files), |config| {
+        config.header_timeout = Duration::from_secs(600);
+        config.shutdown_timeout = Duration::from_secs(600);
+    });
+    let service = service.await;
+    let mut stream = TcpStream::connect(service.address).await.unwrap();
+    stream.write_all(&HELLO_BEGUN).await.unwrap();
+    let ended = timeout(PATIENCE, service.end()).await;
+    assert!(ended.expect("it ends"));
+}
+
+#[tokio::test]
+async fn a_client_that_never_reads_loses_its_connection() {
+    let (authority, files) = issued();
+    let service = Service::start(Some(&files), |config| {
+        config.limits.write_timeout = Duration::from_millis(100);
+    });
+    let service = service.await;
+    let connector = trusting(&authority.root, &[]);
+    let mut client = Client::open(&connector, service.address).await;
+    let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(50);
+    // It sends without end, which fails when the service has closed the connection.
+    let refused = async {
+        while client.0.write_all(ask.as_bytes()).await.is_ok() && client.0.flush().await.is_ok() {}
+    };
+    timeout(PATIENCE, refused)
+        .await
+        .expect("the connection ends");
+    let mut client = Client::open(&connector, service.address).await;
+    assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
+    // Its goodbye waits for nobody, either.
+    assert!(timeout(PATIENCE, service.end()).await.expect("it ends"));
+}

@@ -1,0 +1,11 @@
+//! The service over TLS: with certificates made here, and with those of openssl and curl as the client.
+
+#![cfg(feature = "tls")]
+
+mod certificates;
+mod client;
+mod curl;
+mod hostile;
+mod program;
+mod service;
+mod session;

@@ -1,0 +1,227 @@
+//! The program with a certificate: its start, its health check, and SIGHUP.
+
+use crate::certificates::{Authority, Files, kinds};
+use crate::client::{Client, PATIENCE, trusting};
+use rustix::process::{Pid, Signal, kill_process};
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::{Output, Stdio};
+use tokio::io::{AsyncBufReadExt, BufReader, Lines};
+use tokio::process::{Child, ChildStderr, Command};
+use tokio::time::timeout;
+
+/// `bagtrack serve` on a free port.
+pub struct Program {
+    process: Child,
+    log: Lines<BufReader<ChildStderr>>,
+    pub address: SocketAddr,
+}
+
+fn serve(certificate: &Path, key: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    command.args(["serve", "--listen", "127.0.0.1:0", "--shutdown-delay", "0s"]);
+    command.arg("--tls-cert").arg(certificate);
+    command.arg("--tls-key").arg(key);
+    command.env("NO_COLOR", "1");
+    command.stderr(Stdio::piped()).kill_on_drop(true);
+    command
+}
+
+impl Program {
+    pub async fn start(certificate: &Path, key: &Path) -> Self {
+        let mut process = serve(certificate, key).spawn().expect("cargo has built it");
+        let log = BufReader::new(process.stderr.take().unwrap()).lines();
+        let mut program = Self {
+            process,
+            log,
+            address: "0.0.0.0:0".parse().unwrap(),
+        };
+        let line = program.logs("listening on ").await;
+        let (_, address) = line.split_once("listening on https://").expect("https");
+        let address = address.split_whitespace().next().unwrap();
+        program.address = address.parse().unwrap();
+        program
+    }
+
+    fn signal(&self, signal: Signal) {
+        let id = i32::try_from(self.process.id().expect("it runs")).unwrap();
+        kill_process(Pid::from_raw(id).unwrap(), signal).unwrap();
+    }
+
+    async fn logs(&mut self, text: &str) -> String {
+        let found = async {
+            loop {
+                let line = self.log.next_line().await.unwrap().expect(text);
+                if line.contains(text) {
+                    return line;
+                }
+            }
+        };
+        timeout(PATIENCE, found).await.expect(text)
+    }
+}
+
+/// The certificate of the service, as a new client gets it.
+async fn shown(authority: &Authority, program: &Program) -> Vec<u8> {
+    let connector = trusting(&authority.root, &[]);
+    let mut client = Client::open(&connector, program.address).await;
+    assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
+    let chain = client.0.get_ref().1.peer_certificates().unwrap();
+    chain[0].to_vec()
+}
+
+#[tokio::test]
+async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
+    let authority = Authority::new();
+    let files = authority.issue(kinds()[0].1);
+    let mut program = Program::start(&files.certificate(), &files.key()).await;
+    let first = shown(&authority, &program).await;
+    let connector = trusting(&authority.root, &[]);
+    let mut old = Client::open(&connector, program.address).await;
+
+    authority.issue_into(&files, kinds()[2].1);
+    program.signal(Signal::HUP);
+    program.logs("certificate read again").await;
+    let second = shown(&authority, &program).await;
+    assert_ne!(first, second);
+    assert_eq!(old.call("GET", "/healthz", b"").await.status(), "200");
+
+    // A certificate without its key, as between two writes.
+    let other = authority.issue(kinds()[0].1);
+    std::fs::copy(other.certificate(), files.certificate()).unwrap();
+    program.signal(Signal::HUP);
+    let line = program.logs("the certificate stays as it was").await;
+    assert!(line.contains("--tls-key"), "{line}");
+    assert_eq!(shown(&authority, &program).await, second);
+}
+
+#[tokio::test]
+async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
+    let files = Authority::new().issue(kinds()[0].1);
+    let program = Program::start(&files.certificate(), &files.key()).await;
+    let listen = program.address.to_string();
+    let health = async |arguments: &[&str], variables: &[(&str, &str)]| -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+        let command = command
+            .arg("health")
+            .args(arguments)
+            .envs(variables.iter().copied());
+        command.output().await.unwrap()
+    };
+    let certificate = files.certificate().display().to_string();
+    // As in a container, whose settings are those of the service.
+    let variables = [
+        ("BAGTRACK_LISTEN", listen.as_str()),
+        ("BAGTRACK_TLS_CERT", certificate.as_str()),
+    ];
+    let checked = health(&[], &variables).await;
+    assert!(checked.status.success(), "{checked:?}");
+    let checked = health(&["--url", &format!("https://{listen}")], &[]).await;
+    assert!(checked.status.success(), "{checked:?}");
+    // The health check does not follow the service to https.
+    let checked = health(&["--url", &format!("http://{listen}")], &[]).await;
+    let message = String::from_utf8_lossy(&checked.stderr);
+    assert!(
+        !checked.status.success() && message.contains("307"),
+        "{message}"
+    );
+}
+
+/// What the program says when it does not start.
+async fn refused(certificate: &Path, key: &Path) -> String {
+    let output = timeout(PATIENCE, serve(certificate, key).output()).await;
+    let output = output.expect("it ends").unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[tokio::test]
+async fn a_certificate_that_cannot_be_used_is_named_with_the_cure() {
+    let authority = Authority::new();
+    let (files, other) = (authority.issue(kinds()[0].1), authority.issue(kinds()[1].1));
+    let (certificate, key) = (files.certificate(), files.key());
+    let missing = files.folder().join("missing.pem");
+    let encrypted = files.folder().join("encrypted.pem");
+    let text = "-----BEGIN ENCRYPTED PRIVATE KEY-----\nAAAA\n-----END ENCRYPTED PRIVATE KEY-----\n";
+    std::fs::write(&encrypted, text).unwrap();
+    let damaged = files.folder().join("damaged.pem");
+    std::fs::write(
+        &damaged,
+        "-----BEGIN CERTIFICATE-----\n%%%%\n-----END CERTIFICATE-----\n",
+    )
+    .unwrap();
+    let garbage = files.folder().join("garbage.pem");
+    std::fs::write(
+        &garbage,
+        "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n",
+    )
+    .unwrap();
+    for (certificate, key, words) in [
+        (
+            &missing,
+            &key,
+            &["missing.pem (--tls-cert) cannot be read", "No such file"][..],
+        ),
+        (
+            &certificate,
+            &missing,
+            &["missing.pem (--tls-key) cannot be read"],
+        ),
+        (
+            &certificate,
+            &encrypted,
+            &["encrypted.pem (--tls-key)", "passphrase", "openssl pkey"],
+        ),
+        (
+            &key,
+            &key,
+            &["key.pem (--tls-cert) has no certificate", "openssl x509"],
+        ),
+        (
+            &damaged,
+            &key,
+            &["damaged.pem (--tls-cert) has no certificate"],
+        ),
+        (
+            &garbage,
+            &key,
+            &["garbage.pem (--tls-cert) and ", "cannot be used together"],
+        ),
+        (
+            &certificate,
+            &certificate,
+            &["certificate.pem (--tls-key) has no private key"],
+        ),
+        (
+            &certificate,
+            &other.key(),
+            &["cannot be used together", "must be that of the key"],
+        ),
+    ] {
+        let message = refused(certificate, key).await;
+        for word in words {
+            assert!(message.contains(word), "{word}: {message}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_certificate_needs_its_key() {
+    let files: Files = Authority::new().issue(kinds()[0].1);
+    for (flag, file, other) in [
+        ("--tls-cert", files.certificate(), "--tls-key"),
+        ("--tls-key", files.key(), "--tls-cert"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+        command
+            .args(["serve", "--listen", "127.0.0.1:0", flag])
+            .arg(file);
+        let output = timeout(PATIENCE, command.kill_on_drop(true).output()).await;
+        let output = output.expect("it ends").unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            !output.status.success() && message.contains(other),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,143 @@
+"""A page in Chromium, what a user does with it, and what it says."""
+
+import csv
+import io
+import pathlib
+import time
+
+import axe_playwright_python
+
+AXE = next(pathlib.Path(axe_playwright_python.__file__).parent.rglob("axe.min.js")).read_text()
+FRAMES_A_SECOND = 25
+TO_THE_END = 60_000
+DRAW = "Draw a box around what to follow"
+WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
+
+
+class Checks:
+    """One browser and one service, and what all pages of it must not do."""
+
+    def __init__(self, playwright, service, files, arguments):
+        self.playwright = playwright
+        self.service = service
+        self.files = files
+        self.program = arguments.program
+        self.shots = arguments.shots
+        self.from_disk = arguments.from_disk
+        self.faults = []
+        self.browser = self.launch()
+        self.clips = {name: service.call("GET", f"/sample/{name}/clip.json") for name in ("card", "leaves")}
+
+    def launch(self, *flags):
+        # A page that does not come from the service's address may not open its socket.
+        own = ["--no-sandbox"] + ["--disable-features=LocalNetworkAccessChecks"] * self.from_disk
+        return self.playwright.chromium.launch(executable_path="/usr/bin/chromium", args=[*own, *flags])
+
+    def page(self, url=None, browser=None, allowed=(), **options):
+        """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes."""
+        context = (browser or self.browser).new_context(**{"viewport": {"width": 1000, "height": 1100}, **options})
+        page = context.new_page()
+        url = url or self.service.url
+
+        def fault(text):
+            if not any(part in text for part in allowed):
+                self.faults.append(text)
+
+        page.on("console", lambda message: message.type == "error" and fault(f"console: {message.text}"))
+        page.on("pageerror", lambda error: fault(f"script: {error}"))
+        own = ("http://127.0.0.1", "ws://127.0.0.1", url, url.replace("http", "ws"), "blob:", "data:")
+        page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))
+        if self.from_disk:
+            page.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
+            page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
+        page.goto(url + "/")
+        said(page, "Nothing is uploaded")
+        return page
+
+    def shot(self, page, name):
+        if self.shots:
+            page.screenshot(path=pathlib.Path(self.shots) / f"{name}.png", full_page=True)
+
+    def no_axe_violations(self, page, where):
+        page.evaluate(AXE)
+        found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+        told = [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in found]
+        assert not told, f"{where}: {told}"
+
+
+def on_disk(url):
+    """A file of the page, or of the client that it uses."""
+    path = url.split("/page/")[1]
+    return (WEB.parent / "clients" if path.startswith("js/") else WEB) / path
+
+
+def said(page, text):
+    """Waits until the page says this."""
+    try:
+        page.locator("#message").filter(has_text=text).wait_for(timeout=TO_THE_END)
+    except Exception:
+        print("  it says:", page.locator("#message").inner_text())
+        raise
+
+
+def choose(page, clip):
+    page.locator(f"#{clip}").click()
+    said(page, DRAW)
+
+
+def corners(page, box):
+    """The corners of a box of the picture, in pixels of the window."""
+    area = page.locator("#picture").bounding_box()
+    width = page.evaluate("document.getElementById('picture').width")
+    scale = area["width"] / width
+    x, y, w, h = box[:4]
+    return [(area["x"] + a * scale, area["y"] + b * scale) for a, b in ((x, y), (x + w, y + h))]
+
+
+def drag(page, box):
+    page.locator("#picture").scroll_into_view_if_needed()
+    (left, top), (right, bottom) = corners(page, box)
+    page.mouse.move(left, top)
+    page.mouse.down()
+    page.mouse.move((left + right) / 2, bottom)
+    page.mouse.move(right, bottom)
+    page.mouse.up()
+
+
+def frames(page, count):
+    """Waits until the page has shown so many. Its policy forbids to evaluate texts in it."""
+    late = time.monotonic() + TO_THE_END / 1000
+    while not (shown := page.locator("#frames").inner_text()).isdigit() or int(shown) < count:
+        assert time.monotonic() < late, f"{shown} frames; it says: {page.locator('#message').inner_text()}"
+        page.wait_for_timeout(50)
+
+
+def to_the_end(page):
+    said(page, "The video has ended")
+
+
+def saved(page, button):
+    with page.expect_download() as download:
+        page.locator(button).click()
+    return pathlib.Path(download.value.path()).read_bytes()
+
+
+def rows(page):
+    return list(csv.DictReader(io.StringIO(saved(page, "#save-csv").decode())))
+
+
+def numbers(row):
+    return [float(row[name]) for name in ("x", "y", "width", "height")]
+
+
+def distance(row, truth):
+    x, y, width, height = numbers(row)
+    across = x + width / 2 - truth[0] - truth[2] / 2
+    down = y + height / 2 - truth[1] - truth[3] / 2
+    return (across**2 + down**2) ** 0.5
+
+
+def near(table, truth):
+    """How many rows are within 10 pixels of the truth."""
+    at = lambda row: truth[round(float(row["time"]) * FRAMES_A_SECOND)]
+    return sum(distance(row, at(row)) <= 10 for row in table)

@@ -1,0 +1,233 @@
+"""Video files in the page: every frame once, boxes in the file's own pixels, a video that can be saved."""
+
+import json
+import pathlib
+
+from browser import DRAW, drag, frames, rows, said, saved, to_the_end
+from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
+from service import Line, Service
+
+SENT = (960, 720)
+"""What the page sends of a larger file."""
+GRAY = """() => {
+    const canvas = document.getElementById("picture");
+    const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    return pixels.reduce((sum, value, index) => sum + (index % 4 === 3 ? 0 : value), 0) / (pixels.length / 4 * 3);
+}"""
+SECRET = {"BAGTRACK_SNAPSHOT_KEYS": "a secret of this test"}
+
+
+def sent_box(truth):
+    return [value * SENT[0] / SIZE[0] for value in truth]
+
+
+def choose_file(page, path):
+    page.locator("#file").set_input_files(path)
+    said(page, DRAW)
+
+
+def follow_file(checks, page, path):
+    choose_file(page, path)
+    gray = page.evaluate(GRAY)
+    assert 50 < gray < 200, f"the first picture has the mean {gray}"
+    drag(page, sent_box(checks.files.truth[0]))
+
+
+def check_rows(table, path, truth, numbers, times):
+    """The rows are those of the frames with these numbers in the clip, each once, and fit the file."""
+    told = [(row["frame"], row["time"]) for row in table]
+    assert [int(frame) for frame, _ in told] == list(range(len(numbers))), (told, times)
+    late = [(row["time"], time) for row, time in zip(table, times) if abs(float(row["time"]) - time) > 0.0015]
+    assert not late, late
+    near = 0
+    for row, number in zip(table, numbers):
+        x, y, width, height = (float(row[name]) for name in ("x", "y", "width", "height"))
+        left, top, w, h = truth[number]
+        near += ((x + width / 2 - left - w / 2) ** 2 + (y + height / 2 - top - h / 2) ** 2) ** 0.5 <= 10
+        about = [row[name] for name in ("video", "video_width", "video_height")]
+        assert about == [path.name, str(SIZE[0]), str(SIZE[1])], about
+    print(f"  {path.name}: {len(table)} of {len(numbers)} frames, {near} within 10 px of the file")
+    assert near >= 0.9 * len(numbers)
+
+
+def check_video(video, numbers, seconds, size=SENT):
+    """The saved video has these frames, ends when it should, and can be entered in the middle."""
+    probed = run("ffprobe", "-v", "error", "-show_format", "-show_streams", "-of", "json", video)
+    probed = json.loads(probed)
+    duration = float(probed["format"]["duration"])
+    print(f"  the saved video: {video.stat().st_size} bytes, {duration} s, {probed['streams'][0]['codec_name']}")
+    assert abs(duration - seconds) < 0.05, (duration, seconds)
+    shown = frame_numbers(video, *size)
+    assert shown == numbers, shown
+    middle = video.with_suffix(".middle.png")
+    # The input is entered at a key frame and read from there.
+    run("ffmpeg", "-v", "error", "-y", "-ss", duration / 2, "-i", video, "-frames:v", "1", middle)
+    [entered] = frame_numbers(middle, *size)
+    assert abs(entered - numbers[len(numbers) // 2]) <= 2, entered
+
+
+def saved_video(checks, page, name):
+    path = checks.files.folder / name
+    path.write_bytes(saved(page, "#save-video"))
+    return path
+
+
+def times_of(path):
+    told = run("ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "frame=pts_time", "-of", "csv=p=0", path)
+    return [float(line.strip().strip(",")) for line in told.decode().split()]
+
+
+def h264_file(checks):
+    whole_file(checks, checks.files.file("clip.mp4", 30, H264), 30)
+
+
+def vp8_file(checks):
+    whole_file(checks, checks.files.file("clip, of \"VP8\".webm", 25, VP8), 25)
+
+
+def whole_file(checks, path, rate):
+    page = checks.page()
+    follow_file(checks, page, path)
+    frames(page, 10)
+    print(f"  {page.locator('#rate').inner_text()} frames/s, {page.locator('#trip').inner_text()}")
+    to_the_end(page)
+    assert page.locator("#skipped").inner_text() == "0"
+    numbers = list(range(FRAMES))
+    table = rows(page)
+    check_rows(table, path, checks.files.truth, numbers, [number / rate for number in numbers])
+    assert abs(float(table[-1]["frame_rate"]) - rate) < 0.01, table[-1]
+    stored = json.loads(saved(page, "#save-json"))
+    told = [stored[name] for name in ("video", "video_width", "video_height", "skipped")]
+    assert told == [path.name, *SIZE, 0] and abs(stored["frame_rate"] - rate) < 0.01, told
+    assert [row["x"] for row in stored["boxes"]] == [float(row["x"]) for row in table]
+    check_video(saved_video(checks, page, f"saved-{rate}.webm"), numbers, FRAMES / rate)
+    # Making the video took a while: nothing has come since the end.
+    assert rows(page) == table
+    assert page.locator("#stage video").count() == 0
+    page.context.close()
+
+
+def file_of_varying_rate(checks):
+    """After a while three of seven frames are missing, and the frame before them stays for longer."""
+    path = checks.files.file("vary.mp4", 30, H264, "gt(mod(n,7),2)+lt(n,20)")
+    numbers = [n for n in range(FRAMES) if n % 7 > 2 or n < 20]
+    page = checks.page()
+    follow_file(checks, page, path)
+    to_the_end(page)
+    check_rows(rows(page), path, checks.files.truth, numbers, times_of(path))
+    page.context.close()
+
+
+def file_with_corrections(checks):
+    """A corrected frame stays one frame of the video; the video is saved while the file goes on."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    page = checks.page()
+    follow_file(checks, page, path)
+    frames(page, 20)
+    page.locator("#pause").click()
+    drag(page, [200, 200, 80, 60])
+    said(page, "The box is corrected")
+    page.locator("#pause").click()
+    frames(page, 30)
+    video = saved_video(checks, page, "corrected.webm")
+    page.locator("#stop").click()
+    table = rows(page)
+    scale = SIZE[0] / SENT[0]
+    own = {"x": 200 * scale, "y": 200 * scale, "width": 80 * scale, "height": 60 * scale}
+    drawn = [row for row in table[1:] if all(abs(float(row[side]) - own[side]) < 2 for side in own)]
+    assert len(drawn) == 1, drawn
+    assert [int(row["frame"]) for row in table] == list(range(len(table)))
+    shown = frame_numbers(video, *SENT)
+    assert len(shown) >= 30 and shown == list(range(len(shown))), shown
+    page.context.close()
+
+
+class Mortal:
+    """A service behind a line. It can be killed and started again."""
+
+    def __init__(self, checks, *flags, **environment):
+        self.start = lambda: Service(checks.program, *flags, **environment)
+        self.service = self.start()
+        self.line = Line(self.service.port)
+        self.url = self.line.url
+
+    def restart(self):
+        self.service.process.kill()
+        self.service.process.wait()
+        self.service = self.start()
+        self.line.target = self.service.port
+        self.line.cut()
+
+
+BROKEN = ("WebSocket", "ERR_CONNECTION", "ERR_EMPTY", "Failed to load")
+
+
+def service_killed(checks):
+    """The service is killed and started again. With its secret it takes the snapshot, without one the last box."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    for environment, says in ((SECRET, "The line is back"), ({}, "had lost the session")):
+        mortal = Mortal(checks, **environment)
+        page = checks.page(url=mortal.url, allowed=BROKEN)
+        follow_file(checks, page, path)
+        frames(page, 45)
+        mortal.restart()
+        said(page, says)
+        to_the_end(page)
+        check_rows(rows(page), path, checks.files.truth, list(range(FRAMES)), [n / 30 for n in range(FRAMES)])
+        page.context.close()
+        mortal.service.stop()
+
+
+def paused_past_the_expiry(checks):
+    service = Service(checks.program, "--session-idle", "1")
+    page = checks.page(url=service.url, allowed=("404", "410"))
+    path = checks.files.file("clip.mp4", 30, H264)
+    follow_file(checks, page, path)
+    frames(page, 15)
+    page.locator("#pause").click()
+    service.wait_for_no_session()
+    page.locator("#pause").click()
+    to_the_end(page)
+    check_rows(rows(page), path, checks.files.truth, list(range(FRAMES)), [n / 30 for n in range(FRAMES)])
+    page.context.close()
+    service.stop()
+
+
+def plain_http(checks):
+    """A page that came over http from another machine: no camera, no encoder of videos; the rest works."""
+    service = Service(checks.program, "--allowed-hosts", "machine.test")
+    browser = checks.launch("--host-resolver-rules=MAP machine.test 127.0.0.1")
+    page = checks.page(url=f"http://machine.test:{service.port}", browser=browser)
+    page.locator("#camera").click()
+    said(page, "https")
+    assert not page.evaluate("isSecureContext")
+    path = checks.files.file("clip.mp4", 30, H264)
+    follow_file(checks, page, path)
+    frames(page, 30)
+    page.locator("#stop").click()
+    table = rows(page)
+    assert page.locator("#no-encoder").is_visible()
+    video = saved_video(checks, page, "saved.mkv")
+    check_video(video, list(range(len(table))), len(table) / 30)
+    browser.close()
+    service.stop()
+
+
+def file_that_cannot_be_played(checks):
+    page = checks.page()
+    page.locator("#file").set_input_files(pathlib.Path(__file__))
+    said(page, "cannot play the file")
+    assert page.locator("#stage video").count() == 0
+    page.context.close()
+
+
+ALL = [
+    h264_file,
+    vp8_file,
+    file_of_varying_rate,
+    file_with_corrections,
+    service_killed,
+    paused_past_the_expiry,
+    plain_http,
+    file_that_cannot_be_played,
+]

@@ -1,0 +1,164 @@
+// The video with its boxes, made from the frames that were tracked: each is in it once, at its time.
+
+import { matroska } from "./matroska.js";
+import { encoded } from "./source.js";
+import { paintBox } from "./stage.js";
+
+/** @typedef {import("./matroska.js").Chunk} Chunk */
+
+/** Of these the one that the browser encodes faster: they differ by ten times, here one way and there the other. */
+const CODECS = /** @type {const} */ ([
+  ["vp8", "V_VP8"],
+  ["vp09.00.40.08", "V_VP9"],
+]);
+/** Frames that tell which. */
+const TRIED = 4;
+const BITS_A_PIXEL = 0.1;
+/** So often there is a key frame, which a player can go to. */
+const KEY_EVERY = 30;
+/** Frames that wait for the encoder at a time. */
+const MOST_WAITING = 8;
+const QUALITY = 0.9;
+
+/** Whether the browser encodes video. Over plain HTTP none does; then the frames stay JPEGs, in a Matroska file. */
+export const encodes = typeof VideoEncoder !== "undefined";
+export const extension = encodes ? "webm" : "mkv";
+
+/**
+ * Draws the rows' boxes into their frames.
+ * @param {import("./run.js").Run} run
+ * @param {(canvas: HTMLCanvasElement, time: number, index: number) => Promise<void>} write
+ * @param {(done: number, of: number) => void} tell
+ */
+async function draw({ rows, frames, source }, write, tell) {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("2d");
+  const drawn = rows.filter(({ frame }) => frames.has(frame));
+  for (const [index, { frame, time, box, status }] of drawn.entries()) {
+    const image = await createImageBitmap(/** @type {Blob} */ (frames.get(frame)));
+    if (index === 0) [canvas.width, canvas.height] = [image.width, image.height].map((side) => side - (side % 2));
+    context?.drawImage(image, 0, 0);
+    const [across, down] = [image.width / source.size.width, image.height / source.size.height];
+    const shown = { x: box.x * across, y: box.y * down, width: box.width * across, height: box.height * down };
+    if (context) paintBox(context, shown, status, status === "lost");
+    image.close();
+    await write(canvas, Math.round((time - drawn[0].time) * 1000), index);
+    tell(index + 1, drawn.length);
+  }
+  return canvas;
+}
+
+/** How long the last frame is shown, in milliseconds.
+ * @param {import("./run.js").Run} run */
+const lastFrame = ({ source }) => 1000 / (source.rate ?? 25);
+
+/** @type {typeof makeVideo} */
+async function makeJpegs(run, tell) {
+  /** @type {Chunk[]} */
+  const chunks = [];
+  const { width, height } = await draw(
+    run,
+    async (canvas, time) => {
+      const blob = await encoded(canvas, QUALITY);
+      chunks.push({ time, isKey: true, bytes: new Uint8Array(await blob.arrayBuffer()) });
+    },
+    tell,
+  );
+  return matroska({ codec: "V_MJPEG", width, height }, chunks, chunks[chunks.length - 1].time + lastFrame(run));
+}
+
+/** An encoder, and what it has encoded. */
+class Encoder {
+  /** @param {VideoEncoderConfig} config */
+  constructor(config) {
+    /** @type {Chunk[]} */
+    this.chunks = [];
+    /** @type {(error: unknown) => void} */
+    let fail = () => undefined;
+    this.failed = new Promise((_, reject) => (fail = reject));
+    this.failed.catch(() => undefined);
+    const output = (/** @type {EncodedVideoChunk} */ chunk) => {
+      const bytes = new Uint8Array(chunk.byteLength);
+      chunk.copyTo(bytes);
+      this.chunks.push({ time: Math.round(chunk.timestamp / 1000), isKey: chunk.type === "key", bytes });
+    };
+    this.encoder = new VideoEncoder({ output, error: (error) => fail(error) });
+    this.encoder.configure(config);
+  }
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {number} time In milliseconds.
+   * @param {number} index
+   */
+  async write(canvas, time, index) {
+    const frame = new VideoFrame(canvas, { timestamp: time * 1000 });
+    this.encoder.encode(frame, { keyFrame: index % KEY_EVERY === 0 });
+    frame.close();
+    while (this.encoder.encodeQueueSize > MOST_WAITING) {
+      const next = new Promise((resolve) => this.encoder.addEventListener("dequeue", resolve, { once: true }));
+      await Promise.race([next, this.failed]);
+    }
+  }
+
+  async finish() {
+    await Promise.race([this.encoder.flush(), this.failed]);
+    this.encoder.close();
+    return this.chunks;
+  }
+}
+
+/** The codec that the browser encodes a picture with first.
+ * @param {HTMLCanvasElement} canvas
+ * @param {VideoEncoderConfig} config */
+async function quickest(canvas, config) {
+  /** @type {Encoder[]} */
+  const tried = [];
+  const tries = CODECS.map(async ([codec, name]) => {
+    const { supported } = await VideoEncoder.isConfigSupported({ ...config, codec });
+    if (!supported) throw new DOMException("", "NotSupportedError");
+    const encoder = new Encoder({ ...config, codec });
+    tried.push(encoder);
+    for (let index = 0; index < TRIED; index += 1) encoder.write(canvas, index, index);
+    await encoder.finish();
+    return { codec, name };
+  });
+  const first = await Promise.any(tries);
+  for (const { encoder } of tried) if (encoder.state !== "closed") encoder.close();
+  return first;
+}
+
+/** @type {typeof makeVideo} */
+async function encodeVideo(run, tell) {
+  /** @type {Encoder | undefined} */
+  let encoder;
+  /** @type {"V_VP8" | "V_VP9"} */
+  let codec = "V_VP8";
+  const { width, height } = await draw(
+    run,
+    async (canvas, time, index) => {
+      if (!encoder) {
+        const { width, height } = canvas;
+        const framerate = run.source.rate ?? 25;
+        const bitrate = Math.round(width * height * framerate * BITS_A_PIXEL);
+        const config = { codec: CODECS[0][0], width, height, bitrate, framerate };
+        const chosen = await quickest(canvas, config);
+        codec = chosen.name;
+        encoder = new Encoder({ ...config, codec: chosen.codec });
+      }
+      await encoder.write(canvas, time, index);
+    },
+    tell,
+  );
+  const chunks = (await encoder?.finish()) ?? [];
+  return matroska({ codec, width, height }, chunks, chunks[chunks.length - 1].time + lastFrame(run));
+}
+
+/**
+ * @param {import("./run.js").Run} run
+ * @param {(done: number, of: number) => void} tell
+ * @returns {Promise<Blob>}
+ */
+export function makeVideo(run, tell) {
+  return encodes ? encodeVideo(run, tell) : makeJpegs(run, tell);
+}

@@ -1,0 +1,71 @@
+// What frames come from, and how a frame of a video element becomes a picture.
+
+/**
+ * @typedef {object} Picture A frame as it is uploaded and as it is shown, in the same pixels.
+ * @property {Blob} blob
+ * @property {HTMLCanvasElement | ImageBitmap} image
+ * @property {number} time Seconds from the beginning of the video.
+ * @property {number} frame Its number in the video; that of the first is 0.
+ *
+ * @typedef {object} Source Where frames come from.
+ * @property {string} name What results are named after.
+ * @property {boolean} isLive Whether it goes on by itself, so that late frames are skipped.
+ * @property {{width: number, height: number}} size In the video's own pixels.
+ * @property {number | undefined} rate Frames a second, as far as is known.
+ * @property {number} skipped Frames that were not delivered.
+ * @property {() => Promise<Picture>} first The first frame.
+ * @property {(deliver: (picture: Picture) => void, end: () => void) => Promise<void>} start Delivers the frames after
+ *   it. Fails where they cannot be had.
+ * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
+ * @property {() => void} stop
+ */
+
+const QUALITY = 0.85;
+/** Longest side of an uploaded frame in pixels: the tracker needs no more. */
+const LONGEST_SIDE = 960;
+
+/** A video element at a place of the page: what browsers do not show they may not decode.
+ * @param {HTMLElement} place */
+export function addVideo(place) {
+  const video = document.createElement("video");
+  video.muted = true;
+  video.playsInline = true;
+  video.preload = "auto";
+  video.tabIndex = -1;
+  video.setAttribute("aria-hidden", "true");
+  place.prepend(video);
+  return video;
+}
+
+/** Waits until a video can be played.
+ * @param {HTMLVideoElement} video */
+export function loaded(video) {
+  return new Promise((resolve, reject) => {
+    video.onloadeddata = resolve;
+    video.onerror = () => reject(new DOMException("", "NotSupportedError"));
+  });
+}
+
+/** Draws what a video shows, as large as it is uploaded.
+ * @param {HTMLVideoElement} video
+ * @param {CanvasImageSource} [shown] The frame, where it is at hand.
+ * @param {HTMLCanvasElement} [canvas] Where to, if not onto a new one. */
+export function drawFrame(video, shown = video, canvas = document.createElement("canvas")) {
+  const scale = Math.min(1, LONGEST_SIDE / Math.max(video.videoWidth, video.videoHeight));
+  const [width, height] = [video.videoWidth, video.videoHeight].map((side) => Math.max(1, Math.round(side * scale)));
+  if (canvas.width !== width) canvas.width = width;
+  if (canvas.height !== height) canvas.height = height;
+  canvas.getContext("2d", { willReadFrequently: true })?.drawImage(shown, 0, 0, width, height);
+  return canvas;
+}
+
+/** The file that a canvas is uploaded as.
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} [quality]
+ * @returns {Promise<Blob>} */
+export async function encoded(canvas, quality = QUALITY) {
+  /** @type {Blob | null} */
+  const blob = await new Promise((resolve) => canvas.toBlob(resolve, "image/jpeg", quality));
+  if (!blob) throw new Error("The browser cannot encode the frame.");
+  return blob;
+}
