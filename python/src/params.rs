@@ -42,15 +42,12 @@ pub fn params(
 /// Each parameter's value by its name.
 pub fn by_name(params: &Params, py: Python<'_>) -> PyResult<Py<PyDict>> {
     let dict = PyDict::new(py);
-    for (name, value) in fields(params) {
-        match value {
-            Value::Bool(value) => dict.set_item(name, value)?,
-            Value::String(value) => dict.set_item(name, value)?,
-            Value::Number(value) => match value.as_u64() {
-                Some(whole) => dict.set_item(name, whole)?,
-                None => dict.set_item(name, value.as_f64())?,
-            },
-            other => unreachable!("a parameter is a number, a truth value or a name, not {other}"),
+    let fields = fields(params);
+    for row in Params::TABLE {
+        let value = &fields[row.name];
+        match value.as_u64() {
+            Some(whole) => dict.set_item(row.name, whole)?,
+            None => dict.set_item(row.name, value.as_f64())?,
         }
     }
     Ok(dict.unbind())
@@ -58,8 +55,8 @@ pub fn by_name(params: &Params, py: Python<'_>) -> PyResult<Py<PyDict>> {
 
 fn with(params: &Params, name: String, value: &Bound<'_, PyAny>) -> PyResult<Params> {
     let mut fields = fields(params);
-    if !fields.contains_key(&name) {
-        let known: Vec<&str> = Params::TABLE.iter().map(|row| row.name).collect();
+    let known: Vec<&str> = Params::TABLE.iter().map(|row| row.name).collect();
+    if !known.contains(&&*name) {
         return Err(PyTypeError::new_err(format!(
             "there is no parameter {name}; the parameters are {}",
             known.join(", ")

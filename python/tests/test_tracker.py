@@ -115,13 +115,16 @@ def test_parameters_are_checked_and_told(clip: Clip) -> None:
     tracker = bagtrack.Tracker("paper", seed=3, particles=50, alpha=1, motion_std_x=np.float32(4))
     params = tracker.params
     assert params["seed"] == 3 and params["particles"] == 50 and params["alpha"] == 1.0
-    assert params["motion_std_x"] == 4.0 and params["features"] == "gray"
+    assert params["motion_std_x"] == 4.0 and len(params) == 16
     assert bagtrack.Tracker(particles=64.0).params["particles"] == 64
     assert bagtrack.Tracker(seed=None).params["seed"] != bagtrack.Tracker(seed=None).params["seed"]
     with pytest.raises(ValueError, match="robust or paper, not \"fast\""):
         bagtrack.Tracker("fast")
     with pytest.raises(TypeError, match="no parameter particle; the parameters are particles, patch_width"):
         bagtrack.Tracker(particle=10)
+    with pytest.raises(TypeError, match="no parameter search;"):
+        # The preset's own.
+        bagtrack.Tracker(search="answer")
     with pytest.raises(ValueError, match="parameter particles is 2000; it must be from 1 to 1000"):
         bagtrack.Tracker(particles=2000)
     for value in (1.5, "many", True):

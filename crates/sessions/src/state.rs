@@ -5,7 +5,7 @@ use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, Ta
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
-use bagtrack_tracker::{BagEntry, Frame, FrameFormat, Params, Seen, TrackerError};
+use bagtrack_tracker::{BagEntry, Diagnostics, Frame, FrameFormat, Params, TrackerError};
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug, Clone)]
@@ -190,7 +190,7 @@ impl SessionState {
         correction: Option<Correction>,
         meter: &mut WorkMeter,
         kept: usize,
-        mut seen: Option<&mut Vec<Seen>>,
+        mut seen: Option<&mut Vec<Diagnostics>>,
     ) -> Result<Vec<Estimates>, StepError> {
         let mut answered = Vec::with_capacity(frames.len());
         for (index, (fingerprint, frame)) in frames.iter().enumerate() {

@@ -5,7 +5,9 @@
 
 use super::per_target::PerTarget;
 use super::scheduler::work_limit::{Stopped, WorkMeter};
-use bagtrack_tracker::{Estimate, Frame, FrameFormat, Params, Rect, Seen, Tracker, TrackerError};
+use bagtrack_tracker::{
+    Diagnostics, Estimate, Frame, FrameFormat, Params, Rect, Tracker, TrackerError,
+};
 
 /// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
 const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -153,7 +155,7 @@ impl Targets {
         frame: &Frame,
         correction: Option<Correction>,
         meter: &mut WorkMeter,
-        seen: Option<&mut Vec<Seen>>,
+        seen: Option<&mut Vec<Diagnostics>>,
     ) -> Result<(), TargetsError> {
         let trackers = self.0.as_mut_slice();
         let mut all_saw = Vec::new();
@@ -167,7 +169,7 @@ impl Targets {
             }
             meter.check().map_err(TargetsError::Stopped)?;
             if seen.is_some() {
-                let stepped = meter.step(|| tracker.step_seeing(frame));
+                let stepped = meter.step(|| tracker.step_with_diagnostics(frame));
                 let (_, saw) = stepped.map_err(TargetsError::Refused)?;
                 all_saw.push(saw);
             } else {

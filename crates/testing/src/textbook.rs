@@ -4,7 +4,9 @@
 
 use std::f64::consts::PI;
 
-use bagtrack_tracker::{AffineSubspace, Evaluation, Likelihoods, Params, RANK_TOLERANCE, weigh};
+use bagtrack_tracker::{
+    AffineSubspace, Evaluation, Likelihoods, Params, RANK_TOLERANCE, sum_rule_weights,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// An affine subspace (equation 1).
@@ -171,7 +173,7 @@ impl Shipped {
         self.distances.clear();
         self.distances.extend_from_slice(distances);
         self.weights.fill(0.0);
-        weigh(
+        sum_rule_weights(
             &mut self.likelihoods,
             &self.distances,
             self.sigma,

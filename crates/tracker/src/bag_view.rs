@@ -1,8 +1,7 @@
 //! The bag for people: each entry as its subspace, and each vector of it as pictures.
 
-use crate::appearance::bag::Entry;
-use crate::appearance::subspace::AffineSubspace;
 use crate::features::hog::channels::{CHANNELS, CHROMA, DIRECTIONS, GRAY};
+use crate::grassmann::subspace::AffineSubspace;
 use crate::params::table::{Features, Params};
 
 /// One entry of the bag: an affine subspace (equation 1).
@@ -30,23 +29,14 @@ pub struct VectorView {
 }
 
 impl BagEntry {
-    /// Of an entry of a tracker with `params`. With single-vector candidates the subspace is that of the vectors which
-    /// the entry keeps.
-    pub(crate) fn of(entry: &Entry, params: &Params) -> Self {
-        let subspace = if params.single_vector_candidate {
-            let mut vectors = vec![vec![0.0; params.feature_len()]; entry.templates.len()];
-            for (vector, template) in vectors.iter_mut().zip(&entry.templates) {
-                template.write(&[], vector);
-            }
-            let vectors: Vec<&[f32]> = vectors.iter().map(|vector| &vector[..]).collect();
-            AffineSubspace::of(&vectors, params.basis_dim as usize)
-        } else {
-            entry.subspace.clone()
-        };
-        let columns = subspace.basis.chunks_exact(params.feature_len());
+    /// Of an entry of a tracker with `params`.
+    pub(crate) fn of(subspace: &AffineSubspace, params: &Params) -> Self {
         Self {
             mean: VectorView::of(&subspace.mean, params),
-            basis: columns.map(|it| VectorView::of(it, params)).collect(),
+            basis: subspace
+                .basis()
+                .map(|it| VectorView::of(it, params))
+                .collect(),
         }
     }
 }

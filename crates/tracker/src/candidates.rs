@@ -7,14 +7,13 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd};
 
-use crate::appearance::bag_matrix;
-use crate::appearance::point_distance::{self, PointDistance};
+use crate::appearance::model::{Comparison, Vectors};
 use crate::classifier::ridge::Discriminant;
 use crate::classifier::samples::TrainingSamples;
 use crate::confidence::score::Evidence;
 use crate::features::extractor::Extractor;
-use crate::grassmann::evaluation::Evaluation;
 use crate::image::frame::Frame;
+use crate::image::warp::Rotation;
 use crate::linalg::scratch::{AlignedBuffer, clear_and_reserve};
 use crate::linalg::vector_ops;
 use crate::motion::particles::Particle;
@@ -42,15 +41,27 @@ fn center_simd<S: Simd>(
 /// The frame rotated about a particle, and its channels.
 #[derive(Debug, Default)]
 pub(crate) struct RotatedView {
-    pub image: Frame,
-    pub extractor: Extractor,
+    image: Frame,
+    extractor: Extractor,
+}
+
+impl RotatedView {
+    /// Becomes the view of `frame` in which a particle at `angle` radians is upright.
+    pub fn rotate(&mut self, frame: &Frame, particle: Particle, angle: f64, state: &State) {
+        let (bounds, params) = (&state.bounds, &state.params);
+        let rotation = Rotation::about((particle.x, particle.y), angle);
+        let window = Extractor::window(&[particle], 0.0, bounds, params);
+        self.image = rotation.apply(frame, &window, std::mem::take(&mut self.image));
+        self.extractor
+            .compute_channels(&self.image, &[particle], 0.0, bounds, params);
+    }
 }
 
 /// The particles of a frame, and all that is computed of them.
 #[derive(Debug, Default)]
 pub(crate) struct Candidates {
     pub particles: Vec<Particle>,
-    /// The feature vectors; with single-vector candidates the background's mean is subtracted.
+    /// The feature vectors, with the mean of the appearance model subtracted.
     vectors: AlignedBuffer,
     /// D.
     len: usize,
@@ -58,8 +69,7 @@ pub(crate) struct Candidates {
     squares: Vec<f32>,
     /// What the discriminant says of them.
     pub samples: TrainingSamples,
-    point_distance: PointDistance,
-    evaluation: Evaluation,
+    comparison: Comparison,
     /// For each particle, its distance to each entry of the bag.
     distances: Vec<f64>,
     likelihoods: Likelihoods,
@@ -80,17 +90,10 @@ impl Candidates {
         clear_and_reserve(&mut self.distances, count * entries);
         clear_and_reserve(&mut self.weights, count);
         self.likelihoods.reserve(count, entries);
-        let background = &state.background;
+        let model = state.appearance.model();
         let Discriminant { weights, origin } = &state.discriminant;
-        self.samples.begin(weights, origin, &background.mean, count);
-        if params.single_vector_candidate {
-            let queries = self.samples.query_vectors();
-            let matrix = &mut self.point_distance.matrix;
-            bag_matrix::load(matrix, &state.bag, background, queries, self.len);
-        } else {
-            self.evaluation.prepare(params);
-            self.evaluation.set_bag(state.bag.subspaces());
-        }
+        self.samples.begin(weights, origin, model.mean(), count);
+        model.load(self.samples.query_vectors(), params, &mut self.comparison);
     }
 
     /// The feature vectors of the particles that were described.
@@ -127,52 +130,43 @@ impl Candidates {
         let particles = &self.particles[batch];
         let vectors = &mut self.vectors.values_mut()[range];
         extractor.describe(image, particles, &state.bounds, &state.params, vectors);
-        let mean = &state.background.mean;
+        let mean = state.appearance.model().mean();
         center(vectors, self.len, mean, &mut self.squares);
     }
 
     /// (D) The distances and the discriminant's scores of a batch.
     fn compare(&mut self, batch: Range<usize>, state: &State) {
-        let vectors = &self.vectors.values()[batch.start * self.len..batch.end * self.len];
-        if state.params.single_vector_candidate {
-            let squares = &self.squares[batch.start..];
-            let (compared, out) = (&mut self.point_distance, &mut self.distances);
-            point_distance::distances(compared, (vectors, squares), &state.params, out);
-            if state.discriminant.is_on() {
-                let products = self.point_distance.query_products(squares.len());
-                self.samples.push_scores(products, squares);
-            }
-            return;
-        }
+        let candidates = Vectors {
+            values: &self.vectors.values()[batch.start * self.len..batch.end * self.len],
+            squares: &self.squares[batch.start..],
+        };
+        let (model, comparison) = (state.appearance.model(), &mut self.comparison);
+        model.compare(candidates, &state.params, comparison, &mut self.distances);
         if state.discriminant.is_on() {
-            self.samples.score_vectors(vectors);
+            let squares = candidates.squares;
+            match model.query_products(squares.len(), comparison) {
+                Some(products) => self.samples.push_scores(products, squares),
+                None => self.samples.score_vectors(candidates.values),
+            }
         }
-        let history = state.history.exact.iter().map(Vec::as_slice);
-        let distances = self.evaluation.distances(vectors, history);
-        self.distances.extend_from_slice(distances);
     }
 
     /// Weighs all particles: the sum of their likelihoods over the bag (equations 9 to 11) times their priors, given as
     /// logarithms, times the discriminant's likelihood. Returns the most likely one (equation 12).
-    pub fn weigh(&mut self, log_priors: &[f64], params: &Params) -> usize {
-        self.weights.clear();
-        self.weights.extend_from_slice(log_priors);
-        let (likelihoods, scores) = (&mut self.likelihoods, &self.samples.scores);
-        let weights = &mut self.weights;
-        weigh(
-            likelihoods,
-            &self.distances,
-            scores,
-            params.sigma,
-            params,
-            weights,
-        );
-        weights::arg_max(&self.weights)
+    pub fn posterior(&mut self, log_priors: &[f64], params: &Params) -> usize {
+        let (weights, distances) = (&mut self.weights, &self.distances);
+        weights.clear();
+        weights.extend_from_slice(log_priors);
+        add_scores(&self.samples.scores, params, weights);
+        let pinned = (params.pinned_entries(), params.pinned_weight);
+        let likelihoods = &mut self.likelihoods;
+        weights::sum_rule_weights(likelihoods, distances, params.sigma, pinned, weights);
+        weights::arg_max(weights)
     }
 
     /// The weights of one particle in several `views` of the frame, with these logarithmic priors and this σ. The
     /// particles of the frame stay as they are.
-    pub fn weigh_views<const N: usize>(
+    pub fn posterior_in_views<const N: usize>(
         &mut self,
         particle: Particle,
         views: &mut [RotatedView; N],
@@ -188,15 +182,10 @@ impl Candidates {
         let mut weights = log_priors;
         let distances = &self.distances[first * entries..];
         let scores = self.samples.scores.get(first..).unwrap_or_default();
+        add_scores(scores, &state.params, &mut weights);
+        let pinned = (state.params.pinned_entries(), state.params.pinned_weight);
         let likelihoods = &mut self.likelihoods;
-        weigh(
-            likelihoods,
-            distances,
-            scores,
-            sigma,
-            &state.params,
-            &mut weights,
-        );
+        weights::sum_rule_weights(likelihoods, distances, sigma, pinned, &mut weights);
         self.particles.truncate(first);
         self.squares.truncate(first);
         self.distances.truncate(first * entries);
@@ -209,6 +198,11 @@ impl Candidates {
         &self.distances[index * self.entries()..][..self.entries()]
     }
 
+    /// The distance of particle `index` to the first entry of the bag, which is that of the first box where it is pinned.
+    pub fn first_distance_of(&self, index: usize) -> f64 {
+        self.distances_of(index)[0]
+    }
+
     /// The discriminant's score of particle `index`; none without a discriminant.
     pub fn score_of(&self, index: usize) -> Option<f32> {
         self.samples.scores.get(index).copied()
@@ -219,7 +213,7 @@ impl Candidates {
     pub fn evidence(&self, index: usize, mean_first_distance: f64, scale: f64) -> Evidence {
         let distances = self.distances_of(index);
         Evidence {
-            first_distance: distances[0],
+            first_distance: self.first_distance_of(index),
             mean_first_distance,
             nearest_distance: distances.iter().copied().fold(f64::INFINITY, f64::min),
             discriminant: self.score_of(index),
@@ -233,20 +227,11 @@ impl Candidates {
     }
 }
 
-/// Turns `weights`, which are logarithmic priors, into the weights of particles with these distances to the bag's
-/// entries and these scores of the discriminant; there are no scores without one.
-fn weigh(
-    likelihoods: &mut Likelihoods,
-    distances: &[f64],
-    scores: &[f32],
-    sigma: f64,
-    params: &Params,
-    weights: &mut [f64],
-) {
+/// Adds the logarithm of the discriminant's likelihood to `exponents`, the logarithms of priors; there are no scores
+/// without a discriminant.
+fn add_scores(scores: &[f32], params: &Params, exponents: &mut [f64]) {
     let max = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    for (weight, score) in weights.iter_mut().zip(scores) {
-        *weight += params.discriminant_weight * f64::from(score - max);
+    for (exponent, score) in exponents.iter_mut().zip(scores) {
+        *exponent += params.discriminant_weight * f64::from(score - max);
     }
-    let pinned = (params.pinned_entries(), params.pinned_weight);
-    weights::weigh(likelihoods, distances, sigma, pinned, weights);
 }

@@ -5,7 +5,7 @@
 //! is now. `step` reads in the order of the paper's four components, each of which is a room:
 //!
 //! - **(A)** *Particles* (`motion`): N hypotheses of centre and scale (section III-A).
-//! - **(B)** *Affine subspaces* (`features`, `appearance`): a candidate area becomes a vector v of length D. With the
+//! - **(B)** *Affine subspaces* (`features`, `grassmann`): a candidate area becomes a vector v of length D. With the
 //!   patches tracked in the P previous frames it makes the matrix V (equation 2); the mean of its columns and its n
 //!   dominant left singular vectors are the candidate's affine subspace (equation 1). V is not centred.
 //! - **(C)** *The bag* (`appearance`): up to K affine subspaces that were tracked before, a new one every W frames.
@@ -14,9 +14,18 @@
 //!   normalised over the candidates for each entry of the bag, summed over the bag; the greatest sum is the answer,
 //!   and the sums are the weights for the next frame (equations 9 to 12).
 //!
-//! The preset `robust` extends them: a classifier of the target against its surroundings (`classifier`), a filter for
-//! the scale (`scale`), a score and an update gate (`confidence`). The other rooms are `image` (frames and boxes),
-//! `params` and `linalg`.
+//! The preset `robust` extends them. What is the paper's, and what is ours:
+//!
+//! | room | paper | ours |
+//! |---|---|---|
+//! | `motion` | resampling, Brownian motion | search around the answer, global motion, change test, orientation |
+//! | `features` | gray patches | gradient histograms with chroma |
+//! | `appearance` | the bag, the history | candidates of one vector, the background's metric, colour histograms |
+//! | `grassmann` | affine subspaces and their distance | |
+//! | `weights`, `step` | likelihoods, the sum rule, the answer | priors, a second round, pinned entries |
+//! | `classifier`, `scale`, `confidence` | | a discriminant, a filter for the scale, the score and the update gate |
+//!
+//! The other rooms are `image` (frames and boxes), `params` and `linalg`.
 //!
 //! What the paper leaves open:
 //! - Everything happens in the working image ([`Frame`]), as large as the target asks for ([`Params::frame_format`]);
@@ -72,35 +81,36 @@ mod bag_view;
 mod candidates;
 mod classifier;
 mod confidence;
+mod diagnostics;
 mod error;
 mod estimate;
 mod features;
 mod grassmann;
-mod hypotheses;
 mod image;
 mod input;
 mod learn;
 mod linalg;
 mod motion;
-mod observe;
 mod params;
+mod propose;
 mod scale;
-mod seen;
 mod snapshot;
 mod start;
 mod state;
 mod step;
 mod tracker;
+mod views;
 mod weights;
 mod workspace;
 
-pub use appearance::subspace::{AffineSubspace, RANK_TOLERANCE};
 pub use bag_view::{BagEntry, VectorView};
 pub use confidence::score::{Evidence, PREDICTORS, ScoreModel};
+pub use diagnostics::Diagnostics;
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
 pub use features::gray::patch;
 pub use grassmann::evaluation::Evaluation;
+pub use grassmann::subspace::{AffineSubspace, RANK_TOLERANCE};
 pub use image::area_average::area_average;
 pub use image::frame::{Frame, FrameError, FrameFormat};
 pub use image::rect::Rect;
@@ -109,6 +119,5 @@ pub use image::ycbcr;
 pub use input::MIN_BOX_SIDE;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
-pub use seen::Seen;
 pub use tracker::Tracker;
-pub use weights::{Likelihoods, arg_max, weigh};
+pub use weights::{Likelihoods, arg_max, sum_rule_weights};

@@ -8,27 +8,22 @@
 //! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
 //! postcard's encoding.
 
-use crate::appearance::background;
-use crate::appearance::bag::Bag;
-use crate::appearance::subspace::{self, AffineSubspace};
 use crate::error::TrackerError;
 use crate::image::resolution::MAX_WORKING_SIDE;
 use crate::input;
 use crate::motion::orientation;
 use crate::motion::particles::Particle;
-use crate::params::table::Params;
+use crate::params::table::Search;
 use crate::state::State;
 use crate::workspace;
 
 const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
-const VERSION: u32 = 16;
+const VERSION: u32 = 17;
 const HEADER: usize = 16;
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
 const MAX_FEATURE: f32 = 1e3;
-/// The greatest difference of UᵀU from the identity that single precision leaves.
-const ORTHONORMAL: f64 = 1e-3;
 /// Frame numbers are below: 2^53 can also be said exactly in JSON.
 const FRAMES: u64 = 1 << 53;
 
@@ -74,12 +69,8 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
 /// Computes what a snapshot does not carry.
 fn restore(state: &mut State) {
     workspace::with(|workspace| {
-        let learning = &mut workspace.scratch.learning;
-        let params = &state.params;
-        background::learn(&mut state.background, params, &mut learning.background);
-        state
-            .bag
-            .rebuild(&state.background, params, &mut learning.bag);
+        let scratch = &mut workspace.scratch.learning.appearance;
+        state.appearance.model_mut().restore(&state.params, scratch);
     });
 }
 
@@ -87,8 +78,7 @@ fn check(state: &State) -> Result<(), TrackerError> {
     state.params.validate()?;
     let is_valid = check_numbers(state)
         && check_particles(state)
-        && state.history.is_valid_for(&state.params, MAX_FEATURE)
-        && check_bag(&state.bag, &state.params)
+        && state.appearance.is_valid_for(&state.params, MAX_FEATURE)
         && check_extensions(state);
     if is_valid {
         Ok(())
@@ -136,20 +126,14 @@ fn check_numbers(state: &State) -> bool {
 }
 
 fn check_particles(state: &State) -> bool {
-    let count = state.params.stored_particles();
-    let total: f64 = state.weights.iter().sum();
-    state.particles.len() == count
-        && state.weights.len() == count
+    let has_cloud = state.params.search == Search::Resampled;
+    let cloud = state.cloud.as_ref();
+    cloud.is_some() == has_cloud
         && is_clamped(&state.answer, state)
-        && state
-            .weights
-            .iter()
-            .all(|weight| (0.0..=1.0).contains(weight))
-        && (count == 0 || (total - 1.0).abs() < 1e-6)
-        && state
-            .particles
-            .iter()
-            .all(|particle| is_clamped(particle, state))
+        && cloud.is_none_or(|cloud| {
+            let mut particles = cloud.particles.iter();
+            cloud.is_valid_for(&state.params) && particles.all(|it| is_clamped(it, state))
+        })
 }
 
 /// Whether a particle is within its bounds: to two pixels, for a box that the user gave may lie a pixel beyond, and to
@@ -165,8 +149,7 @@ fn is_clamped(particle: &Particle, state: &State) -> bool {
 fn check_extensions(state: &State) -> bool {
     let params = &state.params;
     let (width, height) = state.format.size;
-    state.background.is_valid_for(params, MAX_FEATURE)
-        && state.discriminant.is_valid_for(params, MAX_FEATURE)
+    state.discriminant.is_valid_for(params, MAX_FEATURE)
         && state
             .color
             .is_valid_for(params.histogram_weight > 0.0, state.format.has_color)
@@ -182,37 +165,4 @@ fn check_extensions(state: &State) -> bool {
         && orientation::is_valid_for(state.orientation, params)
         && (0.0..=1e6).contains(&state.update_gate.mean_distance)
         && (0.0..=1e6).contains(&state.update_gate.last_distance)
-}
-
-fn check_bag(bag: &Bag, params: &Params) -> bool {
-    // With single-vector candidates a subspace follows from its templates.
-    let len = match params.single_vector_candidate {
-        true => 0,
-        false => params.feature_len(),
-    };
-    (1..=params.bag_size as usize).contains(&bag.entries.len())
-        && bag
-            .entries
-            .iter()
-            .all(|entry| entry.is_valid_for(params, MAX_FEATURE))
-        && bag.subspaces().all(|entry| {
-            entry.mean.len() == len
-                && entry.basis.len().is_multiple_of(len)
-                && entry.dim() <= params.basis_dim as usize
-                && are_features(&entry.mean)
-                && are_features(&entry.basis)
-                && is_orthonormal(entry)
-        })
-}
-
-fn are_features(values: &[f32]) -> bool {
-    values.iter().all(|value| value.abs() <= MAX_FEATURE)
-}
-
-fn is_orthonormal(entry: &AffineSubspace) -> bool {
-    let gram = subspace::gram(&entry.basis, entry.mean.len().max(1));
-    let shape = (entry.dim(), entry.dim());
-    gram.view((0, 0), shape)
-        .into_owned()
-        .is_identity(ORTHONORMAL)
 }

@@ -2,11 +2,9 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::appearance::augmentation;
-use crate::appearance::background::{self, Background};
-use crate::appearance::bag::Bag;
+use crate::appearance::background;
 use crate::appearance::color_histogram::ColorHistogram;
-use crate::appearance::history::History;
+use crate::appearance::model::Appearance;
 use crate::classifier::labels;
 use crate::classifier::ridge::Discriminant;
 use crate::confidence::score::DistanceBaseline;
@@ -19,6 +17,7 @@ use crate::image::warp::Rotation;
 use crate::motion::global_motion::GlobalMotion;
 use crate::motion::last_seen::LastSeen;
 use crate::motion::random::{self, Draws};
+use crate::motion::resampling::Cloud;
 use crate::params::table::Params;
 use crate::scale::dsst::ScaleFilter;
 use crate::state::State;
@@ -46,17 +45,14 @@ impl State {
         let source = frame.source_size();
         let (bounds, answer) = Self::place(source, format.size, &target);
         let mut state = Self {
+            appearance: Appearance::new(&params),
             params,
             source,
             format,
             bounds,
             estimate: given(0, target),
             answer,
-            particles: Vec::new(),
-            weights: Vec::new(),
-            history: History::default(),
-            bag: Bag::default(),
-            background: Background::default(),
+            cloud: None,
             discriminant: Discriminant::default(),
             global_motion: None,
             scale_filter: ScaleFilter::default(),
@@ -83,26 +79,25 @@ impl State {
     /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
     fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
         let Workspace { views, scratch } = workspace;
-        let image = self.original(frame, &mut views.downsampled);
+        let image = self.working_view(frame, &mut views.downsampled);
         // All particles are there, with equal weights.
-        let count = self.params.stored_particles();
-        self.particles = vec![self.answer; count];
-        self.weights = vec![1.0 / count.max(1) as f64; count];
+        self.cloud = Cloud::at(self.answer, &self.params);
         let profiles = || GlobalMotion::new(frame);
         self.global_motion = self.params.global_motion.then(profiles);
         scratch.change_test.load(frame, &self.answer, &self.bounds);
         self.record_seen(scratch);
         self.init_models(image, given.frame, scratch);
-        let Learning { features, bag, .. } = &mut scratch.learning;
+        let Learning {
+            features,
+            appearance,
+            ..
+        } = &mut scratch.learning;
         let (extractor, params) = (&mut scratch.extractor, &self.params);
         extractor.features(image, &[self.answer], &self.bounds, params, features);
         self.describe_augmented(image, extractor, features);
-        self.bag.rebuild(&self.background, &self.params, bag);
-        self.history.clear();
+        let model = self.appearance.model_mut();
+        model.restart(features, &self.params, appearance);
         self.update_gate = UpdateGate::default();
-        self.bag
-            .admit_pinned(features, &self.background, &self.params, bag);
-        self.history.push(features, &self.params);
         self.estimate = given;
     }
 
@@ -114,7 +109,7 @@ impl State {
             .extractor
             .compute_channels(image, &[answer], everywhere, bounds, &self.params);
         let mut draws = random::generator(self.params.seed, number, Draws::Samples);
-        let samples = self.params.metric_samples();
+        let samples = self.appearance.model().background_wanted(0, &self.params);
         if samples > 0 {
             let areas = &mut scratch.learning.areas;
             background::areas(&answer, &self.bounds, samples, &mut draws, areas);
@@ -129,8 +124,10 @@ impl State {
         self.learn_scale(image, &answer, scratch);
     }
 
-    /// Appends the feature vectors of the augmented views of the answer to `features`. The extractor has the channels of the last of
-    /// them then.
+    /// Appends the feature vectors of the augmented views of the answer to `features`: copies rotated by some degrees
+    /// either way. A subspace of one vector is a point; with these it spans what the target looks like when it tilts.
+    /// The frame is rotated, so the rim shows what would be there. The extractor has the channels of the last of them
+    /// then.
     fn describe_augmented(
         &self,
         image: &Frame,
@@ -139,7 +136,8 @@ impl State {
     ) {
         let (answer, params) = ([self.answer], &self.params);
         let window = Extractor::window(&answer, 0.0, &self.bounds, params);
-        for angle in augmentation::angles(params) {
+        let angle = params.augmentation_angle.to_radians();
+        for angle in [angle, -angle].into_iter().filter(|it| *it != 0.0) {
             let rotation = Rotation::about((self.answer.x, self.answer.y), angle);
             let rotated = rotation.apply(image, &window, Frame::default());
             extractor.compute_channels(&rotated, &answer, 0.0, &self.bounds, params);
@@ -153,7 +151,7 @@ impl State {
     /// Fits the discriminant to the target and to areas around it.
     fn init_discriminant(&mut self, image: &Frame, draws: &mut ChaCha8Rng, scratch: &mut Scratch) {
         if !self.discriminant.is_on() {
-            let mut origin = self.background.mean.clone();
+            let mut origin = self.appearance.model().mean().to_vec();
             origin.resize(self.params.feature_len(), 0.0);
             self.discriminant = Discriminant::new(origin);
         }

@@ -2,10 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::appearance::background::Background;
-use crate::appearance::bag::Bag;
 use crate::appearance::color_histogram::ColorHistogram;
-use crate::appearance::history::History;
+use crate::appearance::model::Appearance;
 use crate::classifier::ridge::Discriminant;
 use crate::confidence::score::DistanceBaseline;
 use crate::confidence::update_gate::UpdateGate;
@@ -16,6 +14,7 @@ use crate::input;
 use crate::motion::global_motion::GlobalMotion;
 use crate::motion::last_seen::LastSeen;
 use crate::motion::particles::{Particle, StateBounds};
+use crate::motion::resampling::Cloud;
 use crate::params::table::Params;
 use crate::scale::dsst::ScaleFilter;
 
@@ -38,12 +37,8 @@ pub(crate) struct State {
     /// Where the target was found last.
     pub answer: Particle,
     /// The last particles; none where the next ones are drawn around the answer.
-    pub particles: Vec<Particle>,
-    /// One for each particle, with the sum 1.
-    pub weights: Vec<f64>,
-    pub history: History,
-    pub bag: Bag,
-    pub background: Background,
+    pub cloud: Option<Cloud>,
+    pub appearance: Appearance,
     pub discriminant: Discriminant,
     /// The profiles of the last frame, with `global_motion`.
     pub global_motion: Option<GlobalMotion>,

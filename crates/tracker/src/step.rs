@@ -26,18 +26,18 @@ impl State {
         self.test_for_change(frame, &search, scratch);
 
         // (B) Describe, (D) compare and weigh. Twice, since a second round is drawn around the best of the first.
-        let mut best = self.weigh(views.rectified, &search, scratch);
+        let mut best = self.weigh_particles(views.rectified, &search, scratch);
         let candidates = &mut scratch.candidates;
         if search.refine(&candidates.weights, &mut draws, &mut candidates.particles) {
-            best = self.weigh(views.rectified, &search, scratch);
+            best = self.weigh_particles(views.rectified, &search, scratch);
         }
 
         // Answer (equation 12). A lost target counts as where it was, displaced with the image.
         let candidates = &scratch.candidates;
-        let distance = candidates.distances_of(best)[0];
+        let first_distance = candidates.first_distance_of(best);
         let is_lost = self.update_gate.is_lost(
             candidates.score_of(best),
-            distance,
+            first_distance,
             self.frames_lost,
             search.spread,
             &self.params,
@@ -48,12 +48,12 @@ impl State {
             let mean = search.answer(&candidates.particles, &candidates.weights, best);
             self.measure_scale(views.rectified, mean, scratch)
         };
-        let answer = self.bounds.clamp(search.in_original(rectified));
+        let answer = self.bounds.clamp(search.in_frame(rectified));
         let found = Localization {
             number,
             answer,
             rectified,
-            distance,
+            first_distance,
         };
 
         // Judge: how likely the box is right, and whether it may be learned from.

@@ -5,13 +5,13 @@ use std::borrow::Cow;
 use crate::bag_view::BagEntry;
 use crate::candidates::Candidates;
 use crate::confidence::score::Evidence;
+use crate::diagnostics::Diagnostics;
 use crate::error::TrackerError;
 use crate::estimate::Estimate;
 use crate::image::frame::{Frame, FrameFormat};
 use crate::image::rect::Rect;
 use crate::input;
 use crate::params::table::Params;
-use crate::seen::Seen;
 use crate::snapshot;
 use crate::state::State;
 use crate::workspace;
@@ -57,12 +57,15 @@ impl Tracker {
         Ok(self.advance(frame, |_, _| ())?.0)
     }
 
-    /// Like [`step`](Self::step), and tells what the tracker saw.
+    /// Like [`step`](Self::step), with the particles and votes that the answer was chosen from.
     ///
     /// # Errors
     /// As for [`step`](Self::step).
-    pub fn step_seeing(&mut self, frame: &Frame) -> Result<(Estimate, Seen), TrackerError> {
-        self.advance(frame, Seen::of)
+    pub fn step_with_diagnostics(
+        &mut self,
+        frame: &Frame,
+    ) -> Result<(Estimate, Diagnostics), TrackerError> {
+        self.advance(frame, Diagnostics::of)
     }
 
     /// Steps, and has a look at the candidates of the step.
@@ -124,15 +127,21 @@ impl Tracker {
     /// answer, and the last ones are not kept.
     pub fn particles(&self) -> impl ExactSizeIterator<Item = (Rect, f64)> {
         let state = &self.state;
-        let boxes = state.particles.iter().map(|it| state.target_of(it));
-        boxes.zip(state.weights.iter().copied())
+        let cloud = state.cloud.as_ref();
+        let particles = cloud.map_or(&[][..], |cloud| &cloud.particles);
+        let weights = cloud.map_or(&[][..], |cloud| &cloud.weights);
+        let boxes = particles.iter().map(|it| state.target_of(it));
+        boxes.zip(weights.iter().copied())
     }
 
     /// The entries of the bag, oldest first, for people to look at.
     pub fn bag(&self) -> Vec<BagEntry> {
-        let entries = self.state.bag.entries.iter();
-        let view = |entry| BagEntry::of(entry, &self.state.params);
-        entries.map(view).collect()
+        let State {
+            appearance, params, ..
+        } = &self.state;
+        let entries = appearance.model().subspaces(params);
+        let view = |entry| BagEntry::of(entry, params);
+        entries.iter().map(view).collect()
     }
 
     /// The parameters of this tracker.

@@ -22,9 +22,9 @@ pub struct Likelihoods {
 /// A weight begins as an exponent, what is known of the particle besides (0: nothing), and becomes the exponential of
 /// that times the sum of the particle's likelihoods over the bag (equation 9), scaled so that all sum to 1. In the sum
 /// the first `pinned.0` entries count `pinned.1` times.
-#[pulp::with_simd(weigh = Arch::new())]
+#[pulp::with_simd(sum_rule_weights = Arch::new())]
 #[inline(always)]
-pub fn weigh_simd<S: Simd>(
+pub fn sum_rule_weights_simd<S: Simd>(
     _: S,
     likelihoods: &mut Likelihoods,
     distances: &[f64],
@@ -132,7 +132,7 @@ mod tests {
     fn weigh(distances: &[f64], pinned: (usize, f64), exponents: &[f64]) -> Vec<f64> {
         let mut weights = exponents.to_vec();
         let mut likelihoods = Likelihoods::default();
-        super::weigh(&mut likelihoods, distances, 0.01, pinned, &mut weights);
+        sum_rule_weights(&mut likelihoods, distances, 0.01, pinned, &mut weights);
         weights
     }
 

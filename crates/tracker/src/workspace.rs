@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 
 use crate::appearance::foreground_map::ForegroundMap;
-use crate::appearance::{background, color_histogram, span};
+use crate::appearance::{color_histogram, model};
 use crate::candidates::{Candidates, RotatedView};
 use crate::classifier::dense_search::DenseSearch;
 use crate::classifier::ridge;
@@ -46,8 +46,8 @@ pub(crate) struct Scratch {
     pub sums: Vec<f64>,
     /// For each particle the logarithm of its prior.
     pub log_priors: Vec<f64>,
-    /// Particles where they are in the original view.
-    pub original: Vec<Particle>,
+    /// Particles where they are in the frame that is not rotated.
+    pub in_frame: Vec<Particle>,
     pub candidates: Candidates,
     pub learning: Learning,
     /// The frame at other angles of the target.
@@ -60,8 +60,7 @@ pub(crate) struct Learning {
     pub areas: Vec<Particle>,
     /// Feature vectors, the answer's first.
     pub features: Vec<f32>,
-    pub background: background::Scratch,
-    pub bag: span::Scratch,
+    pub appearance: model::Scratch,
     pub color: color_histogram::Scratch,
     pub fit: ridge::Scratch,
     pub pyramid: pyramid::Scratch,

@@ -54,10 +54,10 @@ impl ParamOverrides {
         params.seed = rand::random_range(0..=MAX_EXACT);
         // One at a time, so that a value of the wrong type can be named.
         for (name, value) in self.0 {
-            let mut known = by_name(&params);
-            if !known.contains_key(&name) {
-                return Err(unknown(&name, &known));
+            if !is_public(&name) {
+                return Err(unknown(&name));
             }
+            let mut known = fields(&params);
             let value = match value.as_f64().and_then(whole) {
                 Some(whole) if value.is_f64() => Value::from(whole),
                 _ => value,
@@ -92,8 +92,29 @@ pub fn resolve(
     params.resolve(preset, seed)
 }
 
-/// The parameters by their names.
-pub fn by_name(params: &Params) -> Map<String, Value> {
+impl From<&Params> for ParamOverrides {
+    /// The values of the parameters that users set.
+    fn from(params: &Params) -> Self {
+        let mut fields = fields(params);
+        fields.retain(|name, _| is_public(name));
+        Self(fields)
+    }
+}
+
+impl ParamOverrides {
+    /// Removes and returns the value of the parameter `name`.
+    pub fn take(&mut self, name: &str) -> Option<Value> {
+        self.0.remove(name)
+    }
+}
+
+/// Whether users set the parameter `name`. The others are the presets' own.
+fn is_public(name: &str) -> bool {
+    Params::TABLE.iter().any(|row| row.name == name)
+}
+
+/// All parameters by their names.
+fn fields(params: &Params) -> Map<String, Value> {
     match serde_json::to_value(params) {
         Ok(Value::Object(object)) => object,
         // `Params` is a struct of numbers, booleans and names.
@@ -101,8 +122,9 @@ pub fn by_name(params: &Params) -> Map<String, Value> {
     }
 }
 
-fn unknown(name: &str, known: &Map<String, Value>) -> Problem {
-    let names: Vec<String> = known.keys().map(|name| format!("`{name}`")).collect();
+fn unknown(name: &str) -> Problem {
+    let rows = Params::TABLE.iter();
+    let names: Vec<String> = rows.map(|row| format!("`{}`", row.name)).collect();
     let name: String = name.chars().take(64).collect();
     Problem::invalid_parameter(format!(
         "There is no parameter `{name}`; the parameters are {}.",

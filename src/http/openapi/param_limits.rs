@@ -13,7 +13,7 @@ pub fn create_description() -> String {
         "The first frame and the target's box start the tracker. A session snapshot in the place of the frame, with \
          nothing else, restores that session under a new id; it goes on exactly where it stood.\n\n\
          Every parameter has a range. Sizes that multiply have limits together, which bound the time and memory of a \
-         session. The feature length is patch_width times patch_height, and {} times that for `gradients`.\n\n\
+         session. The feature length is patch_width times patch_height, and {} times that with the preset `robust`.\n\n\
          {}\n\n\
          A parameter out of these answers `invalid-parameter`, with the limit in its detail.\n\n\
          `curl --data-binary @first.jpg 'http://localhost:8080/sessions?box=10,20,30,40'`",

@@ -1,6 +1,6 @@
 //! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
 
-use crate::http::extract::overrides::{ParamOverrides, by_name};
+use crate::http::extract::overrides::ParamOverrides;
 use crate::http::extract::settings::{MAX_EXACT, number_schema};
 use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
@@ -20,9 +20,9 @@ impl ToSchema for ParamOverrides {
 impl PartialSchema for ParamOverrides {
     /// An object with a property for each parameter.
     fn schema() -> RefOr<Schema> {
-        let mut defaults = by_name(&Preset::default().params());
+        let mut defaults = ParamOverrides::from(&Preset::default().params());
         // Without one, a session draws its own.
-        defaults.remove("seed");
+        defaults.take("seed");
         let object = Params::TABLE.iter().fold(
             ObjectBuilder::new()
                 .description(Some(
@@ -31,7 +31,7 @@ impl PartialSchema for ParamOverrides {
                      drawn.",
                 ))
                 .additional_properties(Some(AdditionalProperties::FreeForm(false))),
-            |object, row| object.property(row.name, param(row, defaults.remove(row.name))),
+            |object, row| object.property(row.name, param(row, defaults.take(row.name))),
         );
         object.build().into()
     }
@@ -67,10 +67,8 @@ fn param(row: &Parameter, default: Option<Value>) -> Schema {
             greatest.map(Number::Float),
         ),
         "u32" => (Type::Integer, least.map(whole), greatest.map(whole)),
-        "bool" => (Type::Boolean, None, None),
-        _ => (Type::String, None, None),
+        _ => (Type::Integer, None, None),
     };
-    let choices = (!row.choices.is_empty()).then_some(row.choices.iter().copied());
     let schema = match row.kind {
         "u64" => number_schema(Type::Integer, MAX_EXACT),
         kind => ObjectBuilder::new()
@@ -81,7 +79,6 @@ fn param(row: &Parameter, default: Option<Value>) -> Schema {
     };
     let schema = schema
         .description(Some(row.description.trim()))
-        .enum_values(choices)
         .default(default);
     schema.build().into()
 }

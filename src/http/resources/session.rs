@@ -11,7 +11,6 @@ use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::{StatusCode, Uri};
-use bagtrack_tracker::Params;
 use serde::Serialize;
 use uuid::Uuid;
 
@@ -29,8 +28,7 @@ pub struct SessionView {
     image: ImageSize,
     /// The tracker's parameters; with `boxes` the seed is that of the first target.
     #[serde(rename = "parameters")]
-    #[schema(value_type = ParamOverrides)]
-    params: Params,
+    params: ParamOverrides,
     /// When the session ends if no frame comes (RFC 3339); this request does not move it on.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
     expires_at: String,
@@ -64,7 +62,7 @@ pub async fn get(
         frames: latest.first().frame + 1,
         answer: (&latest).into(),
         image: session.source_size().into(),
-        params: session.params().clone(),
+        params: session.params().into(),
         expires_at: state.expires_at(&session),
     }))
 }

@@ -13,7 +13,7 @@ use axum::response::{IntoResponse, Response};
 use bagtrack_sessions::{
     ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
 };
-use bagtrack_tracker::Seen;
+use bagtrack_tracker::Diagnostics;
 use std::sync::Arc;
 
 /// The header that has the answer as JSON.
@@ -68,7 +68,11 @@ pub async fn answer_drawn(
 }
 
 /// The picture as a file. What was answered before has no particles.
-fn draw(mut picture: Picture, estimates: &Estimates, seen: &[Seen]) -> Result<Vec<u8>, Problem> {
+fn draw(
+    mut picture: Picture,
+    estimates: &Estimates,
+    seen: &[Diagnostics],
+) -> Result<Vec<u8>, Problem> {
     let is_list = matches!(estimates, PerTarget::List(_));
     let targets = estimates.as_slice().iter().enumerate();
     let targets = targets.map(|(number, estimate)| Drawn {

@@ -9,7 +9,6 @@ use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::{IntoResponse, Response};
 use bagtrack_sessions::{Opened, PerTarget, Session, box_warnings};
-use bagtrack_tracker::Params;
 use serde::Serialize;
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
@@ -37,7 +36,7 @@ pub struct CreatedSession {
     /// With `verbose`: the tracker's parameters, with the seed that was drawn when none was given.
     #[serde(rename = "parameters", skip_serializing_if = "Option::is_none")]
     #[schema(value_type = ParamOverrides, nullable = false, required = false)]
-    params: Option<Params>,
+    params: Option<ParamOverrides>,
     /// When the session ends if no frame comes (RFC 3339); every frame moves this on.
     #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
     expires_at: String,
@@ -66,7 +65,7 @@ impl CreatedSession {
             },
             warnings,
             image: session.source_size().into(),
-            params: is_verbose.then(|| session.params().clone()),
+            params: is_verbose.then(|| session.params().into()),
             expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
         }
     }

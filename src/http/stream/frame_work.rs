@@ -10,7 +10,7 @@ use bagtrack_sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
     Tracked, box_warnings,
 };
-use bagtrack_tracker::{Rect, Seen};
+use bagtrack_tracker::{Diagnostics, Rect};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::time::{Instant, sleep};
@@ -50,7 +50,7 @@ pub struct Given {
     /// Whether it was given before.
     pub replayed: bool,
     /// What the tracker of the target saw that was asked for.
-    pub seen: Option<Seen>,
+    pub seen: Option<Diagnostics>,
     /// What may be wrong with the box that came with it.
     pub warnings: Option<Vec<String>>,
     /// The last frame whose state is in the store.

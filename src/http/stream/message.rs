@@ -4,7 +4,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::Answer;
 use crate::http::respond::target_box::TargetBox;
 use bagtrack_sessions::{Estimates, GivenBox};
-use bagtrack_tracker::Seen;
+use bagtrack_tracker::Diagnostics;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
 
@@ -107,8 +107,8 @@ pub struct SeenView {
     votes: Vec<f64>,
 }
 
-impl From<Seen> for SeenView {
-    fn from(mut seen: Seen) -> Self {
+impl From<Diagnostics> for SeenView {
+    fn from(mut seen: Diagnostics) -> Self {
         seen.particles.sort_by(|a, b| b.1.total_cmp(&a.1));
         let shown = seen.particles.iter().take(MAX_PARTICLES);
         let round = |value: f64, digits: f64| (value * digits).round() / digits;
@@ -154,7 +154,7 @@ impl StreamAnswer {
     }
 
     /// With what the tracker saw.
-    pub fn with_seen(mut self, seen: Option<Seen>) -> Self {
+    pub fn with_seen(mut self, seen: Option<Diagnostics>) -> Self {
         self.seen = seen.map(SeenView::from);
         self
     }

@@ -10,7 +10,7 @@ use crate::{
     WorkMeter,
 };
 use bagtrack_ingest::Limits;
-use bagtrack_tracker::{Frame, FrameFormat, Rect, Seen, TrackerError};
+use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -65,7 +65,7 @@ pub struct Tracked {
     /// Whether they were given before.
     pub replayed: bool,
     /// What the tracker of each target saw in the last frame, where that was asked for and the frame was tracked now.
-    pub diagnostics: Vec<Seen>,
+    pub diagnostics: Vec<Diagnostics>,
     /// The last frame whose state is in the store, where there is one.
     pub checkpoint: Option<u64>,
 }

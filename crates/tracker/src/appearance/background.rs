@@ -52,7 +52,7 @@ pub(crate) struct Scratch {
 impl Background {
     /// How many new samples frame `number` brings: all in the first frame, some in every so many of the others.
     pub fn wanted(number: u64, params: &Params) -> usize {
-        let all = params.metric_samples();
+        let all = params.background_samples as usize;
         if number == 0 {
             all
         } else if number.is_multiple_of(REFRESH_EVERY) {
@@ -65,7 +65,7 @@ impl Background {
     /// Appends new samples, vectors of length D one after the other; the oldest leave.
     pub fn rebuild(&mut self, vectors: &[f32], params: &Params, scratch: &mut Scratch) {
         for vector in vectors.chunks_exact(params.feature_len()) {
-            let is_full = self.samples.len() >= params.metric_samples();
+            let is_full = self.samples.len() >= params.background_samples as usize;
             let oldest = self.samples.pop_front_if(|_| is_full);
             let mut sample = oldest.unwrap_or_default();
             sample.set(vector);
@@ -92,7 +92,7 @@ impl Background {
 
     /// Whether the samples may be those of a tracker with `params`.
     pub fn is_valid_for(&self, params: &Params, max: f32) -> bool {
-        self.samples.len() == params.metric_samples()
+        self.samples.len() == params.background_samples as usize
             && self
                 .samples
                 .iter()

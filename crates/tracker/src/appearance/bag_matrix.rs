@@ -5,6 +5,7 @@ use pulp::{Arch, Simd};
 
 use crate::appearance::background::Background;
 use crate::appearance::bag::Bag;
+use crate::appearance::span::Span;
 use crate::linalg::scratch::AlignedBuffer;
 
 /// The rows, each of length D, and what is known of them beside.
@@ -29,7 +30,7 @@ pub(crate) struct BagMatrix {
 pub(crate) fn load_simd<S: Simd>(
     simd: S,
     matrix: &mut BagMatrix,
-    bag: &Bag,
+    bag: &Bag<Span>,
     background: &Background,
     queries: [&[f32]; 2],
     len: usize,
@@ -38,25 +39,16 @@ pub(crate) fn load_simd<S: Simd>(
     matrix.samples = metric.count;
     matrix.inverse.clone_from(&metric.inverse);
     matrix.entries.clear();
-    let sizes = entries
-        .iter()
-        .map(|entry| (entry.span.norm, entry.span.dim));
+    let sizes = entries.iter().map(|entry| (entry.norm, entry.dim));
     matrix.entries.extend(sizes);
     let count = matrix.samples + matrix.subspace_rows() + queries.len();
     matrix.values.resize(count * len);
     let (samples, mut rest) = matrix.values.values_mut().split_at_mut(metric.count * len);
     background.write_samples(samples);
     matrix.background_coordinates.clear();
-    for entry in entries {
-        let span = &entry.span;
+    for span in entries {
         let (rows, others) = rest.split_at_mut((1 + span.dim) * len);
-        span.write_to(
-            simd,
-            &entry.templates,
-            background,
-            &mut matrix.templates,
-            rows,
-        );
+        span.write_to(simd, background, &mut matrix.templates, rows);
         let coordinates = &span.background_coordinates;
         matrix.background_coordinates.extend_from_slice(coordinates);
         rest = others;

@@ -10,10 +10,13 @@ use std::f64::consts::PI;
 use pulp::{Arch, Simd};
 
 use crate::appearance::bag_matrix::BagMatrix;
+use crate::appearance::model::Vectors;
 use crate::linalg::acos::{LANES, squared_angles};
 use crate::linalg::{combinations, gemm, vector_ops};
 use crate::params::table::Params;
 
+/// γ (equation 5): one over the greatest squared distance of the origins, two unit vectors.
+const GAMMA: f64 = 0.25;
 /// Candidates are worked on in groups of this many.
 const GROUP: usize = 32;
 
@@ -30,21 +33,20 @@ pub(crate) struct PointDistance {
     norms: Vec<f32>,
 }
 
-/// Appends the distances of candidates (vectors of length D, with the background's mean subtracted, one after the other,
-/// and their squared lengths) to each entry of the bag (equation 4).
+/// Appends the distances of candidates to each entry of the bag (equation 4).
 #[pulp::with_simd(distances = Arch::new())]
 #[inline(always)]
 pub(crate) fn distances_simd<S: Simd>(
     simd: S,
     point_distance: &mut PointDistance,
-    (candidates, squares): (&[f32], &[f32]),
+    candidates: Vectors<'_>,
     params: &Params,
     out: &mut Vec<f64>,
 ) {
-    let count = squares.len();
+    let count = candidates.squares.len();
     let stride = count.next_multiple_of(GROUP);
-    point_distance.multiply(simd, candidates, params.feature_len(), stride);
-    point_distance.normalize(squares, stride);
+    point_distance.multiply(simd, candidates.values, params.feature_len(), stride);
+    point_distance.normalize(candidates.squares, stride);
     point_distance.compare(count, stride, params, out);
 }
 
@@ -100,7 +102,7 @@ impl PointDistance {
     /// Distances of `count` candidates to all entries.
     #[inline(always)]
     fn compare(&mut self, count: usize, stride: usize, params: &Params, out: &mut Vec<f64>) {
-        let (alpha, gamma) = (params.alpha, params.gamma());
+        let alpha = params.alpha;
         // β = 4 / (n π²) (equation 8) with n = 1.
         let beta = 4.0 / (PI * PI);
         let first = out.len();
@@ -136,7 +138,7 @@ impl PointDistance {
                 let values = out[first + at * entries + k..].iter_mut().step_by(entries);
                 for (lane, value) in values.enumerate().take(LANES.min(count - at)) {
                     let origin = origins[lane].max(0.0);
-                    *value = alpha * gamma * origin + (1.0 - alpha) * beta * angles[lane];
+                    *value = alpha * GAMMA * origin + (1.0 - alpha) * beta * angles[lane];
                 }
             }
         }
@@ -148,7 +150,8 @@ mod tests {
     use super::*;
     use crate::appearance::background::{self, Background};
     use crate::appearance::bag::Bag;
-    use crate::appearance::{bag_matrix, span};
+    use crate::appearance::bag_matrix;
+    use crate::appearance::span::{self, Span};
     use crate::features::quantized::QuantizedVector;
     use crate::params::presets::Preset;
     use crate::params::table::Features;
@@ -193,7 +196,10 @@ mod tests {
             let templates = [vectors(5, 2), vectors(4, 3)];
             let (mut bag, mut scratch) = (Bag::default(), span::Scratch::default());
             for templates in &templates {
-                bag.admit(templates, &background, &params, &mut scratch);
+                span::load(&mut scratch, &background);
+                bag.admit(&params, |entry: &mut Span| {
+                    entry.fit(templates, &background, &params, &mut scratch);
+                });
             }
             let mut candidates = vectors(3, 4);
             let given = columns(&candidates);
@@ -215,7 +221,10 @@ mod tests {
             let mut found = vec![7.0];
             distances(
                 &mut point_distance,
-                (&candidates, &squares),
+                Vectors {
+                    values: &candidates,
+                    squares: &squares,
+                },
                 &params,
                 &mut found,
             );
@@ -257,7 +266,7 @@ mod tests {
             for (i, candidate) in candidates.column_iter().enumerate() {
                 for (k, templates) in templates.iter().enumerate() {
                     let v = compared(kept(templates));
-                    let origin = (candidate - &v.column_mean()).norm_squared() * params.gamma();
+                    let origin = (candidate - &v.column_mean()).norm_squared() * GAMMA;
                     let svd = v.svd(true, false);
                     let u = svd.u.expect("it was asked for");
                     let basis = u.columns(0, 3);

@@ -7,23 +7,30 @@
 //! the background coordinates).
 
 use pulp::{Arch, Simd};
+use serde::{Deserialize, Serialize};
 
 use crate::appearance::background::Background;
-use crate::appearance::subspace::{self, Gram};
 use crate::features::quantized::QuantizedVector;
+use crate::grassmann::subspace::{self, AffineSubspace, Gram};
 use crate::linalg::{combinations, gemm, jacobi, vector_ops};
 use crate::params::table::Params;
 
-/// The mean, then the basis vectors, of an affine subspace.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// The mean, then the basis vectors, of an affine subspace. A snapshot carries the templates: the rest follows.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Span {
+    /// The vectors that it was made of.
+    pub templates: Vec<QuantizedVector>,
     /// ‖μ‖².
+    #[serde(skip)]
     pub norm: f64,
     /// For the mean and for each basis vector, the coefficients of the templates.
+    #[serde(skip)]
     coefficients: Vec<f32>,
     /// For the mean and for each basis vector, its background coordinates.
+    #[serde(skip)]
     pub background_coordinates: Vec<f32>,
     /// The number of basis vectors.
+    #[serde(skip)]
     pub dim: usize,
 }
 
@@ -101,16 +108,28 @@ fn compare_templates_simd<S: Simd>(
 }
 
 impl Span {
-    /// Becomes the subspace of `templates` under the metric of `background`, which `scratch` has loaded.
+    /// Becomes the subspace of `vectors`, of length D one after the other, under the metric of `background`, which
+    /// `scratch` has loaded.
     pub fn fit(
         &mut self,
-        templates: &[QuantizedVector],
+        vectors: &[f32],
         background: &Background,
         params: &Params,
         scratch: &mut Scratch,
     ) {
-        let (count, samples) = (templates.len(), background.metric.count);
-        compare_templates(templates, background, params.feature_len(), scratch);
+        let vectors = vectors.chunks_exact(params.feature_len());
+        self.templates
+            .resize_with(vectors.len(), QuantizedVector::default);
+        for (template, vector) in self.templates.iter_mut().zip(vectors) {
+            template.set(vector);
+        }
+        self.refit(background, params, scratch);
+    }
+
+    /// Becomes the subspace of the same templates under the metric of another `background`, which `scratch` has loaded.
+    pub fn refit(&mut self, background: &Background, params: &Params, scratch: &mut Scratch) {
+        let (count, samples) = (self.templates.len(), background.metric.count);
+        compare_templates(&self.templates, background, params.feature_len(), scratch);
         self.combine(count, params.basis_dim as usize, scratch);
         self.background_coordinates.clear();
         for coefficients in self.coefficients.chunks_exact(count) {
@@ -147,20 +166,31 @@ impl Span {
         }
     }
 
-    /// Writes the mean and the basis vectors, as plain vectors, to `out`, which is as long as they are. `templates` are
-    /// those that this was fitted to; `scratch` is a buffer for them.
+    /// The subspace of the templates under the plain metric, for people to look at.
+    pub fn subspace(&self, params: &Params) -> AffineSubspace {
+        let mut subspace = AffineSubspace::default();
+        let len = params.feature_len();
+        let mut vectors = vec![0.0; self.templates.len() * len];
+        for (template, vector) in self.templates.iter().zip(vectors.chunks_exact_mut(len)) {
+            template.write(&[], vector);
+        }
+        subspace::fit(&mut subspace, &vectors, len, params.basis_dim as usize);
+        subspace
+    }
+
+    /// Writes the mean and the basis vectors, as plain vectors, to `out`, which is as long as they are. `scratch` is a
+    /// buffer for the templates.
     #[inline(always)]
     pub fn write_to<S: Simd>(
         &self,
         simd: S,
-        templates: &[QuantizedVector],
         background: &Background,
         scratch: &mut Vec<f32>,
         out: &mut [f32],
     ) {
         let len = out.len() / (1 + self.dim);
-        scratch.resize(templates.len() * len, 0.0);
-        for (template, vector) in templates.iter().zip(scratch.chunks_exact_mut(len)) {
+        scratch.resize(self.templates.len() * len, 0.0);
+        for (template, vector) in self.templates.iter().zip(scratch.chunks_exact_mut(len)) {
             template.write(&background.mean, vector);
         }
         combinations::assign_combinations(simd, out, &self.coefficients, scratch, len);

@@ -1,4 +1,5 @@
-//! The discriminant: a linear classifier of the target against its surroundings, learned while tracking.
+//! The discriminant: a linear classifier of the target against its surroundings, learned while tracking. All
+//! of it is ours, none the paper's.
 //!
 //! - `ridge`: the classifier's weights, fitted frame by frame by regularised least squares.
 //! - `labels`: what it is fitted to, and the areas of the first fit.

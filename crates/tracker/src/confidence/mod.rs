@@ -1,4 +1,4 @@
-//! How far the tracker trusts its own answer.
+//! How far the tracker trusts its own answer. All of it is ours, none the paper's.
 //!
 //! - `score`: the probability, in \[0, 1\], that the box overlaps the target by half or more, and the status.
 //! - `update_gate`: whether the target is lost, and whether a frame may update the models.

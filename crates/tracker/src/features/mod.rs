@@ -4,12 +4,12 @@
 //! particle a vector of D `f32` values, one after the other. These are H₁ x H₂ gray values in [0, 1] (section III-B),
 //! or H₁ x H₂ cells of twelve values: nine gradient directions in [0, 0.4], two of chroma and a gray value of mean 0.
 //!
-//! | file | holds |
-//! |---|---|
-//! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind |
-//! | [`gray`] | gray patches |
-//! | [`hog`] | gradient histograms, a room of its own |
-//! | [`quantized`] | vectors in 4 or 10 bits a value, as the state keeps them |
+//! | file | holds | whose |
+//! |---|---|---|
+//! | [`gray`] | gray patches | paper |
+//! | [`extractor`] | [`Extractor`](extractor::Extractor): from particles to vectors of either kind | ours |
+//! | [`hog`] | gradient histograms, a room of its own | ours |
+//! | [`quantized`] | vectors in 4 or 10 bits a value, as the state keeps them | ours |
 //!
 //! What can go wrong: nothing fails. Areas need finite positions and sides above 0. They may reach over the frame's
 //! edge: gray patches continue the edge's pixels; in gradient histograms there is no gradient beyond the edge, and

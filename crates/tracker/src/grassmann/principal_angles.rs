@@ -5,22 +5,17 @@
 //! thousand a frame: nalgebra's `singular_values` takes five times as long, and stops early where singular values are
 //! small (dimforge/nalgebra issue 1172).
 
-use nalgebra::{SMatrix, SimdPartialOrd, SimdValue};
+use nalgebra::SMatrix;
 
-use crate::grassmann::Lanes;
 use crate::linalg::{acos, jacobi};
 
 /// ‖Θ‖² (equation 6) of the `dim` smallest principal angles, in radians², of bases with these products EᵀF.
 #[inline(always)]
-pub(crate) fn squared_norm<const N: usize>(products: &SMatrix<Lanes, N, N>, dim: Lanes) -> Lanes {
+pub(crate) fn squared_norm<const N: usize>(products: &SMatrix<f64, N, N>, dim: usize) -> f64 {
     let squared_cosines = jacobi::eigenvalues(products.tr_mul(products));
-    let mut sum = Lanes::splat(0.0);
-    for (j, squares) in squared_cosines.iter().enumerate() {
-        let squared_angles = Lanes::from(acos::squared_angles(&squares.0));
-        let is_among = dim.simd_gt(Lanes::splat(j as f64));
-        sum += squared_angles.select(is_among, Lanes::splat(0.0));
-    }
-    sum
+    let mut lanes = [0.0; acos::LANES];
+    lanes[..N].copy_from_slice(squared_cosines.as_slice());
+    acos::squared_angles(&lanes)[..dim].iter().sum()
 }
 
 #[cfg(test)]
@@ -48,7 +43,7 @@ mod tests {
             let product = left * Matrix3::from_diagonal(&cosines) * right;
             for dim in 0..=3 {
                 let expected: f64 = angles[..dim].iter().map(|angle| angle * angle).sum();
-                let found = squared_norm(&product.map(Lanes::splat), Lanes::splat(dim as f64)).0[7];
+                let found = squared_norm(&product, dim);
                 assert!(
                     (found - expected).abs() < 1e-7,
                     "{angles:?}, {dim}: {found}"
@@ -60,8 +55,8 @@ mod tests {
     #[test]
     fn zero_columns_are_right_angles_and_tiny_ones_stay_finite() {
         for value in [0.0, 1e-30, 1e-160, 1e-300] {
-            let product = SMatrix::<Lanes, 6, 6>::repeat(Lanes::splat(value));
-            let found = squared_norm(&product, Lanes::splat(6.0)).0[0];
+            let product = SMatrix::<f64, 6, 6>::repeat(value);
+            let found = squared_norm(&product, 6);
             let right = std::f64::consts::FRAC_PI_2.powi(2);
             assert!((found - 6.0 * right).abs() < 1e-7, "{value}: {found}");
         }

@@ -11,9 +11,6 @@ use std::f64::consts::FRAC_PI_2;
 /// The number of angles that are computed together.
 pub(crate) const LANES: usize = 8;
 
-/// One number for each of them.
-pub(crate) type Lanes = [f64; LANES];
-
 /// arcsin²(√y) / y on [0, 1/2], lowest power first: the Chebyshev fit of degree 16, off by less than 3e-15 (mpmath's
 /// `chebyfit(lambda y: asin(sqrt(y))**2 / y, [0, 0.5], 17)`).
 const ARCSIN_SQUARED: [f64; 17] = [
@@ -38,7 +35,7 @@ const ARCSIN_SQUARED: [f64; 17] = [
 
 /// θ² in [0, π²/4] from cos²θ, which is clamped to [0, 1] against rounding.
 #[inline(always)]
-pub(crate) fn squared_angles(squared_cosines: &Lanes) -> Lanes {
+pub(crate) fn squared_angles(squared_cosines: &[f64; LANES]) -> [f64; LANES] {
     let mut angles = [0.0; LANES];
     for lane in 0..LANES {
         // The squares of all three.

@@ -5,7 +5,7 @@
 //! 1.6 times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a
 //! microsecond.
 
-use nalgebra::{SMatrix, SVector, SimdBool, SimdRealField};
+use nalgebra::{SMatrix, SVector};
 
 /// Cyclic Jacobi needs four to six sweeps at these sizes; the bound ends it on NaN.
 const MAX_SWEEPS: usize = 16;
@@ -18,38 +18,29 @@ const NEGLIGIBLE: f64 = 1e-16;
 /// never their sum.
 const NEGLIGIBLE_SQUARED: f64 = 1e-12;
 
-/// One `f64`, or several of as many matrices that are worked on at once.
-pub(crate) trait Real: SimdRealField<Element = f64> + Copy {}
-
-impl<T: SimdRealField<Element = f64> + Copy> Real for T {}
-
 /// Diagonalises a symmetric positive semidefinite matrix of size `dim`, in row order, of which the upper triangle is
 /// read. Leaves the eigenvalues on its diagonal, in no order, and in row `j` of `vectors` the eigenvector of the `j`-th
 /// of them. An empty `vectors` asks for the eigenvalues alone, to six digits.
 #[inline(always)]
-fn diagonalize<T: Real>(matrix: &mut [T], vectors: &mut [T], dim: usize) {
-    let mut floor = T::zero();
+fn diagonalize(matrix: &mut [f64], vectors: &mut [f64], dim: usize) {
+    let mut floor = 0.0;
     for j in 0..dim {
-        floor += matrix[j * dim + j] * T::splat(NEGLIGIBLE);
+        floor += matrix[j * dim + j] * NEGLIGIBLE;
     }
-    let relative = T::splat(if vectors.is_empty() {
+    let relative = if vectors.is_empty() {
         NEGLIGIBLE_SQUARED
     } else {
         0.0
-    });
-    vectors.fill(T::zero());
-    vectors
-        .iter_mut()
-        .step_by(dim + 1)
-        .for_each(|one| *one = T::one());
+    };
+    vectors.fill(0.0);
+    vectors.iter_mut().step_by(dim + 1).for_each(|it| *it = 1.0);
     for _ in 0..MAX_SWEEPS {
         let mut rotated = false;
         for p in 0..dim {
             for q in p + 1..dim {
                 let off = matrix[p * dim + q];
                 let share = relative * matrix[p * dim + p] * matrix[q * dim + q];
-                let counts = off.simd_abs().simd_gt(floor) & (off * off).simd_gt(share);
-                if counts.bitmask() != 0 {
+                if off.abs() > floor && off * off > share {
                     rotated = true;
                     rotate(matrix, vectors, dim, p, q);
                 }
@@ -63,20 +54,19 @@ fn diagonalize<T: Real>(matrix: &mut [T], vectors: &mut [T], dim: usize) {
 
 /// Zeroes element (p, q), p < q, by a rotation.
 #[inline(always)]
-fn rotate<T: Real>(matrix: &mut [T], vectors: &mut [T], dim: usize, p: usize, q: usize) {
+fn rotate(matrix: &mut [f64], vectors: &mut [f64], dim: usize, p: usize, q: usize) {
     let (pp, qq, pq) = (p * dim + p, q * dim + q, p * dim + q);
     let off = matrix[pq];
     let gap = matrix[qq] - matrix[pp];
     let twice = off + off;
     // The smaller root, without a branch; MIN_POSITIVE keeps 0 / 0 out where there is nothing to rotate.
-    let root =
-        (gap * gap + twice * twice).simd_sqrt() + gap.simd_abs() + T::splat(f64::MIN_POSITIVE);
-    let tangent = twice * T::one().simd_copysign(gap) / root;
-    let cosine = T::one() / (tangent * tangent + T::one()).simd_sqrt();
+    let root = (gap * gap + twice * twice).sqrt() + gap.abs() + f64::MIN_POSITIVE;
+    let tangent = twice * 1.0_f64.copysign(gap) / root;
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
     let sine = tangent * cosine;
     matrix[pp] -= tangent * off;
     matrix[qq] += tangent * off;
-    matrix[pq] = T::zero();
+    matrix[pq] = 0.0;
     for r in (0..dim).filter(|&r| r != p && r != q) {
         let rp = r.min(p) * dim + r.max(p);
         let rq = r.min(q) * dim + r.max(q);
@@ -88,7 +78,7 @@ fn rotate<T: Real>(matrix: &mut [T], vectors: &mut [T], dim: usize, p: usize, q:
 }
 
 #[inline(always)]
-fn rotate_pair<T: Real>(values: &mut [T], p: usize, q: usize, cosine: T, sine: T) {
+fn rotate_pair(values: &mut [f64], p: usize, q: usize, cosine: f64, sine: f64) {
     let (at_p, at_q) = (values[p], values[q]);
     values[p] = cosine * at_p - sine * at_q;
     values[q] = sine * at_p + cosine * at_q;
@@ -97,49 +87,30 @@ fn rotate_pair<T: Real>(values: &mut [T], p: usize, q: usize, cosine: T, sine: T
 /// The eigenvalues of a symmetric positive semidefinite matrix, largest first, and their eigenvectors as columns. Rows
 /// and columns of zeros at the end of the matrix change no other eigenpair.
 #[inline(always)]
-pub(crate) fn eigenpairs<T: Real, const M: usize>(
-    mut matrix: SMatrix<T, M, M>,
-) -> (SVector<T, M>, SMatrix<T, M, M>) {
-    let mut vectors = SMatrix::<T, M, M>::zeros();
+pub(crate) fn eigenpairs<const M: usize>(
+    mut matrix: SMatrix<f64, M, M>,
+) -> (SVector<f64, M>, SMatrix<f64, M, M>) {
+    let mut vectors = SMatrix::<f64, M, M>::zeros();
     // The matrix is symmetric, so that the order of rows and columns does not matter; rows of vectors become columns.
     diagonalize(matrix.as_mut_slice(), vectors.as_mut_slice(), M);
     let mut values = matrix.diagonal();
     for j in 0..M {
         for other in j + 1..M {
-            let is_greater = values[other].simd_gt(values[j]);
-            swap_where(is_greater, values.as_mut_slice(), j, other);
-            for row in 0..M {
-                swap_where(
-                    is_greater,
-                    vectors.as_mut_slice(),
-                    j * M + row,
-                    other * M + row,
-                );
+            if values[other] > values[j] {
+                values.swap_rows(j, other);
+                vectors.swap_columns(j, other);
             }
         }
     }
     (values, vectors)
 }
 
-/// Swaps two of `values` where the condition holds.
-#[inline(always)]
-fn swap_where<T: Real>(condition: T::SimdBool, values: &mut [T], i: usize, j: usize) {
-    let (at_i, at_j) = (values[i], values[j]);
-    values[i] = at_j.select(condition, at_i);
-    values[j] = at_i.select(condition, at_j);
-}
-
 /// The eigenvalues of a symmetric positive semidefinite matrix, largest first, to six digits; their sum is exact.
 #[inline(always)]
-pub(crate) fn eigenvalues<T: Real, const N: usize>(mut matrix: SMatrix<T, N, N>) -> SVector<T, N> {
+pub(crate) fn eigenvalues<const N: usize>(mut matrix: SMatrix<f64, N, N>) -> SVector<f64, N> {
     diagonalize(matrix.as_mut_slice(), &mut [], N);
     let mut values = matrix.diagonal();
-    for j in 0..N {
-        for other in j + 1..N {
-            let (a, b) = (values[j], values[other]);
-            (values[j], values[other]) = (a.simd_max(b), a.simd_min(b));
-        }
-    }
+    values.as_mut_slice().sort_by(|a, b| b.total_cmp(a));
     values
 }
 

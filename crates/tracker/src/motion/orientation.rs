@@ -9,9 +9,13 @@
 
 use std::f64::consts::PI;
 
+use crate::image::frame::Frame;
 use crate::image::warp::Rotation;
+use crate::learn::Localization;
 use crate::motion::particles::Particle;
 use crate::params::table::{Params, Search};
+use crate::state::State;
+use crate::workspace::Scratch;
 
 /// How many angles are tried: one either way. The last angle itself does not tell which way to turn.
 pub(crate) const HYPOTHESES: usize = 2;
@@ -20,7 +24,7 @@ const STEP: f64 = 6.0;
 /// The share of a measured change that is applied, so that noise evens out.
 const GAIN: f64 = 0.5;
 /// σ of the likelihood of an angle, as a multiple of that of a place: limbs that move make small rotations likely.
-pub(crate) const SIGMA_FACTOR: f64 = 3.0;
+const SIGMA_FACTOR: f64 = 3.0;
 /// Standard deviation of the prior on the angle, in degrees: targets are upright rather than not.
 const PRIOR_STD: f64 = 25.0;
 /// Below this angle, in degrees, the image is not rotated: the features hardly change.
@@ -45,22 +49,28 @@ pub(crate) fn rotation(target: &Particle, angle: f64) -> Option<Rotation> {
     is_notable.then(|| Rotation::about((target.x, target.y), angle))
 }
 
-/// The angles to try, in radians, and the logarithms of their priors; none where that is off or the target, at
-/// `distance` from the first subspace, looks too unlike it.
-pub(crate) fn hypotheses(
-    angle: f64,
-    distance: f64,
-    params: &Params,
-) -> Option<[(f64, f64); HYPOTHESES]> {
-    let step = STEP.to_radians();
-    let log_prior = |angle: f64| -0.5 * (angle / PRIOR_STD.to_radians()).powi(2);
-    let tried = [angle - step, angle + step].map(|angle| (angle, log_prior(angle)));
-    (is_on(params) && distance < MAX_DISTANCE).then_some(tried)
-}
-
-/// `angle` moved towards the [`hypotheses`] by their weights, which sum to 1.
-pub(crate) fn updated(angle: f64, weights: [f64; HYPOTHESES]) -> f64 {
-    let change = (weights[1] - weights[0]) * STEP.to_radians();
-    // Half a turn is as far as there is.
-    (angle + GAIN * change).clamp(-PI, PI)
+impl State {
+    /// The target's rotation in `frame`, in radians: the last one, or moved towards the likelier of two others.
+    pub fn measure_orientation(
+        &self,
+        frame: &Frame,
+        found: &Localization,
+        scratch: &mut Scratch,
+    ) -> f64 {
+        if !is_on(&self.params) || found.first_distance >= MAX_DISTANCE {
+            return self.orientation;
+        }
+        let step = STEP.to_radians();
+        let angles = [self.orientation - step, self.orientation + step];
+        for (view, angle) in scratch.rotated.iter_mut().zip(angles) {
+            view.rotate(frame, found.answer, angle, self);
+        }
+        let log_priors = angles.map(|angle| -0.5 * (angle / PRIOR_STD.to_radians()).powi(2));
+        let (views, sigma) = (&mut scratch.rotated, SIGMA_FACTOR * self.params.sigma);
+        let candidates = &mut scratch.candidates;
+        let weights = candidates.posterior_in_views(found.answer, views, log_priors, sigma, self);
+        let change = (weights[1] - weights[0]) * step;
+        // Half a turn is as far as there is.
+        (self.orientation + GAIN * change).clamp(-PI, PI)
+    }
 }

@@ -3,42 +3,69 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::motion::particles::{Particle, StateBounds};
 use crate::motion::random::normal;
-use crate::params::table::Params;
+use crate::params::table::{Params, Search};
 
-/// Draws N particles into `out` from the previous ones and their weights (at least 0, with the sum 1): multinomial
-/// resampling by weight, then Brownian motion. `sums` is a buffer.
-pub(crate) fn resample(
-    (previous, weights): (&[Particle], &[f64]),
-    params: &Params,
-    bounds: &StateBounds,
-    generator: &mut ChaCha8Rng,
-    sums: &mut Vec<f64>,
-    out: &mut Vec<Particle>,
-) {
-    let mut total = 0.0;
-    sums.clear();
-    sums.extend(weights.iter().map(|weight| {
-        total += weight;
-        total
-    }));
-    out.clear();
-    for _ in 0..params.particles {
-        let draw = generator.random::<f64>() * total;
-        // Rounding can put the draw at the very end.
-        let chosen = sums
-            .partition_point(|&sum| sum <= draw)
-            .min(previous.len() - 1);
-        let mut step = |std: f64| std * normal(generator);
-        let origin = previous[chosen];
-        let moved = Particle {
-            x: origin.x + step(params.motion_std_x),
-            y: origin.y + step(params.motion_std_y),
-            scale: origin.scale + step(params.motion_std_scale),
-        };
-        out.push(bounds.clamp(moved));
+/// The particles of a frame, with their weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Cloud {
+    /// N of them.
+    pub particles: Vec<Particle>,
+    /// One for each particle, at least 0, with the sum 1.
+    pub weights: Vec<f64>,
+}
+
+impl Cloud {
+    /// N particles at `place`, with equal weights; none where the next ones are not drawn from the last.
+    pub fn at(place: Particle, params: &Params) -> Option<Self> {
+        let count = params.particles as usize;
+        (params.search == Search::Resampled).then(|| Self {
+            particles: vec![place; count],
+            weights: vec![1.0 / count as f64; count],
+        })
+    }
+
+    /// Draws N particles into `out`: multinomial resampling by weight, then Brownian motion. `sums` is a buffer.
+    pub fn resample(
+        &self,
+        params: &Params,
+        bounds: &StateBounds,
+        generator: &mut ChaCha8Rng,
+        sums: &mut Vec<f64>,
+        out: &mut Vec<Particle>,
+    ) {
+        let mut total = 0.0;
+        sums.clear();
+        sums.extend(self.weights.iter().map(|weight| {
+            total += weight;
+            total
+        }));
+        out.clear();
+        for _ in 0..params.particles {
+            let draw = generator.random::<f64>() * total;
+            // Rounding can put the draw at the very end.
+            let chosen = sums.partition_point(|&sum| sum <= draw);
+            let origin = self.particles[chosen.min(self.particles.len() - 1)];
+            let mut step = |std: f64| std * normal(generator);
+            let moved = Particle {
+                x: origin.x + step(params.motion_std_x),
+                y: origin.y + step(params.motion_std_y),
+                scale: origin.scale + step(params.motion_std_scale),
+            };
+            out.push(bounds.clamp(moved));
+        }
+    }
+
+    /// Whether the sizes and weights are those of N particles.
+    pub fn is_valid_for(&self, params: &Params) -> bool {
+        let count = params.particles as usize;
+        let total: f64 = self.weights.iter().sum();
+        (self.particles.len(), self.weights.len()) == (count, count)
+            && self.weights.iter().all(|it| (0.0..=1.0).contains(it))
+            && (total - 1.0).abs() < 1e-6
     }
 }
 
@@ -65,17 +92,12 @@ mod tests {
 
     fn proposals(frame: u64, params: &Params) -> Vec<Particle> {
         let mut out = Vec::new();
-        let previous = [particle(60.0), particle(160.0), particle(260.0)];
-        let cloud = (&previous[..], &[0.7, 0.0, 0.3][..]);
+        let cloud = Cloud {
+            particles: [60.0, 160.0, 260.0].map(particle).to_vec(),
+            weights: vec![0.7, 0.0, 0.3],
+        };
         let mut draws = random::generator(params.seed, frame, Draws::Particles);
-        resample(
-            cloud,
-            params,
-            &BOUNDS,
-            &mut draws,
-            &mut Vec::new(),
-            &mut out,
-        );
+        cloud.resample(params, &BOUNDS, &mut draws, &mut Vec::new(), &mut out);
         out
     }
 

@@ -73,7 +73,7 @@ impl SearchContext<'_> {
     }
 
     /// `particle` of the rectified view where it is in the frame.
-    pub fn in_original(&self, particle: Particle) -> Particle {
+    pub fn in_frame(&self, particle: Particle) -> Particle {
         self.rotation.map_or(particle, |rotation| {
             let (x, y) = rotation.to_original((particle.x, particle.y));
             Particle { x, y, ..particle }

@@ -1,4 +1,8 @@
 //! The table of parameters. Validation, the command line's help and the OpenAPI schema are made from it.
+//!
+//! A preset owns the rest: its structure, and the weights of its extensions. Those are fields of [`Params`] too, so that
+//! an ablation can switch each of them off (`bagtrack-eval --set search=resampled`), but no rows of the table: users of
+//! the service choose between two measured trackers, and not among the thousands that their mixtures make.
 
 use serde::{Deserialize, Serialize};
 
@@ -38,12 +42,10 @@ pub struct Parameter {
     pub name: &'static str,
     /// What it means, in the words of the field's documentation.
     pub description: &'static str,
-    /// The Rust type of the field: `u32` and `f64` have a range, enums have choices.
+    /// The Rust type of the field: `u32` and `f64` have a range, the seed is a `u64`.
     pub kind: &'static str,
-    /// The least and the greatest value, both allowed; none for other types than numbers, and for the seed.
+    /// The least and the greatest value, both allowed; none for the seed.
     pub range: Option<(f64, f64)>,
-    /// The names of an enum's values.
-    pub choices: &'static [&'static str],
 }
 
 /// A parameter out of its range.
@@ -58,27 +60,31 @@ pub struct ParamsError {
     pub expected: &'static str,
 }
 
-/// Makes [`Params`], its table and its check of ranges from one list: `name: type [min to max]`.
+/// Makes [`Params`], its table and its check of ranges from two lists of `name: type [min to max]`: the rows of the
+/// table, and what the presets own.
 macro_rules! parameters {
     (@range) => { None };
     (@range $min:literal $max:literal) => { Some(($min as f64, $max as f64)) };
-    ($($(#[doc = $doc:literal])* $name:ident: $kind:ident $([$min:literal to $max:literal])? $({$($choice:literal)*})?;)*) => {
+    (table { $($(#[doc = $doc:literal])* $name:ident: $kind:ident $([$min:literal to $max:literal])?;)* }
+     preset { $($(#[doc = $own_doc:literal])* $own:ident: $own_kind:ident $([$own_min:literal to $own_max:literal])?;)* }) => {
         /// Every parameter of the tracker. Lengths are in pixels of the working image
         /// ([`frame_format`](Self::frame_format)).
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct Params {
             $($(#[doc = $doc])* $(#[doc = concat!("\n\nRange: ", $min, " to ", $max, ".")])? pub $name: $kind,)*
+            $($(#[doc = $own_doc])* $(#[doc = concat!("\n\nRange: ", $own_min, " to ", $own_max, ".")])?
+                #[doc = "\n\nThe preset's own."] pub $own: $own_kind,)*
         }
 
         impl Params {
-            /// Each parameter with its meaning, type and range, in the order of the fields.
+            /// The parameters that users set, with their meaning, type and range, in the order of the fields. The other
+            /// fields are the presets' own.
             pub const TABLE: &'static [Parameter] = &[$(Parameter {
                 name: stringify!($name),
                 description: concat!($($doc),*),
                 kind: stringify!($kind),
                 range: parameters!(@range $($min $max)?),
-                choices: &[$($($choice),*)?],
             }),*];
 
             /// Checks every parameter against its range, and sizes against what they may cost together. NaN is out of
@@ -87,98 +93,102 @@ macro_rules! parameters {
             /// # Errors
             /// The first parameter that is out of its range.
             pub fn validate(&self) -> Result<(), ParamsError> {
-                $($(
-                    let value = f64::from(self.$name);
-                    if !($min as f64..=$max as f64).contains(&value) {
-                        return Err(ParamsError {
-                            name: stringify!($name),
-                            value,
-                            expected: concat!("from ", $min, " to ", $max),
-                        });
-                    }
-                )?)*
-                self.validate_products()
+                let ranges = [
+                    $($((stringify!($name), f64::from(self.$name), $min as f64..=$max as f64,
+                        concat!("from ", $min, " to ", $max)),)?)*
+                    $($((stringify!($own), f64::from(self.$own), $own_min as f64..=$own_max as f64,
+                        concat!("from ", $own_min, " to ", $own_max)),)?)*
+                ];
+                match ranges.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
+                    Some((name, value, _, expected)) => Err(ParamsError { name, value, expected }),
+                    None => self.validate_products(),
+                }
             }
         }
     };
 }
 
 parameters! {
-    /// N, the number of particles (section III-A).
-    particles: u32 [1 to 1000];
-    /// H₁, the width to which a candidate area is resized (section III-B): in pixels, with gradients in cells.
-    patch_width: u32 [4 to 64];
-    /// H₂, the height to which a candidate area is resized (section III-B): in pixels, with gradients in cells.
-    patch_height: u32 [4 to 64];
-    /// n, the number of basis vectors of an affine subspace (equation 1). At most P + 1 of them exist.
-    basis_dim: u32 [1 to 6];
-    /// P, the number of previous tracked patches in a subspace (equation 2).
-    history: u32 [1 to 10];
-    /// K, the number of subspaces in the full bag (equation 3).
-    bag_size: u32 [1 to 32];
-    /// W, the number of frames from one update of the bag to the next (section III-C).
-    update_every: u32 [1 to 1000];
-    /// α, the weight of the distance of origins against that of bases (equation 4).
-    alpha: f64 [0 to 1];
-    /// σ, the distance at which a likelihood has fallen to 1/e (equation 11).
-    sigma: f64 [0.0001 to 100];
-    /// Standard deviation of the Brownian motion along x, in pixels a frame (section III-A).
-    motion_std_x: f64 [0 to 320];
-    /// Standard deviation of the Brownian motion along y, in pixels a frame (section III-A).
-    motion_std_y: f64 [0 to 320];
-    /// Standard deviation of the Brownian motion of the scale, a frame (section III-A). The scale of the first box
-    /// is 1. Searching from the answer it is that of the scale's logarithm.
-    motion_std_scale: f64 [0 to 1];
-
-    /// The first box's √(width · height) in working pixels: the resolution follows the target. Off: 0, a working image
-    /// of 320 pixels on its longer side.
-    target_side: f64 [0 to 256];
-    /// What a candidate area is turned into. Gradients hardly change with the light.
-    features: Features {"gray" "gradients"};
-    /// Where particles are drawn from. The paper: `resampled`.
-    search: Search {"resampled" "answer"};
-    /// Whether a candidate's subspace is its own vector alone, brought to unit length. As one of P + 1 columns a
-    /// candidate hardly counts beside the history that it shares with all others. Then n = 1 for the candidate, and
-    /// its one principal angle is that between its vector and the entry's subspace. Off: false.
-    single_vector_candidate: bool;
-    /// Weight of the mean chroma of a cell beside its gradients. With gradients, in colour. Off: 0.
-    chroma_weight: f64 [0 to 10];
-    /// Weight of the colour histogram (of luma, without colour): the likelihood is multiplied by exp(weight · m), where
-    /// m is the mean over the box of the probability that a pixel's colour is the target's, minus a half. Searching from
-    /// the answer. Off: 0.
-    histogram_weight: f64 [0 to 100];
-    /// The area that is described, as a multiple of the box on each side. The rim of a target tells where it ends.
-    /// Off: 1.
-    context: f64 [0.5 to 3];
-    /// How many vectors of areas beside the target the Mahalanobis metric is made of: what the background has too
-    /// counts less. With `single_vector_candidate`. Off: 0.
-    background_samples: u32 [0 to 256];
-    /// Standard deviation of the prior on the displacement in a frame, in pixels: a look-alike far away loses. Up to
-    /// twice as much for a place that looks more like the first box than the last answer does. Off: 0.
-    displacement_std: f64 [0 to 1000];
-    /// Learning rate of the correlation filter that measures the scale along a pyramid of areas. Off: 0.
-    scale_learning_rate: f64 [0 to 1];
-    /// How many local maxima of the discriminant's dense search particles are drawn around. With gradients. Off: 0.
-    dense_maxima: u32 [0 to 16];
-    /// Log-likelihood penalty of a particle whose box, where it lies beside the last one, looks as it did when the
-    /// target was last seen: nothing has come there. Off: 0.
-    static_penalty: f64 [0 to 100];
-    /// Whether the displacement of the whole image is measured, and half of the particles moved by it. Off: false.
-    global_motion: bool;
-    /// The weight of the first box's subspace in the sum rule (equation 9); it never leaves the bag. Off: 0, an entry
-    /// as any other.
-    pinned_weight: f64 [0 to 100];
-    /// By how many degrees, either way, the first box's image is rotated to augment its subspace. Off: 0.
-    augmentation_angle: f64 [0 to 90];
-    /// The models are updated only while the answer's distance to the first subspace is below this multiple of its
-    /// running mean. Off: 0.
-    update_distance_ratio: f64 [0 to 100];
-    /// Weight of the discriminant, a linear classifier of the target against its surroundings: the likelihood is
-    /// multiplied by exp(weight · score). Off: 0.
-    discriminant_weight: f64 [0 to 100];
-
-    /// Seed of all random draws: the same seed and frames give the same boxes.
-    seed: u64;
+    table {
+        /// N, the number of particles (section III-A).
+        particles: u32 [1 to 1000];
+        /// H₁, the width to which a candidate area is resized (section III-B): in pixels, with `robust` in cells.
+        patch_width: u32 [4 to 64];
+        /// H₂, the height to which a candidate area is resized (section III-B): in pixels, with `robust` in cells.
+        patch_height: u32 [4 to 64];
+        /// n, the number of basis vectors of an affine subspace (equation 1). At most P + 1 of them exist.
+        basis_dim: u32 [1 to 6];
+        /// P, the number of previous tracked patches in a subspace (equation 2).
+        history: u32 [1 to 10];
+        /// K, the number of subspaces in the full bag (equation 3).
+        bag_size: u32 [1 to 32];
+        /// W, the number of frames from one update of the bag to the next (section III-C).
+        update_every: u32 [1 to 1000];
+        /// α, the weight of the distance of origins against that of bases (equation 4).
+        alpha: f64 [0 to 1];
+        /// σ, the distance at which a likelihood has fallen to 1/e (equation 11).
+        sigma: f64 [0.0001 to 100];
+        /// Standard deviation of the Brownian motion along x, in pixels a frame (section III-A).
+        motion_std_x: f64 [0 to 320];
+        /// Standard deviation of the Brownian motion along y, in pixels a frame (section III-A).
+        motion_std_y: f64 [0 to 320];
+        /// Standard deviation of the Brownian motion of the scale, a frame (section III-A). The scale of the first box
+        /// is 1. With `robust` it is that of the scale's logarithm.
+        motion_std_scale: f64 [0 to 1];
+        /// The first box's √(width · height) in working pixels: the resolution follows the target. Off: 0, a working
+        /// image of 320 pixels on its longer side.
+        target_side: f64 [0 to 256];
+        /// How many vectors of areas beside the target the Mahalanobis metric is made of: what the background has too
+        /// counts less. With `robust`. Off: 0.
+        background_samples: u32 [0 to 256];
+        /// Standard deviation of the prior on the displacement in a frame, in pixels: a look-alike far away loses. Up
+        /// to twice as much for a place that looks more like the first box than the last answer does. With `robust`.
+        /// Off: 0.
+        displacement_std: f64 [0 to 1000];
+        /// Seed of all random draws: the same seed and frames give the same boxes.
+        seed: u64;
+    }
+    preset {
+        /// What a candidate area is turned into. Gradients hardly change with the light.
+        features: Features;
+        /// Where particles are drawn from. The paper: `resampled`.
+        search: Search;
+        /// Whether a candidate's subspace is its own vector alone, brought to unit length. As one of P + 1 columns a
+        /// candidate hardly counts beside the history that it shares with all others. Then n = 1 for the candidate, and
+        /// its one principal angle is that between its vector and the entry's subspace. Off: false.
+        single_vector_candidate: bool;
+        /// Weight of the mean chroma of a cell beside its gradients. With gradients, in colour. Off: 0.
+        chroma_weight: f64 [0 to 10];
+        /// Weight of the colour histogram (of luma, without colour): the likelihood is multiplied by exp(weight · m),
+        /// where m is the mean over the box of the probability that a pixel's colour is the target's, minus a half.
+        /// Searching from the answer. Off: 0.
+        histogram_weight: f64 [0 to 100];
+        /// The area that is described, as a multiple of the box on each side. The rim of a target tells where it ends.
+        /// Off: 1.
+        context: f64 [0.5 to 3];
+        /// Learning rate of the correlation filter that measures the scale along a pyramid of areas. Off: 0.
+        scale_learning_rate: f64 [0 to 1];
+        /// How many local maxima of the discriminant's dense search particles are drawn around. With gradients.
+        /// Off: 0.
+        dense_maxima: u32 [0 to 16];
+        /// Log-likelihood penalty of a particle whose box, where it lies beside the last one, looks as it did when the
+        /// target was last seen: nothing has come there. Off: 0.
+        static_penalty: f64 [0 to 100];
+        /// Whether the displacement of the whole image is measured, and half of the particles moved by it.
+        /// Off: false.
+        global_motion: bool;
+        /// The weight of the first box's subspace in the sum rule (equation 9); it never leaves the bag. Off: 0, an
+        /// entry as any other.
+        pinned_weight: f64 [0 to 100];
+        /// By how many degrees, either way, the first box's image is rotated to augment its subspace. Off: 0.
+        augmentation_angle: f64 [0 to 90];
+        /// The models are updated only while the answer's distance to the first subspace is below this multiple of its
+        /// running mean. Off: 0.
+        update_distance_ratio: f64 [0 to 100];
+        /// Weight of the discriminant, a linear classifier of the target against its surroundings: the likelihood is
+        /// multiplied by exp(weight · score). Off: 0.
+        discriminant_weight: f64 [0 to 100];
+    }
 }
 
 impl Params {
@@ -195,32 +205,6 @@ impl Params {
     pub fn feature_len(&self) -> usize {
         let cells = self.patch_width as usize * self.patch_height as usize;
         cells * self.features.channels()
-    }
-
-    /// γ (equation 5): one over the greatest squared distance of two feature vectors. Two unit vectors are at most 2
-    /// apart.
-    pub(crate) fn gamma(&self) -> f64 {
-        if self.single_vector_candidate {
-            0.25
-        } else {
-            1.0 / self.feature_len() as f64
-        }
-    }
-
-    /// How many particles are kept from one frame to the next.
-    pub(crate) fn stored_particles(&self) -> usize {
-        match self.search {
-            Search::Resampled => self.particles as usize,
-            Search::Answer => 0,
-        }
-    }
-
-    /// How many samples the background's metric is made of.
-    pub(crate) fn metric_samples(&self) -> usize {
-        match self.single_vector_candidate {
-            true => self.background_samples as usize,
-            false => 0,
-        }
     }
 
     /// How many of the bag's entries are pinned.

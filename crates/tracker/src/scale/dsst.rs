@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::features::quantized::Quantized;
 use crate::linalg::vector_ops;
 use crate::params::table::Params;
-use crate::scale::maximum::Maximum;
+use crate::scale::measure::Maximum;
 use crate::scale::pyramid::{self, FOURIER, FREQUENCIES, LEVELS, MIDDLE, STEP, Scratch};
 use crate::weights;
 
@@ -157,7 +157,7 @@ fn respond_simd<S: Simd>(simd: S, filter: &ScaleFilter, scratch: &mut Scratch) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scale::maximum::{FULL_RESPONSE, MIN_RESPONSE};
+    use crate::scale::measure::{FULL_RESPONSE, MIN_RESPONSE};
     use crate::scale::pyramid::RESPONSE_STD;
     use std::f64::consts::TAU;
 

@@ -9,8 +9,10 @@ use std::sync::LazyLock;
 
 use pulp::Simd;
 
+use crate::features::extractor::Extractor;
+use crate::image::frame::Frame;
 use crate::linalg::{combinations, vector_ops};
-use crate::motion::particles::Particle;
+use crate::motion::particles::{Particle, StateBounds};
 use crate::params::table::Params;
 
 /// Areas of a pyramid, and the logarithm of the ratio of two neighbours: from 1 / 1.27 to 1.27, several times what a
@@ -52,7 +54,7 @@ pub(crate) fn params(params: &Params) -> Params {
 }
 
 /// Writes the areas of the pyramid around `center` to `out`, smallest first.
-pub(crate) fn areas(center: &Particle, out: &mut Vec<Particle>) {
+fn areas(center: &Particle, out: &mut Vec<Particle>) {
     out.clear();
     out.extend((0..LEVELS).map(|level| Particle {
         scale: center.scale * (STEP * (level as f64 - MIDDLE as f64)).exp(),
@@ -107,6 +109,20 @@ pub(crate) static FOURIER: LazyLock<Fourier> = LazyLock::new(|| {
 });
 
 impl Scratch {
+    /// Takes the feature vectors of the pyramid around `center`.
+    pub fn describe(
+        &mut self,
+        image: &Frame,
+        center: &Particle,
+        extractor: &mut Extractor,
+        bounds: &StateBounds,
+        tracker: &Params,
+    ) {
+        areas(center, &mut self.areas);
+        let (areas, features) = (&self.areas, &mut self.features);
+        extractor.features(image, areas, bounds, &params(tracker), features);
+    }
+
     /// Scales the pyramid's vectors to length 1 and transforms them along the scale. Returns D.
     #[inline(always)]
     pub fn transform<S: Simd>(&mut self, simd: S) -> usize {

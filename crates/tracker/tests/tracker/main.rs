@@ -3,12 +3,12 @@
 mod allocation;
 mod color;
 mod degenerate;
+mod diagnostics;
 mod evaluation;
 mod flow;
 mod memory;
 mod params;
 mod rect;
 mod robust;
-mod seen;
 mod snapshot;
 mod textbook_step;

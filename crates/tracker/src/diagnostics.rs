@@ -1,13 +1,13 @@
-//! What a step saw, for people who want to look at it. A step that is not asked copies nothing.
+//! What a step's answer was chosen from, for people who want to look at it. A step that is not asked copies nothing.
 
 use crate::candidates::Candidates;
 use crate::image::rect::Rect;
 use crate::state::State;
 use crate::weights;
 
-/// What one step saw.
+/// What one step's answer was chosen from.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Seen {
+pub struct Diagnostics {
     /// The particles that the answer was chosen from, in the order in which they were drawn: the box of each, in pixels
     /// of the uploaded frame, and its weight. Weights are at least 0 and sum to 1.
     pub particles: Vec<(Rect, f64)>,
@@ -16,8 +16,8 @@ pub struct Seen {
     pub votes: Vec<f64>,
 }
 
-impl Seen {
-    /// What a step with these candidates saw.
+impl Diagnostics {
+    /// Those of a step with these candidates.
     pub(crate) fn of(state: &State, candidates: &Candidates) -> Self {
         let boxes = candidates.particles.iter();
         let boxes = boxes.map(|particle| state.target_of(particle));

@@ -1,4 +1,4 @@
-//! The hypotheses of a frame: particles are proposed, and weighed by all that is known of them.
+//! (A) Particles are proposed, and weighed by all that is known of them.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -6,9 +6,8 @@ use crate::appearance::color_histogram::ColorPixels;
 use crate::features::extractor::Extractor;
 use crate::image::frame::Frame;
 use crate::linalg::scratch::clear_and_reserve;
+use crate::motion::orientation;
 use crate::motion::search::{self, SearchContext};
-use crate::motion::{orientation, resampling};
-use crate::params::table::Search;
 use crate::state::State;
 use crate::workspace::Scratch;
 
@@ -24,17 +23,15 @@ impl State {
         let (bounds, params, radius) = (&self.bounds, &self.params, search.window_radius());
         scratch.candidates.begin(self, orientation::HYPOTHESES);
         clear_and_reserve(&mut scratch.log_priors, search::max_count(params));
-        clear_and_reserve(&mut scratch.original, search::max_count(params));
+        clear_and_reserve(&mut scratch.in_frame, search::max_count(params));
         let extractor = &mut scratch.extractor;
         let particles = &mut scratch.candidates.particles;
-        match params.search {
-            Search::Resampled => {
-                let cloud = (&self.particles[..], &self.weights[..]);
-                let sums = &mut scratch.sums;
-                resampling::resample(cloud, params, bounds, draws, sums, particles);
+        match &self.cloud {
+            Some(cloud) => {
+                cloud.resample(params, bounds, draws, &mut scratch.sums, particles);
                 extractor.compute_channels(image, particles, radius, bounds, params);
             }
-            Search::Answer => {
+            None => {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut scratch.dense_search;
                 let foreground = &mut scratch.foreground;
@@ -55,7 +52,7 @@ impl State {
         scratch: &mut Scratch,
     ) {
         if self.params.static_penalty > 0.0 {
-            let displaced = search.in_original(search.displaced());
+            let displaced = search.in_frame(search.displaced());
             let test = &mut scratch.change_test;
             test.load(frame, &self.answer, &self.bounds);
             test.compare(
@@ -69,12 +66,19 @@ impl State {
 
     /// (B) and (D) Describes, compares and weighs the particles that were drawn since the last time, in `image`.
     /// Returns the most likely one of all.
-    pub fn weigh(&self, image: &Frame, search: &SearchContext<'_>, scratch: &mut Scratch) -> usize {
+    pub fn weigh_particles(
+        &self,
+        image: &Frame,
+        search: &SearchContext<'_>,
+        scratch: &mut Scratch,
+    ) -> usize {
         scratch
             .candidates
             .describe_and_compare(image, &mut scratch.extractor, self);
         self.push_log_priors(search, scratch);
-        scratch.candidates.weigh(&scratch.log_priors, &self.params)
+        scratch
+            .candidates
+            .posterior(&scratch.log_priors, &self.params)
     }
 
     /// The logarithms of the priors of the new particles: of their displacement, and of whether anything has come
@@ -86,18 +90,18 @@ impl State {
         let (foreground, scale) = (&scratch.foreground, self.answer.scale);
         let last = self.update_gate.last_distance;
         let log_priors = new.iter().enumerate().map(|(index, particle)| {
-            let distance = scratch.candidates.distances_of(known + index)[0];
+            let distance = scratch.candidates.first_distance_of(known + index);
             let prior_width = search::prior_width(last, distance);
             search.log_prior(particle, prior_width)
                 + weight * foreground.mean(particle, scale, &self.bounds)
         });
         scratch.log_priors.extend(log_priors);
         if self.params.static_penalty > 0.0 {
-            scratch.original.clear();
-            let original = new.iter().map(|&particle| search.in_original(particle));
-            scratch.original.extend(original);
+            scratch.in_frame.clear();
+            let in_frame = new.iter().map(|&particle| search.in_frame(particle));
+            scratch.in_frame.extend(in_frame);
             scratch.change_test.penalize(
-                &scratch.original,
+                &scratch.in_frame,
                 &self.bounds,
                 self.params.static_penalty,
                 &mut scratch.log_priors[known..],

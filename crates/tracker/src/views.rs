@@ -1,6 +1,6 @@
-//! What is seen of a frame: the displacement of the image, where the target is searched, and in which pixels.
+//! The views of a frame: the displacement of the image, where the target is searched, and in which pixels.
 
-use crate::appearance::background::{self, Background};
+use crate::appearance::background;
 use crate::features::extractor::Extractor;
 use crate::image::downsample::downsampled;
 use crate::image::frame::Frame;
@@ -13,7 +13,7 @@ use crate::workspace::{Scratch, ViewBuffers};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Views<'a> {
     /// The frame, in larger pixels where the target is large.
-    pub original: &'a Frame,
+    pub working: &'a Frame,
     /// The same with a rotated target upright, within the window of the search.
     pub rectified: &'a Frame,
 }
@@ -30,7 +30,8 @@ impl State {
     /// The search in frame `number`, whose image is displaced by so much.
     pub fn search(&self, number: u64, displacement: (f64, f64)) -> SearchContext<'_> {
         let rotation = orientation::rotation(&self.answer, self.orientation);
-        let samples_radius = match Background::wanted(number, &self.params) {
+        let appearance = self.appearance.model();
+        let samples_radius = match appearance.background_wanted(number, &self.params) {
             0 => 0.0,
             _ => background::radius(&self.answer, &self.bounds),
         };
@@ -54,22 +55,19 @@ impl State {
         search: &SearchContext<'_>,
         buffers: &'a mut ViewBuffers,
     ) -> Views<'a> {
-        let original = self.original(frame, &mut buffers.downsampled);
+        let working = self.working_view(frame, &mut buffers.downsampled);
         let memory = &mut buffers.rectified;
-        let rectified = search.rotation.map_or(original, |rotation| {
+        let rectified = search.rotation.map_or(working, |rotation| {
             let radius = search.window_radius();
             let window = Extractor::window(&[self.answer], radius, &self.bounds, &self.params);
-            *memory = rotation.apply(original, &window, std::mem::take(memory));
+            *memory = rotation.apply(working, &window, std::mem::take(memory));
             memory
         });
-        Views {
-            original,
-            rectified,
-        }
+        Views { working, rectified }
     }
 
     /// `frame`, or the frame in larger pixels where the target is large.
-    pub fn original<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
+    pub fn working_view<'a>(&self, frame: &'a Frame, memory: &'a mut Frame) -> &'a Frame {
         match Extractor::downsample_factor(&self.answer, &self.bounds, &self.params) {
             1 => frame,
             factor => {

@@ -1,17 +1,19 @@
-//! What a step saw, told to those who ask.
+//! Diagnostics of a step, for those who ask.
 
 use bagtrack_testing::scene::{frame, target};
 use bagtrack_tracker::{Preset, Tracker};
 
 #[test]
-fn a_step_that_tells_what_it_saw_answers_like_one_that_does_not() {
+fn a_step_with_diagnostics_answers_like_one_without() {
     for preset in [Preset::Robust, Preset::Paper] {
         let params = preset.params();
         let mut plain = Tracker::new(&frame(0), target(0), params.clone()).expect("a box inside");
         let mut seeing = plain.clone();
         for t in 1..=30 {
             let expected = plain.step(&frame(t)).expect("frames of one size");
-            let (estimate, seen) = seeing.step_seeing(&frame(t)).expect("frames of one size");
+            let (estimate, seen) = seeing
+                .step_with_diagnostics(&frame(t))
+                .expect("frames of one size");
             assert_eq!(estimate, expected, "frame {t}");
             let weights: Vec<f64> = seen.particles.iter().map(|(_, weight)| *weight).collect();
             assert!(weights.len() >= 20 && weights.iter().all(|weight| *weight >= 0.0));

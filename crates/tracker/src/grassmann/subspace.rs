@@ -1,20 +1,27 @@
 //! (B) Affine subspaces: an origin and an orthonormal basis (equation 1).
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 use pulp::{Arch, Simd};
 use serde::{Deserialize, Serialize};
 
 use crate::linalg::jacobi;
+use crate::params::table::Params;
 
 /// A direction counts when its singular value is above this share of the largest. Below it, single-precision gray
 /// values say nothing: one gray step in one pixel of one of six patches is some 0.0001.
 pub const RANK_TOLERANCE: f64 = 1e-5;
+
+/// The greatest difference of UᵀU from the identity that single precision leaves.
+const ORTHONORMAL: f64 = 1e-3;
 
 /// The most vectors that a subspace is made of: P + 1.
 pub(crate) const MAX_VECTORS: usize = 11;
 
 /// The Gram matrix of up to [`MAX_VECTORS`] vectors, with zeros for those that there are not.
 pub(crate) type Gram = SMatrix<f64, MAX_VECTORS, MAX_VECTORS>;
+
+/// A number for each of them.
+type Weights = SVector<f64, MAX_VECTORS>;
 
 /// An affine subspace A = {μ, U} (equation 1) of the space of feature vectors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -56,6 +63,20 @@ impl AffineSubspace {
     pub fn dim(&self) -> usize {
         self.basis.len() / self.mean.len().max(1)
     }
+
+    /// Whether this may be a subspace of a tracker with `params`: of its sizes, with orthonormal columns.
+    pub(crate) fn is_valid_for(&self, params: &Params) -> bool {
+        let (len, dim) = (params.feature_len(), self.dim());
+        let has_sizes = self.mean.len() == len
+            && self.basis.len().is_multiple_of(len)
+            && dim <= params.basis_dim as usize;
+        has_sizes && {
+            let gram = gram(&self.basis, len);
+            gram.view((0, 0), (dim, dim))
+                .into_owned()
+                .is_identity(ORTHONORMAL)
+        }
+    }
 }
 
 /// Makes `subspace` that [`of`](AffineSubspace::of) vectors of length `len`, one after the other, in its present memory.
@@ -71,18 +92,17 @@ pub(crate) fn fit_simd<S: Simd>(
     let AffineSubspace { mean, basis } = subspace;
     let share = len as f64 / vectors.len() as f64;
     mean.resize(len, 0.0);
-    combine(vectors, |_| share, mean);
+    combine(vectors, &Weights::repeat(share), mean);
 
     // U = V W S⁻¹ with the eigenpairs (S², W) of the Gram matrix VᵀV.
-    let (values, weights) = jacobi::eigenpairs(gram(vectors, len));
+    let (values, w) = jacobi::eigenpairs(gram(vectors, len));
     basis.clear();
     basis.reserve_exact(len * basis_dim);
     let dim = dominant(values.iter().copied(), basis_dim);
     basis.resize(len * dim, 0.0);
     let columns = basis.chunks_exact_mut(len);
     for ((place, value), column) in values.iter().enumerate().zip(columns) {
-        let weight = |index| weights[(index, place)] / value.sqrt();
-        combine(vectors, weight, column);
+        combine(vectors, &(w.column(place) / value.sqrt()), column);
     }
 }
 
@@ -115,40 +135,20 @@ pub(crate) fn gram(vectors: &[f32], len: usize) -> Gram {
     gram
 }
 
-/// The inner product, summed in double precision in eight parts so that the loop vectorises.
+/// The inner product, in double precision.
 #[inline(always)]
-pub(crate) fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let mut parts = [0.0_f64; 8];
-    let (a_chunks, a_rest) = a.as_chunks::<8>();
-    let (b_chunks, b_rest) = b.as_chunks::<8>();
-    for (x, y) in a_chunks.iter().zip(b_chunks) {
-        for lane in 0..8 {
-            parts[lane] += f64::from(x[lane]) * f64::from(y[lane]);
-        }
-    }
-    let rest = a_rest.iter().zip(b_rest);
-    parts.iter().sum::<f64>()
-        + rest
-            .map(|(&x, &y)| f64::from(x) * f64::from(y))
-            .sum::<f64>()
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(&x, &y)| f64::from(x) * f64::from(y)).sum()
 }
 
-/// The sum of vectors, each with its weight, into `out`; summed in double precision.
+/// The sum of vectors, each with its weight, into `out`; in double precision.
 #[inline(always)]
-fn combine(vectors: &[f32], weight: impl Fn(usize) -> f64, out: &mut [f32]) {
-    const BLOCK: usize = 64;
+fn combine(vectors: &[f32], weights: &Weights, out: &mut [f32]) {
     let len = out.len();
-    for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-        let mut sums = [0.0; BLOCK];
-        let sums = &mut sums[..out.len()];
-        for (index, vector) in vectors.chunks_exact(len).enumerate() {
-            let weight = weight(index);
-            for (sum, &value) in sums.iter_mut().zip(&vector[block * BLOCK..]) {
-                *sum += weight * f64::from(value);
-            }
-        }
-        for (out, &sum) in out.iter_mut().zip(sums.iter()) {
-            *out = sum as f32;
-        }
+    for (i, out) in out.iter_mut().enumerate() {
+        let values = vectors[i..].iter().step_by(len).zip(weights.iter());
+        let terms = values.map(|(&value, weight)| weight * f64::from(value));
+        *out = terms.sum::<f64>() as f32;
     }
 }
