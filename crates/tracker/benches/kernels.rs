@@ -158,7 +158,7 @@ fn eigen<const M: usize>() {
 
 #[pulp::with_simd(angles_of = Arch::new())]
 #[inline(always)]
-fn angles_simd<S: Simd>(_: S, out: &mut [acos::Lanes], cosines: &[acos::Lanes]) {
+fn angles_simd<S: Simd>(_: S, out: &mut [[f64; acos::LANES]], cosines: &[[f64; acos::LANES]]) {
     for (out, cosines) in out.iter_mut().zip(cosines) {
         *out = acos::squared_angles(cosines);
     }
