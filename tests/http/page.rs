@@ -33,7 +33,7 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
         bytes += text.len();
         open.extend(named(&path, &text));
     }
-    assert_eq!(seen.len(), 17, "{seen:?}");
+    assert_eq!(seen.len(), 23, "{seen:?}");
     assert!(bytes < 150_000, "{bytes}");
     expect_problem(app.get("/page/none.js").await, "route-not-found").await;
 }

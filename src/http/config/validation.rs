@@ -31,79 +31,57 @@ impl Config {
         };
         let positive = "at least 1";
         let duration = "between 1ms and 1 year";
-        let checks = [
-            (
-                "workers",
-                self.workers.is_none_or(|n| semaphore.contains(&n)),
-                positive,
-            ),
-            ("queue", semaphore.contains(&self.queue), positive),
-            ("max-sessions", self.max_sessions >= 1, positive),
-            (
-                "session-queue",
-                semaphore.contains(&self.session_queue),
-                positive,
-            ),
-            (
-                "session-idle",
-                moment.contains(&self.session_idle),
-                duration,
-            ),
-            (
-                "session-first",
-                moment.contains(&self.session_first),
-                duration,
-            ),
-            ("max-body-bytes", self.max_body_bytes >= 1, positive),
+        let year = "at most 1 year";
+        let semaphores = [
+            ("workers", self.workers.unwrap_or(1)),
+            ("queue", self.queue),
+            ("session-queue", self.session_queue),
+            ("max-connections", self.max_connections),
+        ];
+        let semaphores = semaphores.map(|(flag, n)| (flag, semaphore.contains(&n), positive));
+        let counts = [
+            ("max-sessions", self.max_sessions >= 1),
+            ("max-body-bytes", self.max_body_bytes >= 1),
+            ("max-frames", self.max_frames >= 1),
+            ("max-frame-bytes", self.max_frame_bytes >= 1),
+            ("max-frame-side", self.max_frame_side >= 1),
+            ("max-frame-pixels", self.max_frame_pixels >= 1),
+            ("max-frame-memory", self.max_frame_memory >= 1),
+        ];
+        let counts = counts.map(|(flag, holds)| (flag, holds, positive));
+        let times = [
+            ("session-idle", self.session_idle),
+            ("session-first", self.session_first),
+            ("header-timeout", self.header_timeout),
+            ("body-timeout", self.body_timeout),
+            ("work-timeout", self.work_timeout),
+        ];
+        let times = times.map(|(flag, time)| (flag, moment.contains(&time), duration));
+        let others = [
             (
                 "max-upload-bytes",
                 uploads.contains(&self.max_upload_bytes),
                 "at least max-body-bytes, at most 4 TiB",
-            ),
-            ("max-frames", self.max_frames >= 1, positive),
-            ("max-frame-bytes", self.max_frame_bytes >= 1, positive),
-            ("max-frame-side", self.max_frame_side >= 1, positive),
-            ("max-frame-pixels", self.max_frame_pixels >= 1, positive),
-            ("max-frame-memory", self.max_frame_memory >= 1, positive),
-            (
-                "max-connections",
-                semaphore.contains(&self.max_connections),
-                positive,
             ),
             (
                 "cors-origins",
                 self.cors_origins.iter().all(is_origin),
                 "origins like https://example.org, or *",
             ),
-            (
-                "header-timeout",
-                moment.contains(&self.header_timeout),
-                duration,
-            ),
-            (
-                "body-timeout",
-                moment.contains(&self.body_timeout),
-                duration,
-            ),
-            (
-                "work-timeout",
-                moment.contains(&self.work_timeout),
-                duration,
-            ),
-            (
-                "shutdown-delay",
-                self.shutdown_delay <= *moment.end(),
-                "at most 1 year",
-            ),
+            ("shutdown-delay", self.shutdown_delay <= *moment.end(), year),
             (
                 "shutdown-timeout",
                 self.shutdown_timeout <= *moment.end(),
-                "at most 1 year",
+                year,
             ),
         ];
+        let checks = semaphores
+            .into_iter()
+            .chain(counts)
+            .chain(times)
+            .chain(others);
         let limits = self.limits.checks(&moment, self.max_body_bytes);
         match checks
-            .into_iter()
             .chain(limits)
             .chain(self.store.checks(&moment))
             .find(|(_, holds, _)| !holds)

@@ -94,13 +94,7 @@ impl SessionStream {
     }
 
     async fn exchange(&mut self, socket: &mut Socket, counts: &mut Counts) -> Result<End, Error> {
-        let next = self.stand.next;
-        self.send(socket, &Hello { next }).await?;
-        for estimates in std::mem::take(&mut self.stand.stored) {
-            let answer = self.answer(&estimates, 0, true);
-            let answer = answer.with_checkpoint(self.stand.checkpoint);
-            self.send(socket, &answer).await?;
-        }
+        self.greet(socket).await?;
         let work = self.work.clone();
         let mut header = Ok(FrameHeader::default());
         let mut answering: Option<Answering> = None;
@@ -121,42 +115,15 @@ impl SessionStream {
             tokio::select! {
                 message = socket.next(), if may_come => {
                     is_heard = true;
-                    match message {
-                        None | Some(Ok(Message::Close(_))) => return Ok(End::Gone),
-                        Some(Ok(Message::Text(text))) => {
-                            drop(socket.get_mut().take_charge());
-                            header = FrameHeader::parse(&text);
-                        }
-                        Some(Ok(Message::Binary(file))) => {
-                            let header = std::mem::replace(&mut header, Ok(FrameHeader::default()));
-                            let charge = socket.get_mut().take_charge();
-                            let arrived = header.and_then(|header| self.arrived(header, file, charge));
-                            work.waiting().push(arrived);
-                        }
-                        Some(Ok(_)) => {}
-                        Some(Err(error)) => return Ok(End::Problem(unreadable(&error))),
+                    if let Some(end) = self.read(socket, message, &mut header) {
+                        return Ok(end);
                     }
                 }
                 done = wait_for(&mut answering) => {
                     answering = None;
-                    let Some(Done { answer, skipped }) = done else { continue };
-                    if work.place.is_replaced() {
-                        return Ok(End::Replaced);
-                    }
-                    counts.skipped += skipped;
-                    match answer {
-                        Ok(Given { estimates, replayed, seen, warnings, checkpoint }) => {
-                            counts.answered += 1;
-                            let answer = self.answer(&estimates, skipped, replayed);
-                            let answer = answer.with_seen(seen).with_checkpoint(checkpoint);
-                            let answer = answer.with_warnings(warnings);
-                            self.send(socket, &answer).await?;
-                        }
-                        Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
-                        Err(problem) => {
-                            counts.refused += 1;
-                            self.send_problem(socket, &problem).await?;
-                        }
+                    let Some(done) = done else { continue };
+                    if let Some(end) = self.deliver(socket, done, counts).await? {
+                        return Ok(end);
                     }
                 }
                 _ = pings.tick() => {
@@ -177,6 +144,73 @@ impl SessionStream {
                 () = self.connection.ending(), if !is_ending => is_ending = true,
             }
         }
+    }
+
+    /// Tells the number of the next frame, and the stored answers that were asked for.
+    async fn greet(&mut self, socket: &mut Socket) -> Result<(), Error> {
+        let next = self.stand.next;
+        self.send(socket, &Hello { next }).await?;
+        for estimates in std::mem::take(&mut self.stand.stored) {
+            let answer = self.answer(&estimates, 0, true);
+            let answer = answer.with_checkpoint(self.stand.checkpoint);
+            self.send(socket, &answer).await?;
+        }
+        Ok(())
+    }
+
+    /// Takes a message; tells whether it ends the stream. `header` is what was said of the next frame.
+    fn read(
+        &self,
+        socket: &mut Socket,
+        message: Option<Result<Message, Error>>,
+        header: &mut Result<FrameHeader, Problem>,
+    ) -> Option<End> {
+        match message {
+            None | Some(Ok(Message::Close(_))) => return Some(End::Gone),
+            Some(Ok(Message::Text(text))) => {
+                drop(socket.get_mut().take_charge());
+                *header = FrameHeader::parse(&text);
+            }
+            Some(Ok(Message::Binary(file))) => {
+                let header = std::mem::replace(header, Ok(FrameHeader::default()));
+                let charge = socket.get_mut().take_charge();
+                let arrived = header.and_then(|header| self.arrived(header, file, charge));
+                self.work.waiting().push(arrived);
+            }
+            Some(Ok(_)) => {}
+            Some(Err(error)) => return Some(End::Problem(unreadable(&error))),
+        }
+        None
+    }
+
+    /// Sends what came of a frame; tells whether it ends the stream.
+    async fn deliver(
+        &mut self,
+        socket: &mut Socket,
+        Done { answer, skipped }: Done,
+        counts: &mut Counts,
+    ) -> Result<Option<End>, Error> {
+        if self.work.place.is_replaced() {
+            return Ok(Some(End::Replaced));
+        }
+        counts.skipped += skipped;
+        match answer {
+            Ok(given) => {
+                counts.answered += 1;
+                let answer = self.answer(&given.estimates, skipped, given.replayed);
+                let answer = answer
+                    .with_seen(given.seen)
+                    .with_checkpoint(given.checkpoint);
+                self.send(socket, &answer.with_warnings(given.warnings))
+                    .await?;
+            }
+            Err(problem) if ends_stream(problem.kind()) => return Ok(Some(End::Problem(problem))),
+            Err(problem) => {
+                counts.refused += 1;
+                self.send_problem(socket, &problem).await?;
+            }
+        }
+        Ok(None)
     }
 
     /// A frame with the memory that it takes.

@@ -48,7 +48,7 @@ pub fn tracked(dir: &Path, first: bagtrack_tracker::Rect, params: Params) -> Vec
     let format = |size| params.frame_format(size, &first);
     let frame = |path| decode_to(&read(path), &limits, &format).expect("a frame can be decoded");
     let mut tracker =
-        Tracker::new(&frame(&frames[0]), first, params).expect("the box is in the frame");
+        Tracker::new(&frame(&frames[0]), first, params.clone()).expect("the box is in the frame");
     let mut answers = vec![tracker.estimate()];
     for path in &frames[1..] {
         answers.push(tracker.step(&frame(path)).expect("frames of one size"));
