@@ -145,6 +145,21 @@ mod tests {
         assert!(!passes(0.6, WARM_UP) && !passes(0.1, 500));
     }
 
+    /// A walker in full view who turned away was lost, and the box stayed behind. A sign that covered a car had the same
+    /// score, and would have taken the box along.
+    #[test]
+    fn a_doubted_target_is_followed_and_an_occluder_is_not() {
+        let params = Preset::Robust.params();
+        let gate = UpdateGate {
+            mean_distance: 0.4,
+            ..UpdateGate::default()
+        };
+        assert!(gate.is_lost(Some(0.25), 0.45, false, 1.0, &params));
+        assert!(gate.may_follow(Some(0.25), 0.45));
+        assert!(!gate.may_follow(Some(0.25), 0.6));
+        assert!(!gate.may_follow(Some(0.1), 0.45) && !gate.may_follow(None, 0.45));
+    }
+
     /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.
     #[test]
     fn a_narrow_search_recognises_more_easily_than_a_wide_one() {
