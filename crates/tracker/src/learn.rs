@@ -26,15 +26,25 @@ pub(crate) struct Localization {
 }
 
 impl State {
-    /// Keeps what the next frame starts from.
-    pub fn remember(&mut self, found: &Localization, is_lost: bool, scratch: &Scratch) {
+    /// Keeps what the next frame starts from. The particles speak for the box of a target that `is_followed`, which may
+    /// be lost all the same.
+    pub fn remember(
+        &mut self,
+        found: &Localization,
+        is_lost: bool,
+        is_followed: bool,
+        scratch: &Scratch,
+    ) {
         self.answer = found.answer;
         if let Some(cloud) = &mut self.cloud {
             cloud.particles.clone_from(&scratch.candidates.particles);
             cloud.weights.clone_from(&scratch.candidates.weights);
         }
         if is_lost {
-            self.frames_lost = self.frames_lost.saturating_add(1);
+            self.frames_lost = match is_followed {
+                true => self.frames_lost.saturating_sub(1),
+                false => self.frames_lost.saturating_add(1),
+            };
             // A target that comes back is looked for upright.
             self.orientation = 0.0;
         } else {

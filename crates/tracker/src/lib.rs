@@ -90,6 +90,7 @@ mod image;
 mod input;
 mod learn;
 mod linalg;
+mod lost;
 mod motion;
 mod params;
 mod propose;

@@ -49,7 +49,7 @@ pub(crate) struct State {
     pub baseline: DistanceBaseline,
     /// The target's in-plane rotation against the first frame, in radians.
     pub orientation: f64,
-    /// For how many frames the target has been lost.
+    /// For how many frames nothing has spoken for the box of a lost target, less those in which its particles did.
     pub frames_lost: u32,
 }
 

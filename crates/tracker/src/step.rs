@@ -32,21 +32,21 @@ impl State {
             best = self.weigh_particles(views.rectified, &search, scratch);
         }
 
-        // Answer (equation 12). A lost target counts as where it was, displaced with the image.
+        // Answer (equation 12). That the target is lost is said; where its box goes is another decision.
         let candidates = &scratch.candidates;
         let first_distance = candidates.first_distance_of(best);
         let is_lost = self.update_gate.is_lost(
             candidates.score_of(best),
             first_distance,
-            self.frames_lost,
+            self.estimate.status == Status::Lost,
             search.spread,
             &self.params,
         );
-        let rectified = if is_lost {
-            search.displaced()
+        let (rectified, is_followed) = if is_lost {
+            self.place_lost(views.rectified, &search, scratch)
         } else {
             let mean = search.answer(&candidates.particles, &candidates.weights, best);
-            self.measure_scale(views.rectified, mean, scratch)
+            (self.measure_scale(views.rectified, mean, scratch), true)
         };
         let answer = self.bounds.clamp(search.in_frame(rectified));
         let found = Localization {
@@ -64,7 +64,7 @@ impl State {
         let (score, status, may_learn) = self.judge(number, &evidence, is_lost);
 
         // (C) Learn: what is remembered of the frame.
-        self.remember(&found, is_lost, scratch);
+        self.remember(&found, is_lost, is_followed, scratch);
         if may_learn {
             self.learn(&views, &found, scratch);
         }

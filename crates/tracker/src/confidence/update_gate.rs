@@ -26,12 +26,17 @@ const MIN_MEAN: f64 = 0.15;
 /// The least score of a frame that passes: right twice as often as wrong. A box that is half off would be learned as the
 /// target, and the next one would be further off.
 const MIN_SCORE: f32 = 0.65;
-/// Below this score of the discriminant the target is lost: the box stays, nothing is learned, and the search widens
-/// from frame to frame until the target is found again. The discriminant says 0.5 to 1 on the target, and about 0.1
-/// beside it.
+/// Below this score of the discriminant the target is lost: nothing is learned, and the search widens from frame to frame
+/// until the target is found again, unless the box is followed. The discriminant says 0.5 to 1 on the target, and about
+/// 0.1 beside it.
 const LOST_THRESHOLD: f64 = 0.35;
 /// How much better than the lost threshold the discriminant must score a target that is found again.
 const FOUND_MARGIN: f64 = 0.2;
+/// From this score of the discriminant on, and below this multiple of the mean distance to the first subspace, the box of
+/// a lost target follows its particles. An occluder has such a score as often as a target that has turned, but it is
+/// further from the first image.
+const FOLLOWED_SCORE: f64 = 0.2;
+const FOLLOWED_RATIO: f64 = 1.2;
 /// The share of the newest frame in the running mean, where it passes and where it does not.
 const RATE: f64 = 0.1;
 const RATE_REJECTED: f64 = 0.02;
@@ -62,24 +67,30 @@ impl Default for UpdateGate {
 
 impl UpdateGate {
     /// Whether the best particle, with this score of the discriminant and this distance to the first subspace, is not
-    /// the target. The target has been lost for `frames_lost` frames, and the search was `spread` times as wide as
-    /// usual. A wide search finds more that resembles the target a little, so a target that is found again needs a
+    /// the target, which the last frame has lost or not; the search was `spread` times as wide as usual. A wide search finds more that resembles the target a little, so a target that is found again needs a
     /// better score and a recognised distance. Without a discriminant no target is lost.
     pub fn is_lost(
         &self,
         score: Option<f32>,
         distance: f64,
-        frames_lost: u32,
+        was_lost: bool,
         spread: f64,
         params: &Params,
     ) -> bool {
         let Some(score) = score.map(f64::from) else {
             return false;
         };
-        if frames_lost == 0 {
+        if !was_lost {
             return score < LOST_THRESHOLD;
         }
         score < LOST_THRESHOLD + FOUND_MARGIN || !self.recognizes(distance, spread, params)
+    }
+
+    /// Whether the box of a lost target goes to a particle with this score of the discriminant and this distance to the
+    /// first subspace.
+    pub fn may_follow(&self, score: Option<f32>, distance: f64) -> bool {
+        score.is_some_and(|score| f64::from(score) >= FOLLOWED_SCORE)
+            && distance < FOLLOWED_RATIO * self.mean_distance.max(MIN_MEAN)
     }
 
     /// Whether what is found at `distance` from the first subspace is the target that was lost. A search that is hardly
@@ -132,6 +143,21 @@ mod tests {
     fn a_low_score_does_not_pass_after_the_warm_up() {
         assert!(passes(0.1, WARM_UP - 1) && passes(0.7, 500));
         assert!(!passes(0.6, WARM_UP) && !passes(0.1, 500));
+    }
+
+    /// A walker in full view who turned away was lost, and the box stayed behind. A sign that covered a car had the same
+    /// score, and would have taken the box along.
+    #[test]
+    fn a_doubted_target_is_followed_and_an_occluder_is_not() {
+        let params = Preset::Robust.params();
+        let gate = UpdateGate {
+            mean_distance: 0.4,
+            ..UpdateGate::default()
+        };
+        assert!(gate.is_lost(Some(0.25), 0.45, false, 1.0, &params));
+        assert!(gate.may_follow(Some(0.25), 0.45));
+        assert!(!gate.may_follow(Some(0.25), 0.6));
+        assert!(!gate.may_follow(Some(0.1), 0.45) && !gate.may_follow(None, 0.45));
     }
 
     /// A player who bent down for a moment was not recognised for twelve frames, and then something else was found.

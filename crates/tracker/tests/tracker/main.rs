@@ -6,6 +6,7 @@ mod degenerate;
 mod diagnostics;
 mod evaluation;
 mod flow;
+mod lost;
 mod memory;
 mod params;
 mod rect;
