@@ -23,17 +23,17 @@ const ALWAYS_ACCEPTED: f64 = 0.3;
 const COLOR_STRICTNESS: f64 = 0.8;
 /// The least mean against which a target that was lost is recognised, also if it has hardly changed so far.
 const MIN_MEAN: f64 = 0.15;
-/// The least score of a frame that passes: right twice as often as wrong. A box that is half off would be learned as the
-/// target, and the next one would be further off.
+/// The least score of a frame that passes: right twice as often as wrong. A box that is half off would be learned as
+/// the target, and the next one would be further off.
 const MIN_SCORE: f32 = 0.65;
-/// Below this score of the discriminant the target is lost: nothing is learned, and the search widens from frame to frame
-/// until the target is found again, unless the box is followed. The discriminant says 0.5 to 1 on the target, and about
-/// 0.1 beside it.
+/// Below this score of the discriminant the target is lost: nothing is learned, and the search widens from frame to
+/// frame until the target is found again, unless the box is followed. The discriminant says 0.5 to 1 on the target, and
+/// about 0.1 beside it.
 const LOST_THRESHOLD: f64 = 0.35;
 /// How much better than the lost threshold the discriminant must score a target that is found again.
 const FOUND_MARGIN: f64 = 0.2;
-/// From this score of the discriminant on, and below this multiple of the mean distance to the first subspace, the box of
-/// a lost target follows its particles. An occluder has such a score as often as a target that has turned, but it is
+/// From this score of the discriminant on, and below this multiple of the mean distance to the first subspace, the box
+/// of a lost target follows its particles. An occluder has such a score as often as a target that has turned, but it is
 /// further from the first image.
 const FOLLOWED_SCORE: f64 = 0.2;
 const FOLLOWED_RATIO: f64 = 1.2;
@@ -67,8 +67,9 @@ impl Default for UpdateGate {
 
 impl UpdateGate {
     /// Whether the best particle, with this score of the discriminant and this distance to the first subspace, is not
-    /// the target, which the last frame has lost or not; the search was `spread` times as wide as usual. A wide search finds more that resembles the target a little, so a target that is found again needs a
-    /// better score and a recognised distance. Without a discriminant no target is lost.
+    /// the target, which the last frame has lost or not; the search was `spread` times as wide as usual. A wide search
+    /// finds more that resembles the target a little, so a target that is found again needs a better score and a
+    /// recognised distance. Without a discriminant no target is lost.
     pub fn is_lost(
         &self,
         score: Option<f32>,
@@ -145,8 +146,8 @@ mod tests {
         assert!(!passes(0.6, WARM_UP) && !passes(0.1, 500));
     }
 
-    /// A walker in full view who turned away was lost, and the box stayed behind. A sign that covered a car had the same
-    /// score, and would have taken the box along.
+    /// A walker in full view who turned away was lost, and the box stayed behind. A sign that covered a car had the
+    /// same score, and would have taken the box along.
     #[test]
     fn a_doubted_target_is_followed_and_an_occluder_is_not() {
         let params = Preset::Robust.params();
