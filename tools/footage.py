@@ -121,7 +121,8 @@ def sheet(pictures, boxes):
         picture, box = cv2.imread(str(pictures[at])), boxes[at]
         if box:
             x, y, w, h = (round(value) for value in box)
-            cv2.rectangle(picture, (x - 1, y - 1), (x - 1 + w, y - 1 + h), (0, 255, 255), max(1, picture.shape[1] // 300))
+            corners, thickness = ((x - 1, y - 1), (x - 1 + w, y - 1 + h)), max(1, picture.shape[1] // 300)
+            cv2.rectangle(picture, *corners, (0, 255, 255), thickness)
         size = (SHEET_WIDTH, round(picture.shape[0] * SHEET_WIDTH / picture.shape[1]))
         tile = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
         cv2.putText(tile, str(at + 1), (4, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 255, 255), 1)
@@ -178,7 +179,7 @@ def main():
     parser.add_argument("sequences", metavar="SEQUENCE", type=pathlib.Path, nargs="+")
     parser.add_argument("--annotation", type=pathlib.Path, metavar="FILE", help="of the one sequence given")
     parser.add_argument("--name", help="of the one clip made, in place of its folder's")
-    parser.add_argument("--first", type=int, default=0, metavar="N", help="the number of the first frame that is annotated")
+    parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first annotated frame")
     parser.add_argument("--frames", type=int, metavar="N", help="at most so many frames")
     parser.add_argument("--from-zero", action="store_true", help="boxes count from pixel 0, not 1")
     arguments = parser.parse_args()

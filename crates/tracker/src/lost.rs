@@ -36,8 +36,8 @@ impl State {
         (self.measure_scale(image, mean, scratch), true)
     }
 
-    /// The most likely particle under a prior as narrow as that of a target in view: a wide search decides what is found
-    /// again, but a box that follows does not leap.
+    /// The most likely particle under a prior as narrow as that of a target in view: a wide search decides what is
+    /// found again, but a box that follows does not leap.
     fn best_nearby(&self, search: &SearchContext<'_>, scratch: &Scratch) -> Option<usize> {
         let narrow = SearchContext {
             spread: 1.0,
