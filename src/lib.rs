@@ -16,9 +16,10 @@
 //! | [`bagtrack_ingest`] | JPEG, PNG and WebP files to frames, with limits that are checked before decoding |
 //! | [`bagtrack_sample`] | synthetic clips with exact ground truth |
 //!
-//! The feature `turbo` decodes JPEGs with libjpeg-turbo, `tls` is for a store behind TLS, `otel` exports spans.
+//! The feature `turbo` decodes JPEGs with libjpeg-turbo, `tls` (a default) serves HTTPS and reaches a store behind TLS,
+//! `otel` exports spans.
 //!
-//! Data goes one way, `http -> ingest -> sessions -> tracker`, and the answer comes back the same way.
+//! Data goes one way, `http -> sessions -> ingest -> tracker`, and the answer comes back the same way.
 
 pub mod drawing;
 pub mod http;

@@ -9,7 +9,7 @@ files=target/release-files
 rm -rf "$files"
 mkdir -p "$files"
 
-crates=(bagtrack-tracker bagtrack-ingest bagtrack-sample bagtrack-cli bagtrack-eval bagtrack bagtrack-client)
+crates=(bagtrack-tracker bagtrack-ingest bagtrack-sessions bagtrack-sample bagtrack-cli bagtrack-eval bagtrack bagtrack-client)
 cargo package --locked "${crates[@]/#/--package=}"
 for crate in "${crates[@]}"; do cp "target/package/$crate-$version.crate" "$files"; done
 
