@@ -169,8 +169,20 @@ impl World {
         self.store.drop_creates();
     }
 
+    /// The client no longer waits for what would open a session that has ended meanwhile.
+    async fn give_openings_up(&mut self) {
+        for replica in &mut self.replicas {
+            if replica.opens {
+                replica.give_up().await;
+            }
+        }
+        self.store.drop_creates();
+        self.store.settles().await;
+    }
+
     /// Does what the number says, if that is possible now.
     async fn step(&mut self, choice: u16) {
+        let before = self.ended;
         let (replica, choice) = (usize::from(choice % 2), choice / 2);
         let (pick, choice) = (usize::from(choice % 8), choice / 8);
         let is_idle = self.replicas[replica].is_idle();
@@ -207,6 +219,9 @@ impl World {
         self.store.settles().await;
         // Some answers are lost on their way.
         self.take_answers(pick != 0);
+        if self.ended > before {
+            self.give_openings_up().await;
+        }
     }
 
     /// Sends a frame to a replica, or opens a stream.

@@ -73,6 +73,8 @@ impl SessionQuota for NoQuota {
 pub struct Replica {
     pub service: SessionService,
     pub job: Option<JoinHandle<()>>,
+    /// Whether the job opens a session.
+    pub opens: bool,
     pub stream: Option<Arc<StreamPlace>>,
 }
 
@@ -112,6 +114,7 @@ impl Replica {
         Self {
             service,
             job: None,
+            opens: false,
             stream: None,
         }
     }
@@ -232,6 +235,7 @@ pub fn begin(
     request: Request,
 ) {
     let (service, answers, busy) = (replica.service.clone(), answers.clone(), store.begin());
+    replica.opens = matches!(request.asked, Asked::Open(_));
     replica.job = Some(tokio::spawn(async move {
         let answered = answer(&service, &request.asked).await;
         answers.lock().unwrap().push((number, request, answered));
