@@ -150,17 +150,11 @@ pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
                 Ok(session) => session,
                 Err(error) => return Answer::Nothing(error.to_string()),
             };
-            let mut batch = FrameBatch::posted(None, Vec::new(), None);
             let number = session.latest_frame() + 1;
-            batch.files = vec![picture(0, number).into()];
+            // With its number, for another picture than the frame's own would be a frame of no history.
+            let mut batch = FrameBatch::posted(Some(number), vec![picture(0, number).into()], None);
             batch.stream = Some(place.clone());
-            match track(service, batch).await {
-                // Another picture than the frame's own: its session went on meanwhile.
-                Answer::Tracked(_, estimates, _) if estimates.first().frame != number => {
-                    Answer::Nothing("it went on meanwhile".to_owned())
-                }
-                answer => answer,
-            }
+            track(service, batch).await
         }
         Asked::OpenStream => {
             let opened = open_stream(service).await;
