@@ -3,7 +3,7 @@
 use super::frame::frame;
 use super::params::{by_name, params};
 use super::target::{Numbers, numbers, rect};
-use bagtrack_tracker::{Estimate, Params, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Estimate, Params, Search, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple, PyType};
@@ -175,7 +175,12 @@ impl PyTracker {
             false => {
                 let partial = py.import("functools")?.getattr("partial")?;
                 let params = by_name(&tracker.params, py)?;
-                let make = partial.call((slf.get_type(),), Some(params.bind(py)))?;
+                // The presets own what the parameters do not tell.
+                let preset = match tracker.params.search {
+                    Search::Resampled => "paper",
+                    Search::Answer => "robust",
+                };
+                let make = partial.call((slf.get_type(), preset), Some(params.bind(py)))?;
                 (make, PyTuple::empty(py)).into_pyobject(py)
             }
         }

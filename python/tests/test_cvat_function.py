@@ -59,7 +59,8 @@ def test_shapes_get_the_boxes_of_the_library(
             assert answer.content_type == "application/json"
             answer = json.loads(answer.body)
             for shape in answer["shapes"]:
-                assert shape == pytest.approx(corners(expected), abs=0.0051)
+                # The service rounds corner and size, so a far corner may be off by two halves of a hundredth.
+                assert shape == pytest.approx(corners(expected), abs=0.0101)
             # What CVAT signs and sends back is the state as JSON.
             states = json.loads(json.dumps(answer["states"], separators=(",", ":")))
 

