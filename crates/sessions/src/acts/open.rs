@@ -149,7 +149,8 @@ impl SessionService {
             queue,
             ..
         } = request;
-        let (service, queue) = (self.clone(), queue.for_frames(start.target_count()));
+        let queue = queue.for_frames(start.target_count());
+        let (service, queue) = (self.clone(), queue.for_size(0, start.file_bytes()));
         let begin = move |meter: &mut WorkMeter| {
             let state = start.run(&service, meter)?;
             let bytes = service.store.is_some().then(|| state.stored());
