@@ -1,6 +1,7 @@
 //! The document as it is sent: what the handlers say, and what follows from all of them together.
 
 use super::key_order::InOrder;
+use super::problem_responses::problem_responses;
 use super::routes;
 use crate::http::extract::settings::MAX_EXACT;
 use serde_json::{Map, Value, json};
@@ -22,10 +23,12 @@ pub fn document_at(base_path: &str) -> String {
     let document = serde_json::to_value(routes::handlers());
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
+    share_opening(&mut document);
     let links = links(&document);
     bound_integers(&mut document);
     for operation in operations(&mut document) {
         complete_parameters(operation);
+        add_problems(operation);
         if operation["tags"] != json!(["service"]) {
             add_rate_limits(operation);
         }
@@ -34,6 +37,15 @@ pub fn document_at(base_path: &str) -> String {
         }
     }
     serde_json::to_string_pretty(&InOrder(&document)).expect("the document is plain JSON")
+}
+
+/// `putSession` takes and answers what `createSession` does.
+fn share_opening(document: &mut Value) {
+    let create = &document["paths"]["/sessions"]["post"];
+    let shared = ["requestBody", "responses"].map(|member| (member, create[member].clone()));
+    for (member, value) in shared {
+        document["paths"]["/sessions/{id}"]["put"][member] = value;
+    }
 }
 
 /// Whole numbers of 64 bits are no greater than JSON holds exactly in every language.
@@ -70,6 +82,15 @@ fn complete_parameters(operation: &mut Value) {
         if parameter["in"] == "query" && parameter["schema"]["type"] == "boolean" {
             parameter["allowEmptyValue"] = true.into();
         }
+    }
+}
+
+/// The problems that the operation may answer, beside its responses.
+fn add_problems(operation: &mut Value) {
+    let id = operation["operationId"].as_str().unwrap_or_default();
+    let problems = problem_responses(id);
+    if let Some(responses) = operation["responses"].as_object_mut() {
+        responses.extend(problems);
     }
 }
 

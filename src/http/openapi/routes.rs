@@ -3,11 +3,10 @@
 use crate::http::problems::document::ProblemDocument;
 use crate::http::resources::bag_picture;
 use crate::http::resources::correction;
-use crate::http::resources::create;
-use crate::http::resources::create_named;
 use crate::http::resources::frames;
 use crate::http::resources::health;
 use crate::http::resources::metrics;
+use crate::http::resources::open;
 use crate::http::resources::session;
 use crate::http::resources::snapshot;
 use crate::http::resources::token;
@@ -63,8 +62,8 @@ impl utoipa::Modify for Bearer {
 /// The routes of sessions, with what the document says about them.
 pub fn sessions() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
-        .routes(routes!(create::create))
-        .routes(routes!(session::get, session::delete, create_named::put))
+        .routes(routes!(open::create))
+        .routes(routes!(session::get, session::delete, open::put))
         .routes(routes!(frames::post))
         .routes(routes!(correction::put))
         .routes(routes!(snapshot::get))

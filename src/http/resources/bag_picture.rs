@@ -2,9 +2,7 @@
 
 use super::session_path::SessionPath;
 use super::snapshot::charged;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::BinaryBody;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
@@ -34,19 +32,6 @@ pub struct BagSettings {
     target: Option<usize>,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[
-        Kind::MalformedRequest,
-        Kind::SessionBusy,
-        Kind::QuotaExceeded,
-        Kind::QueueFull,
-        Kind::WorkTimeout,
-    ]
-);
-
 /// See the bag
 ///
 /// A row for each affine subspace of the bag, oldest first: its mean, then the columns of its basis. With gradient
@@ -58,8 +43,7 @@ operation_problems!(
     responses(
         (
             status = 200, description = "The picture", body = BinaryBody, content_type = "image/png"
-        ),
-        Problems
+        )
     )
 )]
 pub async fn get(

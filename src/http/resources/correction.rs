@@ -5,9 +5,7 @@ use crate::http::extract::settings::{
     ExactInput, ExactText, FrameCount, FrameNumber, Settings, TargetInput, TargetNumber, TargetText,
 };
 use crate::http::openapi::example_frames;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, replayed_header};
 use crate::http::respond::checkpoint::with_checkpoint;
@@ -47,21 +45,6 @@ impl Settings for TargetSettings {
 type TargetForm = FormBody<TargetSettings>;
 type TargetJson = JsonBody<TargetSettings>;
 
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    problem_responses::SESSION,
-    &[
-        Kind::MissingBox,
-        Kind::FrameOutOfOrder,
-        Kind::NotInOrder,
-        Kind::FrameDiffers,
-        Kind::FrameSizeMismatch,
-        Kind::InvalidBox,
-        Kind::SessionBusy,
-    ]
-);
-
 /// Correct the box
 ///
 /// The frame counts as the session's next frame, with the box given as its answer. The tracker keeps what it knew of
@@ -97,8 +80,7 @@ operation_problems!(
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
-        ),
-        Problems
+        )
     )
 )]
 pub async fn put(

@@ -7,9 +7,7 @@ use crate::http::extract::switch::Switch;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
 use crate::http::openapi::example_frames;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes, replayed_header};
@@ -51,20 +49,6 @@ impl Settings for FramesSettings {
 
 type FramesForm = FormBody<FramesSettings>;
 type FramesJson = JsonBody<FramesSettings>;
-
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    problem_responses::SESSION,
-    &[
-        Kind::FrameOutOfOrder,
-        Kind::NotInOrder,
-        Kind::FrameDiffers,
-        Kind::FrameSizeMismatch,
-        Kind::SessionBusy,
-        Kind::RequestTooCostly,
-    ]
-);
 
 /// Send the next frame, or several
 ///
@@ -108,8 +92,7 @@ operation_problems!(
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
-        ),
-        Problems
+        )
     )
 )]
 pub async fn post(

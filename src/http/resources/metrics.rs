@@ -2,8 +2,6 @@
 
 use crate::http::auth::caller::Caller;
 use crate::http::extract::texts::refuse_query;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::State;
@@ -13,12 +11,6 @@ use axum::response::IntoResponse;
 
 /// The text format of Prometheus.
 const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
-
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    &[Kind::MalformedRequest, Kind::Unauthorized, Kind::Forbidden]
-);
 
 /// Metrics for Prometheus
 ///
@@ -30,8 +22,7 @@ operation_problems!(
         (
             status = 200, description = "All metrics in the text format of Prometheus", body = String,
             content_type = "text/plain"
-        ),
-        Problems
+        )
     )
 )]
 pub async fn get(

@@ -5,14 +5,12 @@
 
 pub mod bag_picture;
 pub mod correction;
-pub mod create;
-pub mod create_named;
-pub mod create_request;
 pub mod frames;
 pub mod health;
 #[cfg(feature = "tls")]
 pub mod https_only;
 pub mod metrics;
+pub mod open;
 pub mod saturation;
 pub mod session;
 pub mod session_path;

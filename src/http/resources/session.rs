@@ -3,8 +3,6 @@
 use super::session_path::SessionPath;
 use crate::http::extract::overrides::ParamOverrides;
 use crate::http::extract::texts::refuse_query;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, ImageSize};
 use crate::http::respond::json::Json;
@@ -34,20 +32,13 @@ pub struct SessionView {
     expires_at: String,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[Kind::MalformedRequest]
-);
-
 /// See where a session stands
 ///
 /// Answers at once, also while a frame is being tracked.
 #[utoipa::path(
     get, path = "/sessions/{id}", tag = "sessions", operation_id = "getSession",
     params(("id" = Uuid, Path, description = "The session's id")),
-    responses((status = 200, description = "The session", body = SessionView), Problems)
+    responses((status = 200, description = "The session", body = SessionView))
 )]
 pub async fn get(
     State(state): State<AppState>,
@@ -73,7 +64,7 @@ pub async fn get(
 #[utoipa::path(
     delete, path = "/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
     params(("id" = Uuid, Path, description = "The session's id")),
-    responses((status = 204, description = "The session has ended"), Problems)
+    responses((status = 204, description = "The session has ended"))
 )]
 pub async fn delete(
     State(state): State<AppState>,

@@ -2,9 +2,7 @@
 
 use super::session_path::SessionPath;
 use crate::http::extract::texts::refuse_query;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::BinaryBody;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
@@ -23,19 +21,6 @@ use std::task::{Context, Poll};
 /// The media type of session snapshots.
 pub const MEDIA_TYPE: &str = "application/vnd.bagtrack.snapshot";
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[
-        Kind::MalformedRequest,
-        Kind::SessionBusy,
-        Kind::QuotaExceeded,
-        Kind::QueueFull,
-        Kind::WorkTimeout,
-    ]
-);
-
 /// Take a snapshot
 ///
 /// The bytes hold the whole session. Post them to `/sessions`, here or at another instance of the same version that has
@@ -51,8 +36,7 @@ operation_problems!(
         (
             status = 200, description = "The session as bytes", body = BinaryBody,
             content_type = "application/vnd.bagtrack.snapshot"
-        ),
-        Problems
+        )
     )
 )]
 pub async fn get(

@@ -3,8 +3,6 @@
 use super::session_path::SessionPath;
 use crate::http::auth::caller::Caller;
 use crate::http::auth::token::SessionToken;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
@@ -42,13 +40,6 @@ pub struct TokenView {
     expires_at: String,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[Kind::MalformedRequest, Kind::Forbidden]
-);
-
 /// Make a session token
 ///
 /// A web page should not hold an API key. Whoever has one opens a session and gives the page a token for it: the page
@@ -59,7 +50,7 @@ operation_problems!(
         ("id" = Uuid, Path, description = "The session's id"),
         TokenSettings,
     ),
-    responses((status = 200, description = "The token", body = TokenView), Problems)
+    responses((status = 200, description = "The token", body = TokenView))
 )]
 pub async fn create(
     State(state): State<AppState>,

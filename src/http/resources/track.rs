@@ -14,9 +14,7 @@ use crate::http::middleware::base_path::client_path;
 use crate::http::middleware::request_id;
 use crate::http::openapi::example_frames;
 use crate::http::openapi::params_schema::ParametersText;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes};
@@ -88,21 +86,6 @@ pub struct Tracked {
     snapshot: String,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    &[
-        Kind::Unauthorized,
-        Kind::Forbidden,
-        Kind::MissingBox,
-        Kind::InvalidBox,
-        Kind::InvalidParameter,
-        Kind::InvalidSnapshot,
-        Kind::FrameSizeMismatch,
-        Kind::RequestTooCostly,
-    ]
-);
-
 /// Track without a session
 ///
 /// A first frame and a box begin a track. Every answer has a snapshot, which goes with the next frame, to this instance
@@ -139,8 +122,7 @@ operation_problems!(
         (
             status = 200, description = "Where the target is, and the new snapshot; for a video, a line for each frame",
             content((Tracked = "application/json"), (String = "application/x-ndjson"))
-        ),
-        Problems
+        )
     )
 )]
 pub async fn post(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {

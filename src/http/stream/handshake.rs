@@ -9,8 +9,6 @@ use crate::http::extract::switch::Switch;
 use crate::http::middleware::request_id;
 use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::net::least_rate::LeastRate;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::resources::session_path::SessionPath;
@@ -43,19 +41,6 @@ pub struct StreamSettings {
     drop: Switch,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[
-        Kind::MalformedRequest,
-        Kind::FrameOutOfOrder,
-        Kind::SessionBusy,
-        Kind::QuotaExceeded,
-        Kind::WorkTimeout,
-    ]
-);
-
 /// Send frames over a WebSocket
 ///
 /// A binary message is a frame. A text message before it may give its number or a corrected box: `{"frame": 7}`,
@@ -79,7 +64,7 @@ operation_problems!(
         ("id" = Uuid, Path, description = "The session's id"),
         StreamSettings,
     ),
-    responses((status = 101, description = "The stream is open"), Problems)
+    responses((status = 101, description = "The stream is open"))
 )]
 pub async fn open(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
     let request_id = request_id::of(&request);
