@@ -2,9 +2,9 @@
 
 use super::key_order::InOrder;
 use super::problem_responses::problem_responses;
-use super::routes;
 use crate::http::extract::settings::MAX_EXACT;
 use serde_json::{Map, Value, json};
+use utoipa::openapi::OpenApi;
 
 /// The id in all examples: that of `putSession` opens the session which the others use.
 const EXAMPLE_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
@@ -13,14 +13,9 @@ const OPENING: [&str; 2] = ["createSession", "putSession"];
 /// A handshake cannot be made by following a link.
 const HANDSHAKE: &str = "openStream";
 
-/// The OpenAPI document as JSON, of a service at the root of its host.
-pub fn document() -> String {
-    document_at("/")
-}
-
-/// The OpenAPI document of a service at this path.
-pub fn document_at(base_path: &str) -> String {
-    let document = serde_json::to_value(routes::handlers());
+/// The OpenAPI document as JSON: what `handlers` say, of a service at this path.
+pub fn document(handlers: &OpenApi, base_path: &str) -> String {
+    let document = serde_json::to_value(handlers);
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
     share_opening(&mut document);

@@ -18,4 +18,3 @@ pub mod param_limits;
 pub mod params_schema;
 mod problem_responses;
 pub mod request_bodies;
-pub mod routes;

@@ -5,15 +5,15 @@
 
 pub mod bag_picture;
 pub mod correction;
+mod frame_lines;
 pub mod frames;
 pub mod health;
 #[cfg(feature = "tls")]
 pub mod https_only;
 pub mod metrics;
 pub mod open;
-pub mod saturation;
+pub mod routes;
 pub mod session;
-pub mod session_path;
 pub mod snapshot;
 pub mod token;
 pub mod track;

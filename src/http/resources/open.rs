@@ -1,13 +1,13 @@
 //! `POST /sessions` and `PUT /sessions/{id}`: a first frame and a box, or a snapshot, open a session.
 
 use crate::http::auth::caller::Caller;
-use crate::http::extract::admit::admit;
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
+use crate::http::extract::settings::Switch;
 use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
-use crate::http::extract::switch::Switch;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
+use crate::http::extract::uploaded::admit;
 use crate::http::openapi::params_schema::ParametersText;
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::openapi::{example_frames, param_limits};

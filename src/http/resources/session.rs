@@ -1,14 +1,14 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
-use super::session_path::SessionPath;
 use crate::http::extract::overrides::ParamOverrides;
-use crate::http::extract::texts::refuse_query;
+use crate::http::extract::query::NoQuery;
+use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, ImageSize};
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
-use axum::http::{StatusCode, Uri};
+use axum::http::StatusCode;
 use serde::Serialize;
 use uuid::Uuid;
 
@@ -42,10 +42,9 @@ pub struct SessionView {
 )]
 pub async fn get(
     State(state): State<AppState>,
+    _: NoQuery,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<Json<SessionView>, Problem> {
-    refuse_query(&uri)?;
     let session = path.find_newest(&state).await?;
     let latest = session.latest();
     Ok(Json(SessionView {
@@ -68,10 +67,9 @@ pub async fn get(
 )]
 pub async fn delete(
     State(state): State<AppState>,
+    _: NoQuery,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<StatusCode, Problem> {
-    refuse_query(&uri)?;
     path.end(&state).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -1,13 +1,13 @@
 //! `POST /sessions/{id}/token`: a token with which a web page may use this session, and nothing else.
 
-use super::session_path::SessionPath;
 use crate::http::auth::caller::Caller;
 use crate::http::auth::token::SessionToken;
+use crate::http::extract::query::QuerySettings;
+use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
-use axum::extract::{Query, State};
-use axum::http::Uri;
+use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -54,11 +54,11 @@ pub struct TokenView {
 )]
 pub async fn create(
     State(state): State<AppState>,
+    QuerySettings(settings): QuerySettings<TokenSettings>,
     caller: Caller,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<Json<TokenView>, Problem> {
-    let seconds = seconds(&uri)?;
+    let seconds = settings.seconds()?;
     caller.require_key()?;
     let session = path.find(&state).await?;
     let expires = state.now() + Duration::from_secs(seconds.into());
@@ -73,13 +73,13 @@ pub async fn create(
     }))
 }
 
-fn seconds(uri: &Uri) -> Result<u32, Problem> {
-    let Query(TokenSettings { seconds }) = Query::try_from_uri(uri)
-        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
-    match seconds.unwrap_or(DEFAULT_SECONDS) {
-        seconds @ 1..=MAX_SECONDS => Ok(seconds),
-        _ => Err(Problem::malformed(format!(
-            "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
-        ))),
+impl TokenSettings {
+    fn seconds(&self) -> Result<u32, Problem> {
+        match self.seconds.unwrap_or(DEFAULT_SECONDS) {
+            seconds @ 1..=MAX_SECONDS => Ok(seconds),
+            _ => Err(Problem::malformed(format!(
+                "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
+            ))),
+        }
     }
 }

@@ -1,9 +1,7 @@
 //! `GET /version`.
 
-use crate::http::extract::texts::refuse_query;
-use crate::http::problems::problem::Problem;
+use crate::http::extract::query::NoQuery;
 use crate::http::respond::json::Json;
-use axum::http::Uri;
 use serde::Serialize;
 
 /// The program that answers.
@@ -24,10 +22,9 @@ pub struct Version {
     get, path = "/version", tag = "service", operation_id = "getVersion", security(()),
     responses((status = 200, description = "The version", body = Version))
 )]
-pub async fn get(uri: Uri) -> Result<Json<Version>, Problem> {
-    refuse_query(&uri)?;
-    Ok(Json(Version {
+pub async fn get(_: NoQuery) -> Json<Version> {
+    Json(Version {
         name: env!("CARGO_PKG_NAME"),
         version: env!("CARGO_PKG_VERSION"),
-    }))
+    })
 }
