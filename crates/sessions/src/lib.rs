@@ -61,6 +61,7 @@ pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
 pub use scheduler::budget::{
     Budget, Budget as ByteBudget, Charge, Charge as ByteCharge, Full as BytesFull,
 };
+pub use scheduler::charged_bytes::ChargedBytes;
 pub use scheduler::fair_queue::WorkerSlot;
 pub use scheduler::flows::Flow;
 pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};

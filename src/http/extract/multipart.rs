@@ -4,10 +4,10 @@
 //! do nothing with what it has, and the head of a part is bounded: a body costs time in proportion to its bytes.
 
 use super::body::{self, Buffer};
-use super::fields::Fields;
 use super::misnamed;
 use super::settings::Settings;
 use super::texts::MAX_TEXT_BYTES;
+use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};

@@ -8,6 +8,7 @@
 
 pub(crate) mod admission;
 pub(crate) mod budget;
+pub(crate) mod charged_bytes;
 mod cpu_time;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;
