@@ -1,6 +1,7 @@
 //! The settings that bound what one request, one connection and one client may take.
 
 use ipnet::IpNet;
+use std::ffi::OsString;
 use std::time::Duration;
 
 use super::flag_values::parse_duration;
@@ -74,6 +75,9 @@ pub struct LimitsConfig {
         default_value_t = LimitsConfig::default().ffmpeg
     )]
     pub ffmpeg: String,
+    /// What starts that program with fewer rights, and its arguments, where there is something.
+    #[arg(skip)]
+    pub ffmpeg_launcher: Vec<OsString>,
     /// Most connections of one address, trusted proxies excepted [default: a quarter of `max-connections`].
     #[arg(long, env = "BAGTRACK_CLIENT_CONNECTIONS")]
     pub client_connections: Option<usize>,
@@ -127,6 +131,7 @@ impl Default for LimitsConfig {
             ping_interval: Duration::from_secs(20),
             max_video_frames: 3600,
             ffmpeg: "ffmpeg".to_owned(),
+            ffmpeg_launcher: Vec::new(),
             client_connections: None,
             client_sessions: None,
             max_session_bytes: None,

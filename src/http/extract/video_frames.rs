@@ -51,7 +51,9 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let mut decoder = VideoDecoder::of_bytes(&config.limits.ffmpeg, video, format, limits)?;
+        let launcher = &config.limits.ffmpeg_launcher;
+        let mut decoder =
+            VideoDecoder::of_bytes(launcher, &config.limits.ffmpeg, video, format, limits)?;
         let stop = decoder.stop();
         let (send, pictures) = mpsc::channel(MAX_WAITING);
         let reading = move || {
@@ -112,9 +114,9 @@ impl From<VideoError> for Problem {
     fn from(error: VideoError) -> Self {
         match error {
             VideoError::NoProgram { .. } => no_decoder().caused_by(Arc::new(error)),
-            VideoError::Damaged(reason) => {
+            VideoError::Damaged { picture, reason } => {
                 let detail = format!(
-                    "The video cannot be decoded: {reason}. The frames before count. Send MP4, WebM, GIF or Motion JPEG."
+                    "The video cannot be decoded from its picture {picture} on: {reason}. The frames before count. Send MP4, WebM, GIF or Motion JPEG."
                 );
                 Self::new(Kind::FrameDamaged, detail)
             }

@@ -117,14 +117,19 @@ impl Metrics {
             .increment(1);
     }
 
-    /// Of a service with a store: whether it is ready, and how many calls failed.
-    pub fn store(&self, is_ready: bool, failures: u64) {
+    /// Of a service with a store: whether it is ready and full, and how many calls failed.
+    pub fn store(&self, is_ready: bool, is_full: bool, failures: u64) {
         let make = Maker(&self.recorder);
         let up = make.gauge(
             "bagtrack_store_up",
             "1 while the store answers and takes writes.",
         );
         up.set(if is_ready { 1.0 } else { 0.0 });
+        let full = make.gauge(
+            "bagtrack_store_full",
+            "1 after the store took no new session for want of room.",
+        );
+        full.set(if is_full { 1.0 } else { 0.0 });
         let failed = make.counter(
             "bagtrack_store_failures_total",
             "Calls that the store did not answer or refused, probes among them.",

@@ -87,7 +87,7 @@ impl AppState {
             access,
             metrics,
             // A client has one at a time, and no client all of them.
-            videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
+            videos: Arc::new(Semaphore::new(config.video_places())),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
             clock,
@@ -128,7 +128,8 @@ impl AppState {
         gauges.workers_busy.set(busy as f64);
         gauges.draining.set(f64::from(u8::from(self.is_draining())));
         if let Some(store) = &self.service.store {
-            self.metrics.store(store.is_ready(), store.failures());
+            let (is_ready, is_full) = (store.is_ready(), store.is_full());
+            self.metrics.store(is_ready, is_full, store.failures());
         }
         if let Some(memory) = memory_stats::memory_stats() {
             gauges.resident_memory.set(memory.physical_mem as f64);
