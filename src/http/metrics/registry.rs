@@ -48,6 +48,10 @@ pub struct Gauges {
     pub workers_busy: Gauge,
     /// Workers.
     pub workers: Gauge,
+    /// Bytes of bodies that have come, and of answers that are not taken.
+    pub upload_bytes: Gauge,
+    /// Videos that are decoded.
+    pub videos: Gauge,
     /// Resident memory of the process.
     pub resident_memory: Gauge,
     /// 1 while the service is asked to end.
@@ -172,6 +176,11 @@ impl Gauges {
             ),
             workers_busy: make.gauge("bagtrack_workers_busy", "Workers at work."),
             workers: make.gauge("bagtrack_workers", "Workers."),
+            upload_bytes: make.gauge(
+                "bagtrack_upload_bytes",
+                "Bytes of bodies that have come, and of answers that are not taken.",
+            ),
+            videos: make.gauge("bagtrack_videos", "Videos that are decoded."),
             resident_memory: make.gauge(
                 "process_resident_memory_bytes",
                 "Resident memory of the process.",

@@ -137,7 +137,8 @@ impl Clients {
             return account.clone();
         }
         if accounts.len() >= MAX_IDLE_ACCOUNTS {
-            accounts.retain(|_, account| Arc::strong_count(account) > 1);
+            accounts
+                .retain(|_, account| Arc::strong_count(account) > 1 || !account.held.is_empty());
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
         let networks = client.networks().map(|network| self.network(network));

@@ -124,6 +124,9 @@ impl AppState {
         gauges.max_sessions.set(config.max_sessions as f64);
         gauges.queued.set(queued as f64);
         gauges.workers.set(workers as f64);
+        gauges.upload_bytes.set(self.uploads.held() as f64);
+        let videos = config.video_places() - self.videos.available_permits();
+        gauges.videos.set(videos as f64);
         let busy = admission.busy_workers().min(workers);
         gauges.workers_busy.set(busy as f64);
         gauges.draining.set(f64::from(u8::from(self.is_draining())));

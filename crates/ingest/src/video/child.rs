@@ -5,7 +5,7 @@ use std::ffi::{OsStr, OsString};
 use std::process::{Child, Command, Stdio};
 
 /// Most bytes of addresses of a decoder, which needs some ten pictures of a video within the limits of frames.
-pub const MAX_MEMORY: u64 = 1 << 30;
+pub const MAX_MEMORY: u64 = 768 << 20;
 /// By how much lower its priority is: that of other slow work.
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
