@@ -17,7 +17,7 @@ use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, box
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
-use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
+use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
@@ -134,7 +134,7 @@ impl CreateRequest {
         let digest = self.digest();
         let (upload, mut files) = (self.upload.settings, self.upload.files);
         let file = files.swap_remove(0);
-        let start = if self.upload.is_snapshot || file.starts_with(SNAPSHOT_MAGIC) {
+        let start = if self.upload.is_snapshot || is_snapshot(&file) {
             let allowed = CreateSettings {
                 verbose: upload.verbose,
                 ..CreateSettings::default()
