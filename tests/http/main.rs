@@ -21,6 +21,8 @@ mod forged;
 mod forms;
 mod heavy;
 mod hostile_connections;
+#[cfg(feature = "tls")]
+mod https;
 mod idempotency;
 mod identity;
 mod labels;

@@ -78,5 +78,4 @@ pub use store::{
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,
-    target_seed,
 };
