@@ -2,7 +2,7 @@
 // tracker in this page or process: `new LocalClient()`, with the same calls.
 
 export { Client } from "./client.js";
-export { LocalClient, LocalSession } from "./local.js";
+export { LocalClient, LocalSession, LocalStream } from "./local.js";
 export { Problem } from "./problem.js";
 export { Session } from "./session.js";
 export { FrameStream } from "./stream.js";

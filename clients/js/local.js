@@ -25,6 +25,12 @@ export class LocalClient {
     this.before = Promise.resolve();
   }
 
+  /** Loads the tracker, so that the first session need not wait for it. */
+  async warm() {
+    this.worker ??= this.start();
+    await this.worker;
+  }
+
   /**
    * Opens a session.
    * @param {Image} image The first frame.
@@ -212,6 +218,12 @@ export class LocalSession {
    * @returns {Promise<Uint8Array<ArrayBuffer>>} */
   snapshot() {
     return this.client.call("save", { id: this.id });
+  }
+
+  /** A picture (PNG) of what the tracker keeps of the target, in browsers.
+   * @returns {Promise<Blob>} */
+  bag() {
+    return this.client.call("bag", { id: this.id });
   }
 
   /** Frames as of a stream of a service.

@@ -99,6 +99,16 @@ async function withFrame(image, run) {
   }
 }
 
+/**
+ * @param {Float32Array} values
+ * @param {number} columns
+ * @param {number} rows
+ */
+function vectorsOf(values, columns, rows) {
+  const cells = columns * rows;
+  return Array.from({ length: values.length / cells }, (_, at) => values.slice(at * cells, (at + 1) * cells));
+}
+
 /** Follows one object. A call that fails leaves it as it was. */
 export class Tracker {
   /** @param {Wasm} wasm */
@@ -185,6 +195,16 @@ export class Tracker {
     const pairs = Parameters.names().map((name) => [name, parameters.get(name)]);
     parameters.free();
     return /** @type {Record<string, number>} */ (Object.fromEntries(pairs));
+  }
+
+  /** What it keeps of the target: for each affine subspace, oldest first, its mean, then the columns of its basis, each as
+   * gray values row by row. */
+  get bag() {
+    return this.wasm.bag.map((entry) => {
+      const { columns, values } = entry;
+      entry.free();
+      return { columns, vectors: vectorsOf(values, columns, this.parameters.patch_height) };
+    });
   }
 
   /** Gives up its memory. */

@@ -1,5 +1,6 @@
 // The worker: trackers by their numbers, and calls for them, one after the other.
 
+import { pictureOf } from "./bag.js";
 import { Problem } from "./problem.js";
 import { Tracker, frameFor } from "./tracker.js";
 import { close } from "./transfer.js";
@@ -15,6 +16,7 @@ import { close } from "./transfer.js";
  * @property {{image: Image, id: number, box: Box}} correct
  * @property {{id: number}} save
  * @property {{id: number}} read
+ * @property {{id: number}} bag
  * @property {{id: number}} end
  */
 
@@ -57,6 +59,7 @@ const calls = {
     const { answer, size, parameters } = find(id);
     return { frames: answer.frame + 1, answer, image: size, parameters };
   },
+  bag: ({ id }) => pictureOf(find(id).bag),
   end({ id }) {
     trackers.get(id)?.free();
     trackers.delete(id);

@@ -27,6 +27,8 @@ export declare class LocalClient {
     /** @type {Promise<unknown>} The calls before are sent. */
     before: Promise<unknown>;
     constructor();
+    /** Loads the tracker, so that the first session need not wait for it. */
+    warm(): Promise<void>;
     /**
      * Opens a session.
      * @param {Image} image The first frame.
@@ -116,6 +118,9 @@ export declare class LocalSession {
     /** The whole session as bytes: for `restore` of a local client, and of a client whose service takes unsigned ones.
      * @returns {Promise<Uint8Array<ArrayBuffer>>} */
     snapshot(): Promise<Uint8Array<ArrayBuffer>>;
+    /** A picture (PNG) of what the tracker keeps of the target, in browsers.
+     * @returns {Promise<Blob>} */
+    bag(): Promise<Blob>;
     /** Frames as of a stream of a service.
      * @param {{live?: boolean}} [options] */
     stream(options?: {

@@ -61,6 +61,12 @@ export declare class Tracker {
         height: number;
     };
     get parameters(): Record<string, number>;
+    /** What it keeps of the target: for each affine subspace, oldest first, its mean, then the columns of its basis, each as
+     * gray values row by row. */
+    get bag(): {
+        columns: number;
+        vectors: Float32Array<ArrayBuffer>[];
+    }[];
     /** Gives up its memory. */
     free(): void;
 }

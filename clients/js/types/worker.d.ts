@@ -25,6 +25,9 @@ export type Calls = {
     read: {
         id: number;
     };
+    bag: {
+        id: number;
+    };
     end: {
         id: number;
     };

@@ -13,4 +13,4 @@ mod tracker;
 pub use estimate::{WasmEstimate, WasmSeen};
 pub use frame::WasmFrame;
 pub use parameters::WasmParameters;
-pub use tracker::WasmTracker;
+pub use tracker::{WasmEntry, WasmTracker};

@@ -3,7 +3,7 @@
 use crate::estimate::{WasmEstimate, WasmSeen};
 use crate::frame::WasmFrame;
 use crate::parameters::WasmParameters;
-use bagtrack_tracker::{Rect, Tracker};
+use bagtrack_tracker::{BagEntry, Rect, Tracker};
 use wasm_bindgen::prelude::*;
 
 /// Follows one object.
@@ -84,14 +84,33 @@ impl WasmTracker {
         WasmParameters(self.0.params().clone())
     }
 
-    /// What the tracker keeps of the target: for each entry of the bag, oldest first, its mean as gray values row by row.
+    /// What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and of
+    /// the columns of its basis, each row by row.
     #[wasm_bindgen(getter)]
-    pub fn bag(&self) -> Vec<f32> {
-        let entries = self.0.bag();
-        entries
-            .into_iter()
-            .flat_map(|entry| entry.mean.gray)
-            .collect()
+    pub fn bag(&self) -> Vec<WasmEntry> {
+        let entries = self.0.bag().into_iter();
+        entries.map(WasmEntry::new).collect()
+    }
+}
+
+/// An affine subspace of the bag, as pictures.
+#[wasm_bindgen(js_name = Entry, getter_with_clone)]
+#[derive(Debug, Clone)]
+pub struct WasmEntry {
+    /// Cells across.
+    pub columns: u32,
+    /// The values of the mean, then those of the columns of the basis.
+    pub values: Vec<f32>,
+}
+
+impl WasmEntry {
+    fn new(BagEntry { mean, basis }: BagEntry) -> Self {
+        let columns = mean.columns;
+        let vectors = std::iter::once(mean).chain(basis);
+        Self {
+            columns,
+            values: vectors.flat_map(|vector| vector.gray).collect(),
+        }
     }
 }
 

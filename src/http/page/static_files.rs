@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 31] = [
+const FILES: [File; 32] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
@@ -65,6 +65,7 @@ const FILES: [File; 31] = [
     file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
     client_file!("js/backoff.js"),
+    client_file!("js/bag.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
     client_file!("js/image.js"),

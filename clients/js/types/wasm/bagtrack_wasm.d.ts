@@ -1,4 +1,33 @@
 /**
+ * An affine subspace of the bag, as pictures.
+ */
+export declare class Entry {
+    __wbg_ptr: number | undefined;
+    static __wrap(ptr: any): any;
+    __destroy_into_raw(): number | undefined;
+    free(): void;
+    /**
+     * Cells across.
+     * @returns {number}
+     */
+    get columns(): number;
+    /**
+     * The values of the mean, then those of the columns of the basis.
+     * @returns {Float32Array}
+     */
+    get values(): Float32Array;
+    /**
+     * Cells across.
+     * @param {number} arg0
+     */
+    set columns(arg0: number);
+    /**
+     * The values of the mean, then those of the columns of the basis.
+     * @param {Float32Array | number[]} arg0
+     */
+    set values(arg0: Float32Array | number[]);
+}
+/**
  * The answer to a frame.
  */
 export declare class Estimate {
@@ -191,10 +220,11 @@ export declare class Tracker {
     __destroy_into_raw(): any;
     free(): void;
     /**
-     * What the tracker keeps of the target: for each entry of the bag, oldest first, its mean as gray values row by row.
-     * @returns {Float32Array}
+     * What the tracker keeps of the target: for each entry of the bag, oldest first, the gray values of its mean and of
+     * the columns of its basis, each row by row.
+     * @returns {Entry[]}
      */
-    get bag(): Float32Array;
+    get bag(): Entry[];
     /**
      * Takes `frame` as the next one, with the right box in it.
      *

@@ -1,6 +1,6 @@
 //! Any valid parameters on any small frames: a finite answer, the same from every copy of the state.
 
-use bagtrack_tracker::{Features, Frame, Params, Rect, Search, Tracker};
+use bagtrack_tracker::{Features, Frame, Params, Preset, Rect, Search, Tracker};
 use proptest::prelude::*;
 
 /// Numbers in [0, 1], the ends and what underflows among them.
