@@ -37,7 +37,7 @@ environment_with "$environment" "maturin>=1.9,<2" "mypy>=1.11" pyright "numpy>=1
     "websockets>=13" "pillow>=9" "opencv-python-headless>=4.5"
 # attributee 0.1.10 is not what vot-toolkit 0.9 was made for.
 for packages in "got10k==0.1.3" "vot-toolkit==0.9.0 vot-trax>=4 attributee==0.1.9" "cvat-sdk>=2.20 cvat-cli>=2.20" \
-    "nuclio-sdk>=0.5"; do
+    "nuclio-sdk>=0.5" "supervision>=0.25"; do
     # shellcheck disable=SC2086
     environment_with "$environment" $packages || echo "Left out, for want of its package: $packages"
 done

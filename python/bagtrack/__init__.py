@@ -2,7 +2,7 @@
 
 All three have one interface, which users of OpenCV's trackers know: `init(frame, box)`, then `update(frame)` for each
 frame, which gives `(ok, box)`. Boxes are (x, y, width, height) in pixels of the frame, floats, 0-based. The module
-`bagtrack.cv` has OpenCV's interface to the letter.
+`bagtrack.cv` has OpenCV's interface to the letter. `propagate` carries boxes through a whole video.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from bagtrack import cv
 from bagtrack._native import Tracker, __version__
-from bagtrack.answer import Answer, Box, Status
+from bagtrack.answer import Answer, Box, Status, TargetAnswer
 from bagtrack.errors import ServiceError, ServiceUnavailable
+from bagtrack.propagation import propagate
 
 if TYPE_CHECKING:
     from bagtrack.async_client import AsyncClient
@@ -26,9 +27,11 @@ __all__ = [
     "ServiceError",
     "ServiceUnavailable",
     "Status",
+    "TargetAnswer",
     "Tracker",
     "__version__",
     "cv",
+    "propagate",
 ]
 
 

@@ -27,6 +27,10 @@ class Tracker:
     def init(self, frame: npt.NDArray[np.uint8], box: BoxLike) -> None:
         """Starts on `frame` with the target in `box`; whatever was followed before is forgotten."""
 
+    def of_target(self, target: int) -> Tracker:
+        """A tracker without a target and with these parameters, for one of several targets that see the same frames,
+        counted from 0: each has draws of its own, and those of the first are these."""
+
     def update(self, frame: npt.NDArray[np.uint8]) -> tuple[bool, Box]:
         """Finds the target in the next frame. `ok` is False where the target is lost; the box is the best guess then.
 
@@ -66,3 +70,16 @@ class Tracker:
     @property
     def params(self) -> dict[str, Any]:
         """All parameters by their names."""
+
+class KeyFrames:
+    """Picks the key frames of one target's track, as its boxes come: linear interpolation between two of them gives
+    every edge of every box left out to within `tolerance` pixels.
+    """
+
+    def __init__(self, tolerance: float) -> None: ...
+    def push(self, box: BoxLike, is_shown: bool, row: Any) -> list[Any]:
+        """Takes the next box, with whatever goes with it, and gives the rows of the key frames that are certain now.
+        Runs in which `is_shown` is the same have a key frame at each end."""
+
+    def finish(self) -> Any | None:
+        """The row of the last key frame, if it was not given yet."""

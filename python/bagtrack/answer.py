@@ -37,6 +37,14 @@ class Answer:
         return cls(document["frame"], parse_box(document["box"]), document["score"], document["status"])
 
 
+@dataclass(frozen=True)
+class TargetAnswer(Answer):
+    """Where one of several targets is in a frame."""
+
+    target: int
+    """Which target, counted from 0 in the order of the boxes."""
+
+
 def parse_box(document: dict[str, float]) -> Box:
     """Reads a box of the service."""
     return (

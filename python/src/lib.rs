@@ -4,6 +4,7 @@
 //! with the tracker's words, and changes nothing.
 
 mod frame;
+mod key_frames;
 mod params;
 mod target;
 mod tracker;
@@ -11,6 +12,8 @@ mod tracker;
 /// The module `bagtrack._native`.
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::key_frames::PyKeyFrames;
     #[pymodule_export]
     use super::tracker::PyTracker;
 

@@ -80,6 +80,14 @@ impl PyTracker {
         })
     }
 
+    /// A tracker without a target, for one of several that see the same frames, counted from 0.
+    fn of_target(&self, target: usize) -> Self {
+        Self {
+            params: self.params.of_target(target),
+            tracker: Mutex::new(None),
+        }
+    }
+
     /// Finds the target in the next frame: `(ok, box)`. `ok` is False where the target is lost; `box` is the best guess
     /// then.
     fn update(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<(bool, Numbers)> {

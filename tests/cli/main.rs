@@ -5,6 +5,7 @@ mod readme_session;
 mod sample_track;
 mod serve;
 mod track_formats;
+mod track_propagation;
 mod track_signals;
 mod track_video;
 

@@ -9,8 +9,6 @@ use bagtrack_tracker::{
     Diagnostics, Estimate, Frame, FrameFormat, Params, Rect, Tracker, TrackerError,
 };
 
-/// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
-const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 /// Most bytes that the trackers of a list of targets keep together. The work on a frame holds a copy of them.
 pub const MAX_LIST_BYTES: usize = 8 << 20;
 
@@ -84,11 +82,6 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
     })
 }
 
-/// The seed of a target, counted from 0, where `seed` is that of the first.
-pub fn target_seed(seed: u64, target: usize) -> u64 {
-    seed.wrapping_add(SEED_STEP.wrapping_mul(target as u64))
-}
-
 impl Targets {
     /// A tracker for each box in `frame`. Before each of them `check` says whether to go on.
     ///
@@ -106,9 +99,7 @@ impl Targets {
         }
         let start = |target: usize, given: &Rect| {
             check().map_err(StartError::Stopped)?;
-            let mut params = params.clone();
-            params.seed = target_seed(params.seed, target);
-            Tracker::new(frame, *given, params)
+            Tracker::new(frame, *given, params.of_target(target))
                 .map_err(|error| StartError::Refused { target, error })
         };
         boxes.try_map(start).map(Self)

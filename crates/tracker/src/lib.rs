@@ -25,7 +25,7 @@
 //! | `weights`, `step` | likelihoods, the sum rule, the answer | priors, a second round, pinned entries |
 //! | `classifier`, `scale`, `confidence` | | a discriminant, a filter for the scale, the score and the update gate |
 //!
-//! The other rooms are `image` (frames and boxes), `params` and `linalg`.
+//! The other rooms are `image` (frames and boxes), `params` and `linalg`; [`KeyFrames`] thins a finished track.
 //!
 //! What the paper leaves open:
 //! - Everything happens in the working image ([`Frame`]), as large as the target asks for ([`Params::frame_format`]);
@@ -88,6 +88,7 @@ mod features;
 mod grassmann;
 mod image;
 mod input;
+mod key_frames;
 mod learn;
 mod linalg;
 mod lost;
@@ -118,6 +119,7 @@ pub use image::rect::Rect;
 pub use image::resolution::{MAX_WORKING_SIDE, MIN_WORKING_SIDE};
 pub use image::ycbcr;
 pub use input::MIN_BOX_SIDE;
+pub use key_frames::KeyFrames;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
 pub use tracker::Tracker;

@@ -22,7 +22,7 @@ pub fn line(row: &Row) -> serde_json::Result<String> {
     serde_json::to_string(&Object {
         frame: row.frame,
         time: row.time,
-        file: row.file,
+        file: row.file.as_deref(),
         target: row.target,
         area: row.estimate.target,
         score: row.estimate.score,

@@ -28,7 +28,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Whether its lines say which target they are of.
+    /// Whether its lines say which frame and target they are of.
     pub fn has_target(self) -> bool {
         self != Self::Otb
     }

@@ -4,12 +4,13 @@ use super::drawn::{Destination, Drawn};
 use super::frames::{FrameFile, Frames};
 use super::interrupt::Interrupt;
 use super::rows::Rows;
+use super::selection::Selection;
 use super::targets::Targets;
 use crate::cli::formats::Row;
 use bagtrack_tracker::{Params, Rect};
 use indicatif::ProgressBar;
 use std::error::Error;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 
 /// What there is to do.
 pub struct Job {
@@ -21,6 +22,10 @@ pub struct Job {
     pub params: Params,
     /// Where drawn frames go, if they are wanted.
     pub destination: Option<Destination>,
+    /// How many frames are tracked after the first one, at most.
+    pub count: Option<u64>,
+    /// Which boxes are written.
+    pub selection: Selection,
     /// Where boxes go.
     pub rows: Rows,
     /// Goes on by a step a frame.
@@ -34,12 +39,13 @@ enum Then {
 }
 
 impl Job {
-    /// Follows the targets to the last frame, or to a signal, and closes what is drawn. Returns how many frames were
-    /// tracked.
+    /// Follows the targets to the last frame that is wanted, or to a signal, and closes what is drawn. Returns how many
+    /// frames were tracked.
     pub fn run(mut self, interrupt: &Interrupt) -> Result<u64, Box<dyn Error>> {
         let mut drawn = None;
         let followed = self.follow(interrupt, &mut drawn);
         // Also after an error: the frames before it are worth keeping.
+        write(&mut self.rows, &self.selection.finish())?;
         let finished = drawn.map_or(Ok(()), Drawn::finish);
         // An encoder that has ended is the cause of an error in the loop.
         finished?;
@@ -53,7 +59,7 @@ impl Job {
     ) -> Result<u64, Box<dyn Error>> {
         let mut targets: Option<Targets> = None;
         let mut count = 0;
-        while !interrupt.came() {
+        while !interrupt.came() && self.count.is_none_or(|most| count <= most) {
             if self.frames.are_before_first() {
                 self.frames.pass_over()?;
                 self.bar.inc(1);
@@ -97,17 +103,31 @@ impl Job {
         if let Some(drawn) = drawn {
             drawn.add(frame, &estimates)?;
         }
-        let rows = estimates.iter().enumerate().map(|(target, estimate)| Row {
-            frame: frame.index,
-            time: frame.time,
-            file: frame.file.as_deref(),
-            target,
-            estimate,
-        });
-        match self.rows.write(rows) {
-            // The reader has seen enough: `bagtrack track … | head`.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Then::Stop),
-            written => Ok(written.map(|()| Then::GoOn)?),
+        let rows = estimates
+            .into_iter()
+            .enumerate()
+            .map(|(target, estimate)| Row {
+                frame: frame.index,
+                time: frame.time,
+                file: frame.file.clone(),
+                target,
+                estimate,
+            });
+        let rows = self.selection.take(rows.collect());
+        match write(&mut self.rows, &rows)? {
+            Then::GoOn if self.selection.has_ended() => Ok(Then::Stop),
+            then => Ok(then),
         }
+    }
+}
+
+/// Writes rows, to a reader that may have seen enough: `bagtrack track … | head`.
+fn write(to: &mut Rows, rows: &[Row]) -> io::Result<Then> {
+    if rows.is_empty() {
+        return Ok(Then::GoOn);
+    }
+    match to.write(rows) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Then::Stop),
+        written => written.map(|()| Then::GoOn),
     }
 }

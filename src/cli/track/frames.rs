@@ -1,5 +1,6 @@
-//! The frames of `bagtrack track`: those of a folder, or of a video.
+//! The frames of `bagtrack track`: those of a folder, or of a video, forwards or backwards.
 
+use super::reversed::Reversed;
 use super::start::Start;
 use super::video_info::{Rate, VideoInfo};
 use bagtrack_cli::frames;
@@ -27,32 +28,47 @@ pub struct FrameFile {
     pub bytes: Vec<u8>,
 }
 
-/// Frames in order.
+/// Which way frames are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// To the last frame.
+    Forwards,
+    /// To the first frame.
+    Backwards,
+}
+
+/// Frames in the order in which they are tracked.
 pub struct Frames {
     source: Source,
+    direction: Direction,
     /// What messages call the folder or the video.
     shown: String,
-    /// The number of the next frame.
-    next: u64,
+    /// The number of the next frame; none after number 0 of those that go backwards.
+    next: Option<u64>,
     /// The number of the first frame that is wanted.
     first: u64,
 }
 
 enum Source {
     Folder(IntoIter<PathBuf>),
-    Video(Box<VideoDecoder>, VideoInfo),
+    Video(Pictures, VideoInfo),
+}
+
+enum Pictures {
+    Forwards(Box<VideoDecoder>),
+    Backwards(Reversed),
 }
 
 impl Frames {
     /// The frames of a folder or a video, from `start` on.
-    pub fn open(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
+    pub fn open(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         match path.is_file() {
-            true => Self::of_video(path, start),
-            false => Self::of_folder(path, start),
+            true => Self::of_video(path, start, direction),
+            false => Self::of_folder(path, start, direction),
         }
     }
 
-    fn of_folder(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
+    fn of_folder(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
         let Start::Frame(first) = start else {
             let text = "frames of a folder have no times: give --start the number of a frame";
@@ -60,20 +76,28 @@ impl Frames {
         };
         let mut paths = frames::list(path)?;
         let count = paths.len();
-        match usize::try_from(first) {
-            Ok(index) if index < count => drop(paths.drain(..index)),
-            _ => return Err(too_short(&shown, count as u64).into()),
+        let index = usize::try_from(first).unwrap_or(usize::MAX);
+        if index >= count {
+            return Err(too_short(&shown, count as u64).into());
+        }
+        match direction {
+            Direction::Forwards => drop(paths.drain(..index)),
+            Direction::Backwards => {
+                paths.truncate(index + 1);
+                paths.reverse();
+            }
         }
         Ok(Self {
             source: Source::Folder(paths.into_iter()),
+            direction,
             shown,
-            next: first,
+            next: Some(first),
             first,
         })
     }
 
     /// Frames before the start are passed over where the file has no index.
-    fn of_video(path: &Path, start: Start) -> Result<Self, Box<dyn Error>> {
+    fn of_video(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
         let path = path.canonicalize()?;
         let info = VideoInfo::read(&path);
@@ -90,13 +114,24 @@ impl Frames {
             max_bytes: limits.max_bytes,
             max_pictures: usize::MAX,
         };
-        let from = info.seek_to(first);
-        let decoder = VideoDecoder::of_file(FFMPEG, &path, from, limits)
-            .map_err(|error| format!("{error}; install ffmpeg"))?;
+        let (pictures, next) = match direction {
+            Direction::Forwards => {
+                let from = info.seek_to(first);
+                let decoder = VideoDecoder::of_file(FFMPEG, &path, from, limits)
+                    .map_err(|error| format!("{error}; install ffmpeg"))?;
+                let next = from.map_or(0, |_| first);
+                (Pictures::Forwards(Box::new(decoder)), next)
+            }
+            Direction::Backwards => {
+                let reversed = Reversed::new(path, limits, first);
+                (Pictures::Backwards(reversed), first)
+            }
+        };
         Ok(Self {
-            source: Source::Video(Box::new(decoder), info),
+            source: Source::Video(pictures, info),
+            direction,
             shown,
-            next: from.map_or(0, |_| first),
+            next: Some(next),
             first,
         })
     }
@@ -116,9 +151,12 @@ impl Frames {
 
     /// How many frames are left, where that is known.
     pub fn left(&self) -> Option<u64> {
-        match &self.source {
-            Source::Folder(paths) => Some(paths.len() as u64),
-            Source::Video(_, info) => Some(info.count()?.saturating_sub(self.next)),
+        match (&self.source, self.direction) {
+            (Source::Folder(paths), _) => Some(paths.len() as u64),
+            (Source::Video(..), Direction::Backwards) => Some(self.next.map_or(0, |next| next + 1)),
+            (Source::Video(_, info), Direction::Forwards) => {
+                Some(info.count()?.saturating_sub(self.next?))
+            }
         }
     }
 
@@ -129,53 +167,59 @@ impl Frames {
 
     /// Whether the next frame is before the first that is wanted.
     pub fn are_before_first(&self) -> bool {
-        self.next < self.first
+        self.direction == Direction::Forwards && self.next.is_some_and(|next| next < self.first)
     }
 
     /// Passes over the next frame.
     pub fn pass_over(&mut self) -> Result<(), Box<dyn Error>> {
-        let is_there = match &mut self.source {
-            Source::Folder(paths) => paths.next().is_some(),
-            Source::Video(..) => self.picture()?.is_some(),
-        };
-        if !is_there {
-            return Err(too_short(&self.shown, self.next).into());
+        let passed = self.next.unwrap_or(0);
+        match self.next()? {
+            Some(_) => Ok(()),
+            None => Err(too_short(&self.shown, passed).into()),
         }
-        self.next += 1;
-        Ok(())
     }
 
     /// The next frame; none after the last.
     pub fn next(&mut self) -> Result<Option<FrameFile>, Box<dyn Error>> {
-        let frame = match &mut self.source {
-            Source::Folder(paths) => match paths.next() {
-                Some(path) => Some(read(self.next, &path)?),
-                None => None,
-            },
-            Source::Video(..) => self.picture()?,
-        };
-        self.next += 1;
-        Ok(frame)
-    }
-
-    /// The next picture of a video.
-    fn picture(&mut self) -> Result<Option<FrameFile>, Box<dyn Error>> {
-        let Source::Video(decoder, info) = &mut self.source else {
+        let Some(index) = self.next else {
             return Ok(None);
         };
-        let (index, shown) = (self.next, format!("{}, frame {}", self.shown, self.next));
-        let picture = decoder.next_picture();
-        let picture = picture.map_err(|error| format!("{shown}: {error}"))?;
-        if picture.is_none() && index == self.first {
-            return Err(format!("{}: there are no pictures in it", self.shown).into());
+        self.next = match self.direction {
+            Direction::Forwards => Some(index + 1),
+            Direction::Backwards => index.checked_sub(1),
+        };
+        match &mut self.source {
+            Source::Folder(paths) => match paths.next() {
+                Some(path) => Ok(Some(read(index, &path)?)),
+                None => Ok(None),
+            },
+            Source::Video(pictures, info) => {
+                let shown = format!("{}, frame {index}", self.shown);
+                let picture = match pictures {
+                    Pictures::Forwards(decoder) => decoder.next_picture().map_err(Box::from),
+                    Pictures::Backwards(reversed) => reversed.next_picture(info),
+                };
+                let picture = picture.map_err(|error| format!("{shown}: {error}"))?;
+                if picture.is_none() && index == self.first {
+                    return Err(no_picture(&self.shown, index, self.direction).into());
+                }
+                Ok(picture.map(|bytes| FrameFile {
+                    index,
+                    time: Some(info.time(index)),
+                    shown,
+                    file: None,
+                    bytes,
+                }))
+            }
         }
-        Ok(picture.map(|bytes| FrameFile {
-            index,
-            time: Some(info.time(index)),
-            shown,
-            file: None,
-            bytes,
-        }))
+    }
+}
+
+/// Why a video has no picture of this number.
+fn no_picture(shown: &str, index: u64, direction: Direction) -> String {
+    match (direction, index) {
+        (Direction::Backwards, 1..) => format!("{shown}: --start is after its last frame"),
+        _ => format!("{shown}: there are no pictures in it"),
     }
 }
 

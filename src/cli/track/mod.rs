@@ -10,7 +10,9 @@ mod drawn;
 mod follow;
 mod frames;
 mod interrupt;
+mod reversed;
 mod rows;
+mod selection;
 mod start;
 mod targets;
 mod video_file;
@@ -22,9 +24,10 @@ use bagtrack_sessions::MAX_TARGETS;
 use bagtrack_tracker::Rect;
 use drawn::Destination;
 use follow::Job;
-use frames::Frames;
+use frames::{Direction, Frames};
 use interrupt::Interrupt;
 use rows::Rows;
+use selection::Selection;
 use start::Start;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -46,6 +49,19 @@ pub struct Args {
     /// there, and the frames before it are passed over.
     #[arg(long, value_name = "FRAME|TIME", value_parser = start::parse)]
     start: Option<Start>,
+    /// Tracks at most so many frames after the first one.
+    #[arg(long, value_name = "N")]
+    frames: Option<u64>,
+    /// Tracks from the first frame back to the beginning of the video or folder.
+    #[arg(long)]
+    backwards: bool,
+    /// Ends when all targets are lost. A target's last row is the one in which it is lost.
+    #[arg(long)]
+    until_lost: bool,
+    /// Writes only key frames: between two of them straight lines give every edge of every box to within a pixel. They
+    /// are written at the end. Where a target is lost, the run of lost frames has a key frame at each of its ends.
+    #[arg(long)]
+    keyframes: bool,
     #[command(flatten)]
     params: ParamFlags,
     /// Seed of all random draws: the same seed gives the same boxes.
@@ -71,7 +87,11 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     params.seed = args.seed.unwrap_or(params.seed);
     check(&args)?;
     let destination = args.draw.as_deref().map(Destination::of).transpose()?;
-    let frames = Frames::open(&args.path, args.start.unwrap_or(Start::Frame(0)))?;
+    let direction = match args.backwards {
+        true => Direction::Backwards,
+        false => Direction::Forwards,
+    };
+    let frames = Frames::open(&args.path, args.start.unwrap_or(Start::Frame(0)), direction)?;
     let boxes = match args.boxes.is_empty() {
         true => vec![annotated(&args.path, frames.first())?],
         false => args.boxes,
@@ -84,9 +104,11 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     let bar = match rows.are_on_terminal() {
         // The rows tell how far it is, and a bar would be among them.
         true => indicatif::ProgressBar::hidden(),
-        false => progress::bar_or_count(frames.left(), "frames"),
+        false => progress::bar_or_count(left(&frames, args.frames), "frames"),
     };
     let job = Job {
+        selection: Selection::new(boxes.len(), args.until_lost, args.keyframes),
+        count: args.frames,
         frames,
         boxes,
         params,
@@ -103,6 +125,12 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     Ok(interrupt.exit_code())
 }
 
+/// How many frames are taken, where that is known.
+fn left(frames: &Frames, most: Option<u64>) -> Option<u64> {
+    let wanted = most.map(|most| most.saturating_add(1));
+    frames.left().into_iter().chain(wanted).min()
+}
+
 /// What can be told before any file is opened.
 fn check(args: &Args) -> Result<(), String> {
     let count = args.boxes.len();
@@ -115,6 +143,14 @@ fn check(args: &Args) -> Result<(), String> {
         return Err(
             "--format otb has one target a file: take --format mot or csv, or run once for each box".to_owned(),
         );
+    }
+    if args.keyframes && !args.format.has_target() {
+        let text = "--format otb has a row for every frame: take --format csv, json or mot for --keyframes";
+        return Err(text.to_owned());
+    }
+    if args.backwards && args.start.is_none() {
+        let text = "--backwards goes from --start to the first frame: give --start, a frame's number or time";
+        return Err(text.to_owned());
     }
     Ok(())
 }

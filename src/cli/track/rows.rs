@@ -42,8 +42,8 @@ impl Rows {
         self.is_on_terminal
     }
 
-    /// Writes the lines of a frame.
-    pub fn write<'a>(&mut self, rows: impl Iterator<Item = Row<'a>>) -> io::Result<()> {
+    /// Writes the lines of these rows.
+    pub fn write(&mut self, rows: &[Row]) -> io::Result<()> {
         let mut text = String::new();
         if !self.has_begun {
             text.extend(self.format.header(self.columns));
@@ -52,7 +52,7 @@ impl Rows {
             }
         }
         for row in rows {
-            text += &self.format.line(&row, self.columns)?;
+            text += &self.format.line(row, self.columns)?;
             text.push('\n');
         }
         self.has_begun = true;

@@ -1,7 +1,7 @@
 //! The targets of `bagtrack track`: a tracker for each, which all see the same frames.
 
 use bagtrack_ingest::Limits;
-use bagtrack_sessions::{PerTarget, frame_format, largest_format, target_seed};
+use bagtrack_sessions::{PerTarget, frame_format, largest_format};
 use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
 use std::error::Error;
 
@@ -15,11 +15,11 @@ impl Targets {
         let format = |source| frame_format(params, source, &list);
         let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &format)?;
         let start = |(target, given): (usize, &Rect)| {
-            let mut params = params.clone();
-            params.seed = target_seed(params.seed, target);
-            Tracker::new(&frame, *given, params).map_err(|error| match boxes.len() {
-                1 => error.to_string(),
-                _ => format!("target {target}: {error}"),
+            Tracker::new(&frame, *given, params.of_target(target)).map_err(|error| {
+                match boxes.len() {
+                    1 => error.to_string(),
+                    _ => format!("target {target}: {error}"),
+                }
             })
         };
         let trackers = boxes.iter().enumerate().map(start);

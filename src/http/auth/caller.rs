@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 use uuid::Uuid;
 
-/// Who makes a request, as the layer [`authenticate`](super::layer::authenticate) has found.
+/// Who makes a request, as the layer [`authenticate`](crate::http::middleware::authenticate::authenticate) has found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Caller {
     owner: Owner,

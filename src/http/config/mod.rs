@@ -6,6 +6,7 @@
 //! the first, [`memory_bound`] computes the second.
 
 pub mod access;
+pub mod base_path;
 pub mod flag_values;
 pub mod limits;
 pub mod memory_bound;

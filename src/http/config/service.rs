@@ -6,7 +6,7 @@ use super::limits::LimitsConfig;
 use super::store::StoreConfig;
 #[cfg(feature = "tls")]
 use super::tls::TlsConfig;
-use crate::http::middleware::base_path::BasePath;
+use crate::http::config::base_path::BasePath;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;

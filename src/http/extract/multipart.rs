@@ -1,10 +1,10 @@
 //! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
 
 use super::body::{self, Buffer};
-use super::fields::Fields;
 use super::misnamed;
 use super::settings::Settings;
 use super::texts::MAX_TEXT_BYTES;
+use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
 use axum::extract::multipart::{Field, MultipartError};

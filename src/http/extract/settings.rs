@@ -29,6 +29,20 @@ pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
     const SCHEMA_PREFIX: &'static str;
 }
 
+/// Off, unless it is given: as `name`, `name=true` or `name=1`. Python clients write `True` and `False`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Switch(pub bool);
+
+impl<'de> Deserialize<'de> for Switch {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match &*Cow::<str>::deserialize(deserializer)? {
+            "" | "true" | "True" | "1" => Ok(Self(true)),
+            "false" | "False" | "0" => Ok(Self(false)),
+            _ => Err(D::Error::custom("a switch is `true` or `false`")),
+        }
+    }
+}
+
 /// The greatest number that JSON holds exactly in every language: 2^53 - 1.
 pub const MAX_EXACT: u64 = (1 << 53) - 1;
 const MAX_TARGET: u64 = MAX_TARGETS as u64 - 1;

@@ -6,8 +6,8 @@
 //! only where `debug` is asked for.
 
 use super::client_identity::note_address;
-use super::request_id;
 use super::trace_context::{TRACEPARENT, TraceContext};
+use crate::http::extract::instance::Instance;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
@@ -55,7 +55,7 @@ pub async fn log_request(
 }
 
 fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
-    let id = request_id::of(request);
+    let id = Instance::of(request).request_id;
     let (method, path) = (request.method(), logged(request.uri().path()));
     match is_probe {
         true => {

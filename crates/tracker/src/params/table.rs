@@ -10,6 +10,9 @@ use crate::image::frame::FrameFormat;
 use crate::image::rect::Rect;
 use crate::image::resolution;
 
+/// The seeds of two targets in a row are so far apart: 2⁶⁴ over the golden ratio.
+const SEED_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+
 /// Values of a cell with [`Features::Gradients`]: nine directions, two of chroma and the gray value.
 pub(crate) const CELL_VALUES: usize = 12;
 
@@ -199,6 +202,16 @@ impl Params {
             size: resolution::working_size(source, target, self.target_side),
             has_color: self.features == Features::Gradients,
         }
+    }
+
+    /// The parameters of one of several targets that see the same frames, counted from 0: each has draws of its own, and
+    /// those of the first are these.
+    pub fn of_target(&self, target: usize) -> Self {
+        let mut params = self.clone();
+        params.seed = self
+            .seed
+            .wrapping_add(SEED_STEP.wrapping_mul(target as u64));
+        params
     }
 
     /// D, the length of a feature vector.

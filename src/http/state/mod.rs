@@ -1,15 +1,19 @@
 //! What all handlers share.
+//!
+//! In: the settings, the keys, the clock and the store. Out: an [`AppState`], whose clones are the same.
+
+mod saturation;
 
 use crate::http::auth::access::Access;
 use crate::http::config::service::Config;
 use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
-use crate::http::resources::saturation::Saturation;
 use bagtrack_sessions::{
-    Admission, ByteBudget, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
+    Admission, ByteBudget, ByteCharge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
     ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
+use saturation::Saturation;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -63,6 +67,7 @@ impl AppState {
         store: Option<Arc<dyn SessionStore>>,
     ) -> io::Result<Self> {
         let metrics = Metrics::new();
+        let clients = Clients::new(&config, store.is_some());
         let service = SessionService::new(ServiceParts {
             settings: settings(&config),
             registry: registry(&config, &clock, store.is_some()),
@@ -77,8 +82,8 @@ impl AppState {
         });
         Ok(Self(Arc::new(Shared {
             service,
-            uploads: ByteBudget::new(config.max_upload_bytes),
-            clients: Clients::new(&config),
+            uploads: clients.all().upload_bytes.clone(),
+            clients,
             access,
             metrics,
             // A client has one at a time, and no client all of them.
@@ -100,9 +105,34 @@ impl AppState {
         self.clock.wall(self.clock.now())
     }
 
+    /// Memory for a client's upload or answer: none so far.
+    pub fn charge(&self, client: &Client) -> ByteCharge {
+        ByteCharge::new(&self.uploads, self.clients.account(client).bytes())
+    }
+
     /// In whose turn the work of a client is done.
     pub fn flow(&self, client: &Client) -> Flow {
         self.clients.account(client).flow()
+    }
+
+    /// Sets the gauges of the metrics to what they are now.
+    pub fn measure(&self) {
+        let (gauges, config) = (&self.metrics.gauges, &self.config);
+        let (admission, workers) = (&self.service.admission, config.worker_count());
+        let queued = config.queue.saturating_sub(admission.queue_places());
+        gauges.sessions.set(self.service.registry.len() as f64);
+        gauges.max_sessions.set(config.max_sessions as f64);
+        gauges.queued.set(queued as f64);
+        gauges.workers.set(workers as f64);
+        let busy = admission.busy_workers().min(workers);
+        gauges.workers_busy.set(busy as f64);
+        gauges.draining.set(f64::from(u8::from(self.is_draining())));
+        if let Some(store) = &self.service.store {
+            self.metrics.store(store.is_ready(), store.failures());
+        }
+        if let Some(memory) = memory_stats::memory_stats() {
+            gauges.resident_memory.set(memory.physical_mem as f64);
+        }
     }
 
     /// When the session expires, in RFC 3339.

@@ -1,0 +1,69 @@
+//! The pictures of a video from one of them back to its first.
+
+use super::frames::FFMPEG;
+use super::video_info::VideoInfo;
+use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
+use std::error::Error;
+use std::path::PathBuf;
+
+/// So many pictures are decoded forwards and kept, as JPEG files, to be given backwards.
+const RUN: u64 = 64;
+
+/// A video that is read backwards, run by run.
+pub struct Reversed {
+    path: PathBuf,
+    limits: VideoLimits,
+    /// The pictures before this one are not decoded yet.
+    end: u64,
+    /// The pictures from `end` on that are still to be given; the next one is the last.
+    run: Vec<Vec<u8>>,
+}
+
+impl Reversed {
+    /// The pictures from number `first` back to number 0.
+    pub fn new(path: PathBuf, limits: VideoLimits, first: u64) -> Self {
+        Self {
+            path,
+            limits,
+            end: first + 1,
+            run: Vec::new(),
+        }
+    }
+
+    /// The picture before the last one; none after number 0, or where the video has too few pictures.
+    pub fn next_picture(&mut self, info: &VideoInfo) -> Result<Option<Vec<u8>>, Box<dyn Error>> {
+        if self.run.is_empty() && self.end > 0 {
+            self.decode_run(info)?;
+        }
+        Ok(self.run.pop())
+    }
+
+    /// Decodes the run before `end`: in a file without an index, from the file's beginning.
+    fn decode_run(&mut self, info: &VideoInfo) -> Result<(), Box<dyn Error>> {
+        let begin = self.end.saturating_sub(RUN);
+        let from = info.seek_to(begin);
+        let decoder = VideoDecoder::of_file(FFMPEG, &self.path, from, self.limits)
+            .map_err(|error| format!("{error}; install ffmpeg"))?;
+        self.run = pictures(decoder, from.map_or(begin, |_| 0), self.end - begin)?;
+        self.end = begin;
+        Ok(())
+    }
+}
+
+/// So many pictures after those that are passed over; none where there are fewer.
+fn pictures(
+    mut decoder: VideoDecoder,
+    passed_over: u64,
+    count: u64,
+) -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
+    let mut found = Vec::new();
+    for index in 0..passed_over + count {
+        let Some(picture) = decoder.next_picture()? else {
+            return Ok(Vec::new());
+        };
+        if index >= passed_over {
+            found.push(picture);
+        }
+    }
+    Ok(found)
+}
