@@ -2,8 +2,8 @@
 
     python detect_and_follow.py clip.mp4 --detector detectors:people
 
-The detector is a function of a module of yours: it takes a frame (height x width x 3, BGR) and gives boxes (x, y, width,
-height), the best one first, or none. With a package of detectors that is three lines, such as
+The detector is a function of a module of yours: it takes a frame (height x width x 3, BGR) and gives boxes (x, y,
+width, height), the best one first, or none. With a package of detectors that is three lines, such as
 
     model = ultralytics.YOLO("yolo11n.pt")
     def people(frame):

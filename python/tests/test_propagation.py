@@ -1,4 +1,4 @@
-"""`bagtrack.propagate`, the examples around it, and `to_detections`, against the command and the package supervision."""
+"""`bagtrack.propagate`, the examples around it, and `to_detections`: against the command, and with supervision."""
 
 from __future__ import annotations
 

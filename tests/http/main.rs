@@ -21,6 +21,8 @@ mod forged;
 mod forms;
 mod heavy;
 mod hostile_connections;
+#[cfg(feature = "tls")]
+mod https;
 mod idempotency;
 mod identity;
 mod labels;
@@ -40,6 +42,7 @@ mod provoke;
 mod quotas;
 mod raw;
 mod replay;
+mod shares;
 mod short_flags;
 mod slow_line;
 mod snapshots;

@@ -67,6 +67,7 @@ impl AppState {
         store: Option<Arc<dyn SessionStore>>,
     ) -> io::Result<Self> {
         let metrics = Metrics::new();
+        let clients = Clients::new(&config, store.is_some());
         let service = SessionService::new(ServiceParts {
             settings: settings(&config),
             registry: registry(&config, &clock, store.is_some()),
@@ -81,8 +82,8 @@ impl AppState {
         });
         Ok(Self(Arc::new(Shared {
             service,
-            uploads: ByteBudget::new(config.max_upload_bytes),
-            clients: Clients::new(&config),
+            uploads: clients.all().upload_bytes.clone(),
+            clients,
             access,
             metrics,
             // A client has one at a time, and no client all of them.

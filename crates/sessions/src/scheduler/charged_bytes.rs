@@ -1,6 +1,6 @@
 //! Bytes that own the memory which they are charged to.
 
-use super::byte_budget::ByteCharge;
+use super::budget::Charge as ByteCharge;
 use bytes::Bytes;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! The service in this process, with a certificate or without.
 
-use crate::certificates::Files;
+use super::certificates::Files;
 use bagtrack::http::{Application, Config, TlsConfig};
 use std::net::SocketAddr;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Certificates that openssl makes as docs/HTTPS.md says, and curl as the client.
 
-use crate::program::Program;
+use super::program::Program;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

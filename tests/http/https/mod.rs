@@ -1,7 +1,5 @@
 //! The service over TLS: with certificates made here, and with those of openssl and curl as the client.
 
-#![cfg(feature = "tls")]
-
 mod certificates;
 mod client;
 mod curl;

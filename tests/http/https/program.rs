@@ -1,7 +1,7 @@
 //! The program with a certificate: its start, its health check, and SIGHUP.
 
-use crate::certificates::{Authority, Files, kinds};
-use crate::client::{Client, PATIENCE, trusting};
+use super::certificates::{Authority, Files, kinds};
+use super::client::{Client, PATIENCE, trusting};
 use rustix::process::{Pid, Signal, kill_process};
 use std::net::SocketAddr;
 use std::path::Path;

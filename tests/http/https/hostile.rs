@@ -1,8 +1,8 @@
 //! Clients that make no handshake, or make it slowly, and clients that do not read.
 
-use crate::certificates::{Authority, Files, kinds};
-use crate::client::{Client, PATIENCE, trusting};
-use crate::service::Service;
+use super::certificates::{Authority, Files, kinds};
+use super::client::{Client, PATIENCE, trusting};
+use super::service::Service;
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;

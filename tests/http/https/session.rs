@@ -1,8 +1,8 @@
 //! Sessions over TLS.
 
-use crate::certificates::{Authority, kinds};
-use crate::client::{Client, trusting};
-use crate::service::Service;
+use super::certificates::{Authority, kinds};
+use super::client::{Client, trusting};
+use super::service::Service;
 use bagtrack_testing::picture_files as pictures;
 use futures_util::{SinkExt, StreamExt};
 use image::{DynamicImage, ImageFormat};
