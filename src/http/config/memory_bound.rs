@@ -1,5 +1,6 @@
 //! How much memory the service takes at most, by its settings.
 
+use super::limits::OFF;
 use super::service::Config;
 use bagtrack_ingest::video::MAX_DECODER_MEMORY;
 use bagtrack_sessions::{MAX_LIST_BYTES, threads_of};
@@ -57,7 +58,10 @@ impl MemoryBound {
                 + threads * (WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES)),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * connection(config),
-            videos: count(config.video_places()) * MAX_DECODER_MEMORY,
+            videos: match config.limits.ffmpeg.as_str() {
+                OFF => 0,
+                _ => count(config.video_places()) * MAX_DECODER_MEMORY,
+            },
         }
     }
 

@@ -1,6 +1,7 @@
 //! The frames of an uploaded video, as they are decoded.
 
 use super::video_place::VideoPlace;
+use crate::http::config::limits::OFF;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
@@ -14,9 +15,6 @@ use tokio::time::timeout;
 
 /// Decoded pictures that wait to be tracked.
 const MAX_WAITING: usize = 2;
-
-/// In place of the program's name: there is none.
-const OFF: &str = "off";
 
 /// The frames of a video. Its process ends when this is dropped.
 #[derive(Debug)]
@@ -51,7 +49,7 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let launcher = &config.limits.ffmpeg_launcher;
+        let launcher = &config.limits.ffmpeg_launcher.0;
         let mut decoder =
             VideoDecoder::of_bytes(launcher, &config.limits.ffmpeg, video, format, limits)?;
         let stop = decoder.stop();
