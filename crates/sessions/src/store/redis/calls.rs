@@ -5,11 +5,11 @@ use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, St
 use super::address::StoreAddress;
 use super::connection::{Call, Connection};
 use super::scripts::Scripts;
+use crate::clock::sleep;
 use crate::owner::Owner;
 use redis::{FromRedisValue, Script, ScriptInvocation};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
-use tokio::time::sleep;
 use uuid::Uuid;
 
 /// How long an idempotency key names its session.
