@@ -21,7 +21,7 @@ use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::response::Response;
-use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
+use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
@@ -199,7 +199,7 @@ impl CreateRequest {
         let digest = self.digest();
         let (upload, mut files) = (self.upload.settings, self.upload.files);
         let file = files.swap_remove(0);
-        let start = if self.upload.is_snapshot || file.starts_with(SNAPSHOT_MAGIC) {
+        let start = if self.upload.is_snapshot || is_snapshot(&file) {
             let allowed = CreateSettings {
                 verbose: upload.verbose,
                 ..CreateSettings::default()
