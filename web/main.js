@@ -5,7 +5,7 @@ import { Camera, openCamera } from "./camera.js";
 import { Chart, showVotes } from "./chart.js";
 import { SampleClip } from "./clip.js";
 import { openFile } from "./file.js";
-import { Client, Problem } from "./js/bagtrack.js";
+import { Client, LocalClient, Problem } from "./js/bagtrack.js";
 import { words } from "./problems.js";
 import { encodes, extension, makeVideo } from "./recording.js";
 import { Run } from "./run.js";
@@ -25,6 +25,9 @@ const chart = new Chart(/** @type {HTMLCanvasElement} */ (get("chart")));
 const see = /** @type {HTMLInputElement} */ (get("see"));
 /** What fails for longer is said. */
 const client = new Client(new URL(".", location.href), { patience: 1500 });
+/** Tracks in this page. */
+const local = new LocalClient();
+const here = /** @type {HTMLInputElement} */ (get("here"));
 const DRAW = "Draw a box around what to follow.";
 const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
 const FOLLOWING = "Following. Draw again to correct the box.";
@@ -82,7 +85,8 @@ async function choose(open) {
     const source = await open();
     const first = await source.first();
     if (own !== choice) return source.stop();
-    run = new Run(client, source, first, { answer: answered, fail, line, anew, end: ended });
+    if (here.checked) local.warm().catch(() => undefined);
+    run = new Run(here.checked ? local : client, source, first, { answer: answered, fail, line, anew, end: ended });
     run.sees = see.checked;
     isUnsaved = false;
     for (const id of ["stage", "keys", "controls"]) get(id).hidden = false;

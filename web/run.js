@@ -1,6 +1,6 @@
 // One run: a source of frames, its session, and what the service answers.
 
-import { Problem } from "./js/bagtrack.js";
+import { LocalClient, LocalStream, Problem } from "./js/bagtrack.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
@@ -37,7 +37,7 @@ const MOST_KEPT = 512 << 20;
 
 export class Run {
   /**
-   * @param {import("./js/bagtrack.js").Client} client
+   * @param {import("./js/bagtrack.js").Client | import("./js/bagtrack.js").LocalClient} client Where it is tracked.
    * @param {import("./source.js").Source} source
    * @param {Picture} picture The first one.
    * @param {Told} told
@@ -65,13 +65,13 @@ export class Run {
     this.hasAll = false;
     /** @type {Sent[]} Oldest first. */
     this.underWay = [];
-    /** @type {import("./js/bagtrack.js").Session | undefined} */
+    /** @type {import("./js/bagtrack.js").Session | import("./js/bagtrack.js").LocalSession | undefined} */
     this.session = undefined;
     /** Whether the session has answered. */
     this.hasAnswered = false;
     /** @type {Box | undefined} A box that was drawn, until the frames on their way are answered. */
     this.drawn = undefined;
-    /** @type {import("./js/bagtrack.js").FrameStream | undefined} */
+    /** @type {import("./js/bagtrack.js").FrameStream | LocalStream | undefined} */
     this.stream = undefined;
   }
 
@@ -99,7 +99,10 @@ export class Run {
   /** Opens a session with the box in the picture that was answered last.
    * @param {Box} box */
   async open(box) {
-    const session = await this.client.open(this.picture.blob, box);
+    // In the page the frame is tracked as it is shown, with the service as it is uploaded.
+    const { client, picture } = this;
+    const isHere = client instanceof LocalClient;
+    const session = await (isHere ? client.open(picture.image, box) : client.open(picture.blob, box));
     this.session = session;
     this.hasAnswered = false;
     if (this.isOver) {
@@ -136,7 +139,9 @@ export class Run {
     const { stream } = this;
     if (!stream) return;
     try {
-      const answer = await stream.track(sent.picture.blob, sent.header);
+      const { image, blob } = sent.picture;
+      const isHere = stream instanceof LocalStream;
+      const answer = await (isHere ? stream.track(image, sent.header) : stream.track(blob, sent.header));
       if (this.stream !== stream) return;
       this.underWay = this.underWay.filter((other) => other !== sent);
       if (answer) this.answered(answer, sent);

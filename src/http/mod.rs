@@ -38,16 +38,16 @@ mod stream;
 
 pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
-pub use config::access::{AccessConfig, Secret};
+pub use config::access::AccessConfig;
 pub use config::base_path::{BasePath, BasePathError};
 pub use config::flag_values::{parse_duration, parse_listen};
 pub use config::limits::LimitsConfig;
 pub use config::memory_bound::MemoryBound;
 pub use config::service::Config;
+pub use config::settings::{ConfigError, Secret};
 pub use config::store::StoreConfig;
 #[cfg(feature = "tls")]
 pub use config::tls::TlsConfig;
-pub use config::validation::ConfigError;
 pub use extract::uploaded::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 #[cfg(feature = "tls")]
 pub use net::certificate::{Certificate, CertificateError};

@@ -4,7 +4,7 @@ use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::{forged, pictures};
 use bagtrack::http::Secret;
 use bagtrack_sessions::{Fingerprint, SNAPSHOT_MAGIC};
-use bagtrack_tracker::{Estimate, Rect};
+use bagtrack_tracker::{Estimate, Frame, Preset, Rect, Tracker};
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use reqwest::StatusCode;
@@ -122,6 +122,47 @@ async fn a_snapshot_is_taken_from_services_with_the_same_secret_only() {
         let problem = expect_problem(restored(from, to).await, "invalid-snapshot").await;
         let detail = problem["detail"].as_str().unwrap();
         assert!(detail.contains("BAGTRACK_SNAPSHOT_KEYS"), "{detail}");
+    }
+}
+
+/// A tracker's own snapshot, from a page or a program, goes on where unsigned ones are taken, and only there.
+#[tokio::test]
+async fn a_tracker_goes_on_in_a_service_that_takes_unsigned_snapshots() {
+    let frame = |t| {
+        let picture = image::load_from_memory(&pictures::png(t))
+            .unwrap()
+            .into_rgb8();
+        Frame::from_rgb(picture.width(), picture.height(), &picture).unwrap()
+    };
+    let [x, y, width, height] =
+        [0, 1, 2, 3].map(|at| BOX.split(',').nth(at).unwrap().parse().unwrap());
+    let target = Rect::new(x, y, width, height);
+    let mut tracker = Tracker::new(&frame(0), target, Preset::Robust.params()).unwrap();
+    for t in 1..8 {
+        tracker.step(&frame(t)).unwrap();
+    }
+    let snapshot = tracker.snapshot();
+
+    let strict = TestApplication::start().await;
+    let refused = strict.create(snapshot.clone(), &[]).await;
+    expect_problem(refused, "invalid-snapshot").await;
+
+    let open = unsigned(64).await;
+    let mut damaged = snapshot.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    expect_problem(open.create(damaged, &[]).await, "invalid-snapshot").await;
+    let created = expect(open.create(snapshot, &[]).await, StatusCode::CREATED).await;
+    assert_eq!(created["frame"], 7);
+    let id = created["id"].as_str().unwrap();
+    let again = open.post_numbered(id, 7, pictures::png(7)).await;
+    expect_problem(again, "frame-differs").await;
+    for t in 8..16 {
+        let answer = expect(open.post_frame(id, pictures::png(t)).await, StatusCode::OK).await;
+        let estimate = tracker.step(&frame(t)).unwrap();
+        // The service rounds to a hundredth.
+        for (side, value) in [("x", estimate.target.x), ("width", estimate.target.width)] {
+            assert!((answer["box"][side].as_f64().unwrap() - value).abs() <= 0.005);
+        }
     }
 }
 

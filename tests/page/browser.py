@@ -33,8 +33,9 @@ class Checks:
         own = ["--no-sandbox"] + ["--disable-features=LocalNetworkAccessChecks"] * self.from_disk
         return self.playwright.chromium.launch(executable_path="/usr/bin/chromium", args=[*own, *flags])
 
-    def page(self, url=None, browser=None, allowed=(), **options):
-        """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes."""
+    def page(self, url=None, browser=None, allowed=(), where="there", **options):
+        """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes. `where` it
+        tracks: `there` at the service, or `here` in the page."""
         context = (browser or self.browser).new_context(**{"viewport": {"width": 1000, "height": 1100}, **options})
         page = context.new_page()
         url = url or self.service.url
@@ -52,6 +53,7 @@ class Checks:
             page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
         page.goto(url + "/")
         said(page, "Nothing is uploaded")
+        page.locator(f"#{where}").evaluate("button => button.click()")
         return page
 
     def shot(self, page, name):

@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 
-const PROGRAM = process.env.BAGTRACK ?? fileURLToPath(new URL("../../../target/debug/bagtrack", import.meta.url));
+export const PROGRAM = process.env.BAGTRACK ?? fileURLToPath(new URL("../../../target/debug/bagtrack", import.meta.url));
 export const SEED = 7;
 const FRAMES = 101;
 

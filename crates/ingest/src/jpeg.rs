@@ -30,6 +30,10 @@ impl<'file> Jpeg<'file> {
     pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
         let damaged = |reason: &str| Format::Jpeg.damaged(reason);
         let markers = Markers::read(bytes).map_err(damaged)?;
+        // A height of 0 would be told after the first scan; no decoder here reads that.
+        if markers.width == 0 || markers.height == 0 {
+            return Err(damaged("its width or its height is 0"));
+        }
         limits.check_size(markers.width, markers.height)?;
         if markers.is_implausibly_small() {
             return Err(damaged("it holds less data than its size needs"));

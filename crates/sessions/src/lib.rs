@@ -69,7 +69,9 @@ pub use scheduler::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
 pub use session::Session;
 pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
 pub use short_id::short_id;
-pub use snapshot::{KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError};
+pub use snapshot::{
+    KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError, is_snapshot,
+};
 pub use state::{SessionState, StepError};
 pub use store::{
     AddressError, Commit, Gone, Intent, Local, Outcome, Record, RedisStore, SessionName,

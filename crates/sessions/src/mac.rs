@@ -48,6 +48,12 @@ impl MacKeys {
         self
     }
 
+    /// Whether unsigned bytes are accepted.
+    pub fn accept_unsigned(&self) -> bool {
+        let public = blake3::derive_key(self.context, UNSIGNED);
+        self.accepted.contains(&public)
+    }
+
     /// The code of `message`.
     pub fn sign(&self, message: &[u8]) -> [u8; MAC_BYTES] {
         *blake3::keyed_hash(&self.signing, message).as_bytes()

@@ -6,13 +6,16 @@
 //! is another one, and the number of targets comes first. Snapshots come from clients, so nothing in them is read
 //! before the code is checked. A service may accept unsigned ones, so all in them is bounded and checked nevertheless:
 //! of the stored answers only as many are kept as a request may have, and the tracker validates its own part.
+//!
+//! A tracker's own snapshot is a session too: that of a tracker in a page or a program, which has no key. It is accepted
+//! where unsigned ones are.
 
 use super::compression;
 use super::mac::{MAC_BYTES, MacKeys};
 use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
 use super::targets::Targets;
-use bagtrack_tracker::{Tracker, TrackerError};
+use bagtrack_tracker::{SNAPSHOT_MAGIC as TRACKER_MAGIC, Tracker, TrackerError};
 use postcard::take_from_bytes;
 use serde::Serialize;
 use serde::de::Deserialize;
@@ -36,12 +39,20 @@ pub enum SnapshotError {
     /// Changed on the way, or signed with a key that this service does not have.
     #[error("it was changed, or signed by a service with other keys (BAGTRACK_SNAPSHOT_KEYS)")]
     NotAuthentic,
+    /// A tracker's own, where unsigned ones are not accepted.
+    #[error("it is not signed, and this service takes signed ones alone (--unsigned-snapshots)")]
+    Unsigned,
     /// Written by another version of the program.
     #[error("it has format version {0}, and this service reads {VERSION} and {LIST_VERSION}")]
     Version(u8),
     /// The tracker does not accept its part.
     #[error(transparent)]
     Tracker(#[from] TrackerError),
+}
+
+/// Whether bytes begin as a snapshot of a session or of a tracker does.
+pub fn is_snapshot(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC) || bytes.starts_with(TRACKER_MAGIC)
 }
 
 /// What a snapshot holds.
@@ -70,6 +81,9 @@ impl SessionSnapshot {
         keys: &MacKeys,
         max_recent: usize,
     ) -> Result<Self, SnapshotError> {
+        if bytes.starts_with(TRACKER_MAGIC) {
+            return Self::of_tracker(bytes, keys);
+        }
         check_version(bytes)?;
         let (content, code) = bytes
             .split_last_chunk::<MAC_BYTES>()
@@ -78,6 +92,24 @@ impl SessionSnapshot {
             return Err(SnapshotError::NotAuthentic);
         }
         Self::read(content, max_recent)
+    }
+
+    /// The session of a tracker that was elsewhere until now. Which bytes its last frame had is not known.
+    fn of_tracker(bytes: &[u8], keys: &MacKeys) -> Result<Self, SnapshotError> {
+        if !keys.accept_unsigned() {
+            return Err(SnapshotError::Unsigned);
+        }
+        let trackers = PerTarget::One(Tracker::restore(bytes)?);
+        let targets = Targets::restored(trackers).ok_or(SnapshotError::Damaged)?;
+        let answers = targets.estimates().map(|&estimate| TargetAnswer {
+            given: None,
+            estimate,
+        });
+        let recent = vec![Answered {
+            fingerprint: Fingerprint::of(bytes),
+            targets: answers,
+        }];
+        Ok(Self { targets, recent })
     }
 
     /// The bytes of a session, without a code.

@@ -122,5 +122,6 @@ pub use input::MIN_BOX_SIDE;
 pub use key_frames::KeyFrames;
 pub use params::presets::Preset;
 pub use params::table::{Features, Parameter, Params, ParamsError, Search};
+pub use snapshot::MAGIC as SNAPSHOT_MAGIC;
 pub use tracker::Tracker;
 pub use weights::{Likelihoods, arg_max, sum_rule_weights};

@@ -17,7 +17,8 @@ use crate::params::table::Search;
 use crate::state::State;
 use crate::workspace;
 
-const MAGIC: &[u8; 8] = b"BAGTRACK";
+/// The first bytes of every snapshot.
+pub const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
 const VERSION: u32 = 17;
 const HEADER: usize = 16;

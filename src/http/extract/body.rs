@@ -3,6 +3,7 @@
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
 
+use super::multipart::{HeadTooLong, MAX_HEAD_BYTES};
 use super::pace::{TooSlow, paced};
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
@@ -96,6 +97,12 @@ pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Proble
         }
         if error.is::<TimeoutError>() || error.is::<TooSlow>() {
             return Problem::body_timeout();
+        }
+        if error.is::<HeadTooLong>() {
+            return Problem::malformed(format!(
+                "A part of the multipart form has a head of more than {MAX_HEAD_BYTES} bytes, or so many stand before the \
+                 first part."
+            ));
         }
         if let Some(full) = error.downcast_ref::<BytesFull>() {
             return (*full).into();

@@ -12,9 +12,11 @@ use axum::response::Response;
 pub const STRICT: &str =
     "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// The page at `/`: its own style sheet, scripts and pictures, files that the user opens, and calls to this service.
+/// The page at `/`: its own style sheet, scripts, worker with WebAssembly and pictures, files that the user opens, and
+/// calls to this service.
 pub const PAGE_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
-    script-src 'self'; style-src 'self'; img-src 'self' data: blob:; media-src blob:; connect-src 'self'";
+    script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
+    media-src blob:; connect-src 'self'";
 
 /// Swagger UI: its own files, styles within its elements, and calls to this service.
 pub const DOCS_POLICY: &str = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \

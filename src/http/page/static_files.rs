@@ -18,16 +18,17 @@ use std::sync::{Arc, LazyLock};
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const WASM: &str = "application/wasm";
 
-/// A file of the page: its name, media type and text.
-type File = (&'static str, &'static str, &'static str);
+/// A file of the page: its name, media type and bytes.
+type File = (&'static str, &'static str, &'static [u8]);
 
 macro_rules! file {
     ($name:literal, $media_type:ident) => {
         (
             $name,
             $media_type,
-            include_str!(concat!("../../../web/", $name)),
+            include_bytes!(concat!("../../../web/", $name)),
         )
     };
 }
@@ -35,17 +36,20 @@ macro_rules! file {
 /// A file of the JavaScript client, which the page uses.
 macro_rules! client_file {
     ($name:literal) => {
+        client_file!($name, SCRIPT)
+    };
+    ($name:literal, $media_type:ident) => {
         (
             $name,
-            SCRIPT,
-            include_str!(concat!("../../../clients/", $name)),
+            $media_type,
+            include_bytes!(concat!("../../../clients/", $name)),
         )
     };
 }
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 22] = [
+const FILES: [File; 32] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
@@ -61,20 +65,30 @@ const FILES: [File; 22] = [
     file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
     client_file!("js/backoff.js"),
+    client_file!("js/bag.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
+    client_file!("js/image.js"),
     client_file!("js/kept.js"),
+    client_file!("js/local.js"),
+    client_file!("js/module.js"),
     client_file!("js/problem.js"),
     client_file!("js/session.js"),
+    client_file!("js/snapshot.js"),
     client_file!("js/stream.js"),
+    client_file!("js/tracker.js"),
+    client_file!("js/transfer.js"),
     client_file!("js/transport.js"),
+    client_file!("js/worker.js"),
+    client_file!("js/wasm/bagtrack_wasm.js"),
+    client_file!("js/wasm/bagtrack_wasm_bg.wasm", WASM),
 ];
 
 /// All of them, by their names.
 static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
     let files = FILES.iter().chain([&INDEX]);
-    let served = files.map(|(name, media_type, text)| {
-        let bytes = Bytes::from_static(text.as_bytes());
+    let served = files.map(|(name, media_type, bytes)| {
+        let bytes = Bytes::from_static(bytes);
         let file = StaticFile::new(*media_type, PAGE_POLICY, "no-cache", bytes);
         (*name, file)
     });

@@ -15,7 +15,7 @@ use bagtrack_sessions::{
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
-use governor::{Quota, RateLimiter};
+use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 use ipnet::Ipv6Net;
 use std::collections::HashMap;
 use std::num::NonZeroU32;
@@ -33,6 +33,15 @@ pub const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-pol
 const MAX_IDLE_ACCOUNTS: usize = 1024;
 
 type FrameRate = RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInformationMiddleware>;
+
+/// How many frames of WebSockets a client may send.
+pub type MessageRate = DefaultDirectRateLimiter;
+
+/// Frames of WebSockets a second, which carry messages: as many as some hundred cameras send, and so few that they take a
+/// network thread little time, whatever is in them.
+const MESSAGES: NonZeroU32 = NonZeroU32::new(10_000).expect("it is not 0");
+/// And at once.
+const MESSAGES_AT_ONCE: NonZeroU32 = NonZeroU32::new(2_000).expect("it is not 0");
 
 /// What one client may have.
 #[derive(Debug, Clone, Copy)]
@@ -79,6 +88,7 @@ pub struct Account {
     requests: Arc<Semaphore>,
     streams: Arc<Semaphore>,
     videos: Arc<Semaphore>,
+    messages: Arc<MessageRate>,
     frames: Option<FrameRate>,
     /// Frames that were left at some moment.
     frames_left: Mutex<(u32, Instant)>,
@@ -203,6 +213,9 @@ impl Account {
             requests: permits(quotas.requests),
             streams: permits(quotas.streams),
             videos: permits(1),
+            messages: Arc::new(MessageRate::direct(
+                Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
+            )),
             frames,
             frames_left: Mutex::new((
                 quotas.frames.map_or(0, |(_, burst)| burst.get()),
@@ -236,6 +249,11 @@ impl Account {
     pub fn stream(&self) -> Result<OwnedSemaphorePermit, Problem> {
         let permit = self.streams.clone().try_acquire_owned();
         permit.map_err(|_| Problem::quota_exceeded("streams", self.quotas.streams))
+    }
+
+    /// How many frames of WebSockets the client may send.
+    pub fn messages(&self) -> Arc<MessageRate> {
+        self.messages.clone()
     }
 
     /// The place for a video that is decoded.

@@ -1,15 +1,13 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{
-    ExactInput, ExactText, FrameCount, FrameNumber, Settings, TargetInput, TargetNumber, TargetText,
-};
+use crate::http::extract::settings::{FrameCount, FrameNumber, Settings, TargetNumber};
 use crate::http::openapi::example_frames;
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, with_standing};
 use crate::http::respond::json::Json;
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
+use crate::http::respond::target_box::{BoxText, TargetBox};
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
@@ -17,22 +15,19 @@ use bagtrack_sessions::{FrameBatch, GivenBox, box_warnings};
 use serde::Deserialize;
 
 /// The settings of a correction.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct TargetSettings {
     /// The corrected box: `x,y,width,height`, or a JSON object with these names. In the query or in the
     /// body; that of the body counts.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = FrameNumber, inline, required = false)]
     frame: Option<FrameNumber>,
     /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
-    #[param(value_type = TargetText, inline, required = false)]
-    #[schema(value_type = TargetInput, inline, required = false)]
+    #[param(value_type = TargetNumber, inline, required = false)]
     target: Option<TargetNumber>,
 }
 

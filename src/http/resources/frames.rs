@@ -4,7 +4,7 @@ use super::frame_lines;
 use crate::http::extract::answer_form::AnswerForm;
 use crate::http::extract::session_request::SessionRequest;
 use crate::http::extract::settings::Switch;
-use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, FrameNumber, Settings};
+use crate::http::extract::settings::{FrameCount, FrameNumber, Settings};
 use crate::http::openapi::example_frames;
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::problem::Problem;
@@ -18,19 +18,17 @@ use bagtrack_sessions::FrameBatch;
 use serde::Deserialize;
 
 /// The settings of a request with the next frames.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct FramesSettings {
     /// The number of the (first) frame of this request.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = FrameNumber, inline, required = false)]
     frame: Option<FrameNumber>,
     /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
     /// has the answer as JSON.
     #[serde(default)]
     #[param(value_type = bool, required = false, default = false)]
-    #[schema(value_type = bool, required = false, default = false)]
     draw: Switch,
 }
 

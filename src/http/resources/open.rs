@@ -4,7 +4,7 @@ use crate::http::auth::caller::Caller;
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
 use crate::http::extract::settings::Switch;
-use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
+use crate::http::extract::settings::{FrameCount, Seed, Settings};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
 use crate::http::extract::uploaded::admit;
@@ -15,13 +15,13 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::{Account, ClientSessions};
 use crate::http::respond::created_session::{CreatedSession, created};
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::respond::target_box::{BoxText, TargetBox};
+use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::response::Response;
-use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, SNAPSHOT_MAGIC, Start};
+use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
@@ -31,26 +31,23 @@ use uuid::Uuid;
 const DIGEST_FORMAT: u8 = 1;
 
 /// The settings of a new session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct CreateSettings {
     /// The target's box: `x,y,width,height`, or a JSON object with these names. In the query or in the
     /// body; that of the body counts.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     pub r#box: Option<TargetBox>,
     /// In place of `box`, the boxes of several targets, at most 16: `x,y,width,height;x,y,width,height`, or a JSON
     /// array of boxes. Then answers have an array `targets`, in this order.
-    #[param(value_type = BoxesText, inline, required = false)]
-    #[schema(value_type = BoxesInput, inline, required = false)]
+    #[param(value_type = TargetBoxes, inline, required = false)]
     pub boxes: Option<TargetBoxes>,
     /// `robust` (the default) or `paper`.
     #[param(nullable = false)]
     pub preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = Seed, inline, required = false)]
     pub seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
@@ -59,7 +56,6 @@ pub struct CreateSettings {
     pub params: Option<ParamOverrides>,
     /// Whether the answer names the tracker's parameters.
     #[param(value_type = bool, required = false, default = false)]
-    #[schema(value_type = bool, required = false, default = false)]
     #[serde(default)]
     pub verbose: Switch,
 }
@@ -203,7 +199,7 @@ impl CreateRequest {
         let digest = self.digest();
         let (upload, mut files) = (self.upload.settings, self.upload.files);
         let file = files.swap_remove(0);
-        let start = if self.upload.is_snapshot || file.starts_with(SNAPSHOT_MAGIC) {
+        let start = if self.upload.is_snapshot || is_snapshot(&file) {
             let allowed = CreateSettings {
                 verbose: upload.verbose,
                 ..CreateSettings::default()

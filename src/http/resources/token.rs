@@ -63,7 +63,7 @@ pub async fn create(
     let session = path.find(&state).await?;
     let expires = state.now() + Duration::from_secs(seconds.into());
     let token = state.access.tokens.sign(&SessionToken {
-        session: session.id(),
+        session: session.name(),
         owner: session.owner().clone(),
         expires,
     });

@@ -4,9 +4,7 @@ use super::track_video::{Track, VideoTrack};
 use crate::http::auth::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{
-    ExactInput, ExactText, FrameCount, Seed, Settings, TargetInput, TargetNumber, TargetText,
-};
+use crate::http::extract::settings::{FrameCount, Seed, Settings, TargetNumber};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::{Upload, admit};
 use crate::http::extract::video_frames::VideoFrames;
@@ -19,8 +17,8 @@ use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes};
 use crate::http::respond::json::{self, JsonBytes};
 use crate::http::respond::ndjson;
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::respond::target_box::{BoxText, TargetBox};
+use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Request, State};
@@ -33,30 +31,26 @@ use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a request without a session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct TrackSettings {
     /// Without a snapshot, the target's box in the first frame; with one, a correction, as in
     /// `PUT /sessions/{id}/target`: `x,y,width,height`, or a JSON object with these names.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// In place of `box`, the boxes of several targets; see `POST /sessions`. Only without a snapshot.
-    #[param(value_type = BoxesText, inline, required = false)]
-    #[schema(value_type = BoxesInput, inline, required = false)]
+    #[param(value_type = TargetBoxes, inline, required = false)]
     boxes: Option<TargetBoxes>,
     /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
-    #[param(value_type = TargetText, inline, required = false)]
-    #[schema(value_type = TargetInput, inline, required = false)]
+    #[param(value_type = TargetNumber, inline, required = false)]
     target: Option<TargetNumber>,
     /// `robust` (the default) or `paper`. Only without a snapshot.
     #[param(nullable = false)]
     preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
     /// snapshot.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = Seed, inline, required = false)]
     seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
     #[serde(rename = "parameters")]

@@ -9,8 +9,8 @@ use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::service::Config;
+use crate::http::config::settings::ConfigError;
 use crate::http::config::store;
-use crate::http::config::validation::ConfigError;
 use crate::http::middleware::forwarded::is_trusted;
 #[cfg(feature = "tls")]
 use crate::http::net::certificate::{Certificate, CertificateError};

@@ -115,23 +115,49 @@ impl AppState {
         self.clients.account(client).flow()
     }
 
-    /// Sets the gauges of the metrics to what they are now.
+    /// Sets the metrics that are values of a moment.
     pub fn measure(&self) {
-        let (gauges, config) = (&self.metrics.gauges, &self.config);
-        let (admission, workers) = (&self.service.admission, config.worker_count());
+        let (config, admission) = (&self.config, &self.service.admission);
         let queued = config.queue.saturating_sub(admission.queue_places());
-        gauges.sessions.set(self.service.registry.len() as f64);
-        gauges.max_sessions.set(config.max_sessions as f64);
-        gauges.queued.set(queued as f64);
-        gauges.workers.set(workers as f64);
-        let busy = admission.busy_workers().min(workers);
-        gauges.workers_busy.set(busy as f64);
-        gauges.draining.set(f64::from(u8::from(self.is_draining())));
-        if let Some(store) = &self.service.store {
-            self.metrics.store(store.is_ready(), store.failures());
+        let workers = config.worker_count();
+        let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
+        let is_draining = usize::from(self.is_draining());
+        for (name, description, value) in [
+            ("bagtrack_sessions", "Sessions in memory.", sessions),
+            (
+                "bagtrack_sessions_max",
+                "Most sessions there may be.",
+                config.max_sessions,
+            ),
+            (
+                "bagtrack_requests_inside",
+                "Requests with a place in the queue.",
+                queued,
+            ),
+            (
+                "bagtrack_workers_busy",
+                "Workers at work.",
+                busy.min(workers),
+            ),
+            ("bagtrack_workers", "Workers.", workers),
+            (
+                "bagtrack_draining",
+                "1 while the service is about to end.",
+                is_draining,
+            ),
+        ] {
+            self.metrics.set(name, description, value as f64);
         }
         if let Some(memory) = memory_stats::memory_stats() {
-            gauges.resident_memory.set(memory.physical_mem as f64);
+            let (name, bytes) = ("process_resident_memory_bytes", memory.physical_mem as f64);
+            self.metrics
+                .set(name, "Resident memory of the process.", bytes);
+        }
+        if let Some(store) = &self.service.store {
+            let (name, is_up) = ("bagtrack_store_up", f64::from(u8::from(store.is_ready())));
+            self.metrics
+                .set(name, "1 while the store answers and takes writes.", is_up);
+            self.metrics.store_failures(store.failures());
         }
     }
 

@@ -1,5 +1,6 @@
 //! Opens a stream.
 
+use super::fragments::Rates;
 use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::Upgrade;
@@ -89,7 +90,10 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let max_bytes = max_message_bytes(&state, &session);
     let budgets = [state.uploads.clone(), account.bytes().clone()];
     let config = &state.config;
-    let rate = LeastRate::new(config.body_timeout, config.limits.min_body_rate);
+    let rates = Rates {
+        bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+        messages: account.messages(),
+    };
     let stream = SessionStream {
         work: Arc::new(FrameWork {
             state,
@@ -107,7 +111,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     };
     let span = tracing::Span::current();
     let serve = move |socket| stream.run(socket).instrument(span);
-    Ok(upgrade.answer(max_bytes, budgets, rate, serve))
+    Ok(upgrade.answer(max_bytes, budgets, rates, serve))
 }
 
 fn settings(uri: &Uri) -> Result<StreamSettings, Problem> {

@@ -90,6 +90,29 @@ macro_rules! parameters {
                 range: parameters!(@range $($min $max)?),
             }),*];
 
+            /// The value of the parameter `name` of the table. Whole numbers above 2⁵³ are rounded. None where there is no
+            /// such parameter.
+            pub fn value(&self, name: &str) -> Option<f64> {
+                match name {
+                    $(stringify!($name) => Some(self.$name as f64),)*
+                    _ => None,
+                }
+            }
+
+            /// Sets the parameter `name` of the table; [`validate`](Self::validate) checks its range. None where there
+            /// is no such parameter, or where `value` is not of its type: a whole number from 0 on, if it is one.
+            pub fn set(&mut self, name: &str, value: f64) -> Option<()> {
+                match name {
+                    $(stringify!($name) => {
+                        let set = value as $kind;
+                        // A conversion that changes the value is none.
+                        self.$name = (set as f64 == value).then_some(set)?;
+                    })*
+                    _ => return None,
+                }
+                Some(())
+            }
+
             /// Checks every parameter against its range, and sizes against what they may cost together. NaN is out of
             /// every range.
             ///

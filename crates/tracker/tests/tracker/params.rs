@@ -1,6 +1,6 @@
 //! Any valid parameters on any small frames: a finite answer, the same from every copy of the state.
 
-use bagtrack_tracker::{Features, Frame, Params, Rect, Search, Tracker};
+use bagtrack_tracker::{Features, Frame, Params, Preset, Rect, Search, Tracker};
 use proptest::prelude::*;
 
 /// Numbers in [0, 1], the ends and what underflows among them.
@@ -124,5 +124,26 @@ proptest! {
             prop_assert_eq!(answer, tracker.estimate());
             prop_assert!(restored.snapshot() == tracker.snapshot(), "frame {}", t);
         }
+    }
+}
+
+#[test]
+fn parameters_are_read_and_set_by_name() {
+    let mut params = Preset::Robust.params();
+    assert_eq!(params.set("particles", 50.0), Some(()));
+    assert_eq!(params.set("sigma", 0.5), Some(()));
+    assert_eq!((params.particles, params.sigma), (50, 0.5));
+    assert_eq!(params.value("particles"), Some(50.0));
+    for (name, value) in [
+        ("particles", 50.5),
+        ("particles", -1.0),
+        ("seed", f64::NAN),
+        ("features", 1.0),
+    ] {
+        assert_eq!(params.set(name, value), None, "{name}");
+    }
+    assert_eq!(params.particles, 50);
+    for row in Params::TABLE {
+        assert!(params.value(row.name).is_some(), "{}", row.name);
     }
 }

@@ -1,0 +1,277 @@
+// Sessions in this page or process: no service, nothing is uploaded. The same calls as those of `Client` and `Session`.
+
+import { close, sendable } from "./transfer.js";
+import { Problem } from "./problem.js";
+
+/**
+ * @typedef {import("./image.js").Image} Image
+ * @typedef {import("./session.js").Answer} Answer
+ * @typedef {import("./session.js").Box} Box
+ * @typedef {import("./session.js").View} View
+ * @typedef {import("./stream.js").StreamAnswer} StreamAnswer
+ *
+ * @typedef {{resolve: (value: any) => void, reject: (problem: unknown) => void}} Waiting
+ */
+
+/** A thread with trackers. Sessions of one client share it, and decode a frame once for all of them. */
+export class LocalClient {
+  constructor() {
+    /** @type {Promise<any> | undefined} */
+    this.worker = undefined;
+    /** @type {Map<number, Waiting>} Calls without an answer. */
+    this.waiting = new Map();
+    this.calls = 0;
+    /** @type {Promise<unknown>} The calls before are sent. */
+    this.before = Promise.resolve();
+  }
+
+  /** Loads the tracker, so that the first session need not wait for it. */
+  async warm() {
+    this.worker ??= this.start();
+    await this.worker;
+  }
+
+  /**
+   * Opens a session.
+   * @param {Image} image The first frame.
+   * @param {Box} box The target's box in it.
+   * @param {import("./tracker.js").TrackerOptions & {signal?: AbortSignal}} [options]
+   */
+  async open(image, box, { signal, ...options } = {}) {
+    const { id, answer } = await this.call("open", { image, box, options }, signal);
+    return new LocalSession(this, id, answer);
+  }
+
+  /** Opens a session that goes on where a snapshot was taken: here, by another local session, or by the service.
+   * @param {Uint8Array<ArrayBuffer>} snapshot
+   * @param {AbortSignal} [signal] */
+  async restore(snapshot, signal) {
+    const { id, answer } = await this.call("restore", { snapshot }, signal);
+    return new LocalSession(this, id, answer);
+  }
+
+  /**
+   * Tracks the next frame of several sessions.
+   * @param {LocalSession[]} sessions
+   * @param {Image} image
+   * @param {{see?: boolean, signal?: AbortSignal}} [options]
+   * @returns {Promise<StreamAnswer[]>} Theirs, in their order.
+   */
+  async track(sessions, image, { see, signal } = {}) {
+    const answers = await this.call("step", { image, see, ids: sessions.map(({ id }) => id) }, signal);
+    sessions.forEach((session, at) => session.take(answers[at]));
+    return answers;
+  }
+
+  /** Ends the thread, and all sessions with it. */
+  async close() {
+    const { worker } = this;
+    this.fail(new Problem({ type: "session-not-found", status: 404, detail: "The client is closed." }));
+    await (await worker)?.terminate();
+  }
+
+  /** @param {Problem} problem */
+  fail(problem) {
+    this.worker = undefined;
+    for (const { reject } of this.waiting.values()) reject(problem);
+    this.waiting.clear();
+  }
+
+  /**
+   * Makes a call to the thread. Calls are answered in their order.
+   * @param {keyof import("./worker.js").Calls} name
+   * @param {any} call
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<any>}
+   */
+  call(name, call, signal) {
+    if (signal?.aborted) return Promise.reject(signal.reason);
+    const { image } = call;
+    const taken = image && sendable(image);
+    taken?.catch(() => undefined);
+    const sending = this.before.then(async () => {
+      this.worker ??= this.start();
+      const worker = await this.worker;
+      const { sent, handed } = (await taken) ?? { sent: undefined, handed: [] };
+      this.calls += 1;
+      const number = this.calls;
+      const answer = new Promise((resolve, reject) => this.waiting.set(number, { resolve, reject }));
+      answer.catch(() => undefined);
+      worker.ref?.();
+      worker.postMessage({ number, name, call: image ? { ...call, image: sent } : call }, handed);
+      return { answer };
+    });
+    this.before = sending.catch(async () => taken && close((await taken).sent));
+    return sending.then(({ answer }) => answer);
+  }
+
+  async start() {
+    const url = new URL("./worker.js", import.meta.url);
+    const worker = typeof Worker === "undefined" ? await startThread(url) : new Worker(url, { type: "module" });
+    await new Promise((resolve, reject) => {
+      worker.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
+        if (data.isReady) resolve(undefined);
+        else this.receive(worker, data);
+      });
+      worker.addEventListener("error", (/** @type {ErrorEvent} */ { message }) => {
+        const problem = new Problem({ type: "internal", status: 500, detail: message || "The tracker cannot be loaded." });
+        reject(problem);
+        this.fail(problem);
+      });
+    });
+    return worker;
+  }
+
+  /**
+   * @param {any} worker
+   * @param {any} answer
+   */
+  receive(worker, { number, value, problem, isBroken }) {
+    const waiting = this.waiting.get(number);
+    this.waiting.delete(number);
+    if (problem) waiting?.reject(new Problem(problem));
+    else waiting?.resolve(value);
+    if (isBroken) {
+      worker.terminate();
+      this.fail(new Problem(problem));
+    }
+    // A process may end that waits for nothing.
+    if (this.waiting.size === 0) worker.unref?.();
+  }
+}
+
+/** A worker of Node.js that listens as one of a browser does.
+ * @param {URL} url */
+async function startThread(url) {
+  const threads = "node:worker_threads";
+  const worker = new (await import(threads)).Worker(url);
+  worker.addEventListener = (/** @type {string} */ kind, /** @type {(event: any) => void} */ listen) =>
+    worker.on(kind, (/** @type {any} */ told) => listen(kind === "message" ? { data: told } : told));
+  return worker;
+}
+
+/** A session in this page or process. */
+export class LocalSession {
+  /**
+   * @param {LocalClient} client
+   * @param {number} id
+   * @param {Answer} answer
+   */
+  constructor(client, id, answer) {
+    this.client = client;
+    this.id = id;
+    /** The number of its last frame. */
+    this.frame = answer.frame;
+    /** The box of that frame. */
+    this.box = answer.box;
+    this.score = answer.score;
+    this.status = answer.status;
+  }
+
+  /** @param {Answer} answer */
+  take({ frame, box, score, status }) {
+    Object.assign(this, { frame, box, score, status });
+  }
+
+  /**
+   * Tracks the next frame.
+   * @param {Image} image
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<Answer>}
+   */
+  async track(image, signal) {
+    return (await this.client.track([this], image, { signal }))[0];
+  }
+
+  /**
+   * Tracks several frames.
+   * @param {Image[]} images
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<Answer[]>}
+   */
+  async trackAll(images, signal) {
+    const answers = [];
+    for (const image of images) answers.push(await this.track(image, signal));
+    return answers;
+  }
+
+  /**
+   * Takes the next frame with the right box in it. It may be one that was tracked before.
+   * @param {Image} image
+   * @param {Box} box
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<Answer>}
+   */
+  async correct(image, box, signal) {
+    const answer = await this.client.call("correct", { id: this.id, image, box }, signal);
+    this.take(answer);
+    return answer;
+  }
+
+  /** The session's state.
+   * @returns {Promise<Omit<View, "id" | "expires_at">>} */
+  read() {
+    return this.client.call("read", { id: this.id });
+  }
+
+  /** The whole session as bytes: for `restore` of a local client, and of a client whose service takes unsigned ones.
+   * @returns {Promise<Uint8Array<ArrayBuffer>>} */
+  snapshot() {
+    return this.client.call("save", { id: this.id });
+  }
+
+  /** A picture (PNG) of what the tracker keeps of the target, in browsers.
+   * @returns {Promise<Blob>} */
+  bag() {
+    return this.client.call("bag", { id: this.id });
+  }
+
+  /** Frames as of a stream of a service.
+   * @param {{live?: boolean}} [options] */
+  stream(options) {
+    return new LocalStream(this, options);
+  }
+
+  /** Ends the session.
+   * @returns {Promise<void>} */
+  end() {
+    return this.client.call("end", { id: this.id });
+  }
+}
+
+/** Frames one after the other; the newest of live ones. */
+export class LocalStream {
+  /**
+   * @param {LocalSession} session
+   * @param {{live?: boolean}} [options]
+   */
+  constructor(session, { live = false } = {}) {
+    this.session = session;
+    this.live = live;
+    this.underWay = 0;
+    /** @type {(problem: unknown) => void} */
+    this.resolveEnded = () => undefined;
+    /** @type {Promise<unknown>} The stream has ended: why, if it was not by `close`. */
+    this.ended = new Promise((resolve) => (this.resolveEnded = resolve));
+  }
+
+  /**
+   * @param {Image} image
+   * @param {{box?: Box, see?: boolean}} [header]
+   * @returns {Promise<StreamAnswer | undefined>} Nothing where the frame was skipped, in a live stream.
+   */
+  async track(image, { box, see } = {}) {
+    if (this.live && !box && this.underWay > 1) return undefined;
+    this.underWay += 1;
+    try {
+      if (box) return await this.session.correct(image, box);
+      return (await this.session.client.track([this.session], image, { see }))[0];
+    } finally {
+      this.underWay -= 1;
+    }
+  }
+
+  close() {
+    this.resolveEnded(undefined);
+  }
+}

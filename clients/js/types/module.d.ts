@@ -1,0 +1,2 @@
+/** Loads the module. Everything of `wasm/bagtrack_wasm.js` needs it. */
+export declare function load(): Promise<unknown>;

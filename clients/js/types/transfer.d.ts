@@ -1,0 +1,12 @@
+export type Image = import("./image.js").Image;
+/** @typedef {import("./image.js").Image} Image */
+/** The same frame, as it can be sent to a worker, and what is handed over to it.
+ * @param {Image} image
+ * @returns {Promise<{sent: Image, handed: Transferable[]}>} */
+export declare function sendable(image: Image): Promise<{
+    sent: Image;
+    handed: Transferable[];
+}>;
+/** Gives up what was handed over.
+ * @param {Image} image */
+export declare function close(image: Image): void;

@@ -1,0 +1,34 @@
+export type Image = import("./image.js").Image;
+export type Box = import("./session.js").Box;
+export type Calls = {
+    open: {
+        image: Image;
+        box: Box;
+        options?: import("./tracker.js").TrackerOptions;
+    };
+    restore: {
+        snapshot: Uint8Array<ArrayBuffer>;
+    };
+    step: {
+        image: Image;
+        ids: number[];
+        see?: boolean;
+    };
+    correct: {
+        image: Image;
+        id: number;
+        box: Box;
+    };
+    save: {
+        id: number;
+    };
+    read: {
+        id: number;
+    };
+    bag: {
+        id: number;
+    };
+    end: {
+        id: number;
+    };
+};

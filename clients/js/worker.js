@@ -1,0 +1,96 @@
+// The worker: trackers by their numbers, and calls for them, one after the other.
+
+import { pictureOf } from "./bag.js";
+import { Problem } from "./problem.js";
+import { Tracker, frameFor } from "./tracker.js";
+import { close } from "./transfer.js";
+
+/**
+ * @typedef {import("./image.js").Image} Image
+ * @typedef {import("./session.js").Box} Box
+ *
+ * @typedef {object} Calls
+ * @property {{image: Image, box: Box, options?: import("./tracker.js").TrackerOptions}} open
+ * @property {{snapshot: Uint8Array<ArrayBuffer>}} restore
+ * @property {{image: Image, ids: number[], see?: boolean}} step
+ * @property {{image: Image, id: number, box: Box}} correct
+ * @property {{id: number}} save
+ * @property {{id: number}} read
+ * @property {{id: number}} bag
+ * @property {{id: number}} end
+ */
+
+/** @type {Map<number, Tracker>} */
+const trackers = new Map();
+let lastId = 0;
+
+/** @param {Tracker} tracker */
+function added(tracker) {
+  lastId += 1;
+  trackers.set(lastId, tracker);
+  return { id: lastId, answer: tracker.answer };
+}
+
+/** @param {number} id */
+function find(id) {
+  const tracker = trackers.get(id);
+  if (!tracker) throw new Problem({ type: "session-not-found", status: 404, detail: "The session has ended." });
+  return tracker;
+}
+
+/** @type {{[Name in keyof Calls]: (call: Calls[Name]) => unknown}} */
+const calls = {
+  open: async ({ image, box, options }) => added(await Tracker.create(image, box, options)),
+  restore: async ({ snapshot }) => added(await Tracker.load(snapshot)),
+  async step({ image, ids, see }) {
+    const all = ids.map(find);
+    const frame = await frameFor(image);
+    try {
+      const answers = [];
+      for (const tracker of all) answers.push(await tracker.step(frame, { see }));
+      return answers;
+    } finally {
+      frame.free();
+    }
+  },
+  correct: ({ id, image, box }) => find(id).correct(image, box),
+  save: ({ id }) => find(id).save(),
+  read({ id }) {
+    const { answer, size, parameters } = find(id);
+    return { frames: answer.frame + 1, answer, image: size, parameters };
+  },
+  bag: ({ id }) => pictureOf(find(id).bag),
+  end({ id }) {
+    trackers.get(id)?.free();
+    trackers.delete(id);
+  },
+};
+
+/** @param {any} message */
+async function answered({ number, name, call }) {
+  try {
+    return { number, value: await calls[/** @type {keyof Calls} */ (name)](call) };
+  } catch (error) {
+    const { message, slug, status } = /** @type {Problem} */ (error);
+    // A module that has failed cannot be used again.
+    const isBroken = error instanceof WebAssembly.RuntimeError;
+    return { number, problem: { type: slug ?? "internal", status: status ?? 500, detail: message }, isBroken };
+  } finally {
+    if (call.image) close(call.image);
+  }
+}
+
+/** @type {any} A worker of a browser has it, one of Node.js does not. */
+let port = globalThis;
+if (!("postMessage" in globalThis)) {
+  const threads = "node:worker_threads";
+  ({ parentPort: port } = await import(threads));
+}
+/** @type {Promise<void>} */
+let before = Promise.resolve();
+port.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
+  before = before.then(async () => port.postMessage(await answered(data)));
+});
+port.start?.();
+// Messages that come before a worker listens are lost in some browsers.
+port.postMessage({ isReady: true });

@@ -1,0 +1,70 @@
+"""Tracking in the page itself: nothing goes to the service."""
+
+import json
+import subprocess
+
+from browser import DRAW, choose, drag, frames, near, numbers, rows, said, to_the_end
+from clips import FRAMES, H264
+from files import sent_box
+
+MIN_OVERLAP = 0.98
+
+
+class Uploads:
+    """The calls of a page that open or use a session."""
+
+    def __init__(self, page):
+        self.calls = []
+        page.on("request", lambda request: "/sessions" in request.url and self.calls.append(request.url))
+
+
+def overlap(one, other):
+    (x, y, w, h), (left, top, width, height) = one, other
+    across = max(0, min(x + w, left + width) - max(x, left))
+    down = max(0, min(y + h, top + height) - max(y, top))
+    return across * down / (w * h + width * height - across * down)
+
+
+def sample_in_the_page(checks):
+    page = checks.page(where="here")
+    uploads = Uploads(page)
+    truth = checks.clips["card"]["truth"]
+    page.locator("#see").evaluate("box => box.click()")
+    choose(page, "card")
+    drag(page, truth[0])
+    frames(page, 60)
+    page.locator("#bag").wait_for()
+    checks.no_axe_violations(page, "following in the page")
+    checks.shot(page, "local-light")
+    print(f"  {page.locator('#rate').inner_text()} frames/s, {page.locator('#trip').inner_text()}")
+    to_the_end(page)
+    table = rows(page)
+    assert near(table, truth) >= 100 and len(table) == 150
+    assert not uploads.calls, uploads.calls
+    page.context.close()
+
+
+def file_in_the_page(checks):
+    """The rows of a file are those of `bagtrack track`."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    page = checks.page(where="here")
+    uploads = Uploads(page)
+    page.locator("#file").set_input_files(path)
+    said(page, DRAW)
+    drag(page, sent_box(checks.files.truth[0]))
+    to_the_end(page)
+    table = rows(page)
+    assert not uploads.calls, uploads.calls
+    page.context.close()
+    box = ",".join(str(value) for value in numbers(table[0]))
+    command = [checks.program, "track", path, "--box", box, "--format", "json"]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    plain = [[line["box"][side] for side in ("x", "y", "width", "height")] for line in map(json.loads, lines)]
+    assert len(plain) == len(table) == FRAMES
+    overlaps = [overlap(numbers(row), box) for row, box in zip(table, plain)]
+    mean = sum(overlaps) / len(overlaps)
+    print(f"  mean overlap with `bagtrack track` {mean:.4f}, least {min(overlaps):.3f}")
+    assert mean >= MIN_OVERLAP, overlaps
+
+
+ALL = [sample_in_the_page, file_in_the_page]
