@@ -20,20 +20,10 @@ fn crates() -> Vec<PathBuf> {
     members.chain(others).map(|path| path.join("src")).collect()
 }
 
-/// How many folders deep the rooms of the service are told apart: http counts as one.
-const SERVICE_DEPTH: usize = 1;
-
 /// The folders of a crate that are its rooms, as module paths.
 fn rooms(src: &Path) -> BTreeSet<Vec<String>> {
-    let is_service = src.parent() == Some(Path::new(env!("CARGO_MANIFEST_DIR")));
-    let depth = if is_service {
-        SERVICE_DEPTH
-    } else {
-        usize::MAX
-    };
     let folders = WalkDir::new(src)
         .min_depth(1)
-        .max_depth(depth)
         .into_iter()
         .map(|entry| entry.expect("a readable folder"));
     let folders = folders.filter(|entry| entry.file_type().is_dir());

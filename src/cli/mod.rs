@@ -15,6 +15,7 @@ mod formats;
 mod headings;
 mod health;
 mod log;
+mod memory_limit;
 mod open_files;
 mod sample;
 mod serve;

@@ -5,6 +5,7 @@
 
 use super::address::Addresses;
 use super::log::{Log, LogFormat};
+use super::memory_limit;
 use super::open_files;
 use super::signals::{self, Reloaded, Signals};
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
@@ -60,6 +61,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
+    memory_limit::check(bound.total());
     tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload(reloaded));

@@ -4,12 +4,16 @@
 //! is green while tracking, orange while uncertain, red when lost, with the score beside it; particles are dots, the
 //! likelier the less transparent.
 //!
+//! Also the bag of a tracker: the mean and the basis of each affine subspace as small pictures.
+//!
 //! What can go wrong: the file cannot be decoded. A large one is drawn smaller, since a picture takes three bytes a
 //! pixel, and its file as many.
 
+mod bag;
 mod label;
 mod marks;
 mod picture;
 
+pub use bag::ContactSheet;
 pub use marks::{Drawn, draw};
 pub use picture::Picture;

@@ -32,26 +32,26 @@ mod problems;
 mod quotas;
 mod resources;
 mod respond;
-mod router;
+mod server;
 mod state;
 mod stream;
 
 pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
-pub use config::access::{AccessConfig, Secret};
+pub use config::access::AccessConfig;
+pub use config::base_path::{BasePath, BasePathError};
 pub use config::flag_values::{parse_duration, parse_listen};
 pub use config::limits::LimitsConfig;
 pub use config::memory_bound::MemoryBound;
 pub use config::service::Config;
+pub use config::settings::{ConfigError, Secret};
 pub use config::store::StoreConfig;
 #[cfg(feature = "tls")]
 pub use config::tls::TlsConfig;
-pub use config::validation::ConfigError;
-pub use middleware::base_path::{BasePath, BasePathError};
+pub use extract::uploaded::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 #[cfg(feature = "tls")]
 pub use net::certificate::{Certificate, CertificateError};
-pub use net::server::{Application, BindError, Shutdown};
-pub use openapi::document::document as openapi_document;
 pub use problems::kind::Kind as ProblemKind;
 pub use quotas::client::Client;
-pub use resources::snapshot::MEDIA_TYPE as SNAPSHOT_MEDIA_TYPE;
+pub use resources::routes::document as openapi_document;
+pub use server::application::{Application, BindError, Shutdown};

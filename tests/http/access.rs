@@ -3,9 +3,10 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use bagtrack::http::{Application, Config, Secret};
+use bagtrack_sessions::Clock;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 const ANN: &str = "0123456789abcdef";
 const BEN: &str = "fedcba9876543210";
@@ -114,6 +115,60 @@ async fn a_token_is_good_for_its_session_alone() {
     expect_problem(app.get("/metrics").await, "forbidden").await;
     expect(app.delete_session(&id).await, StatusCode::NO_CONTENT).await;
     expect_problem(app.get_session(&id).await, "session-not-found").await;
+}
+
+#[tokio::test]
+async fn a_token_is_not_good_for_a_later_session_of_the_same_id() {
+    let mut app = two_clients().await;
+    let id = uuid::Uuid::new_v4().to_string();
+    let path = format!("/sessions/{id}");
+    let open = async |app: &TestApplication| {
+        let request = app.request(Method::PUT, &path, &[("box", BOX)]);
+        let opened = request.body(pictures::png(0)).send().await.unwrap();
+        expect(opened, StatusCode::CREATED).await;
+    };
+    open(&app).await;
+    let made = token(&app, &id, &[]).await;
+    expect(app.delete_session(&id).await, StatusCode::NO_CONTENT).await;
+    open(&app).await;
+    app.key = Some(made["token"].as_str().unwrap().to_owned());
+    expect_problem(app.get_session(&id).await, "session-not-found").await;
+    let frame = app.post_frame(&id, pictures::png(1)).await;
+    expect_problem(frame, "session-not-found").await;
+    expect_problem(app.snapshot_of(&id).await, "session-not-found").await;
+    expect_problem(app.delete_session(&id).await, "session-not-found").await;
+    app.key = Some(ANN.to_owned());
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
+async fn before_1970_answers_tell_the_first_moment_that_dates_have() {
+    let config = Config {
+        listen: "127.0.0.1:0".parse().unwrap(),
+        ..Config::default()
+    };
+    let clock = Clock::with_wall(|| SystemTime::UNIX_EPOCH - Duration::from_secs(864_000));
+    let application = Application::bind_with_clock(config, clock);
+    let application = application.await.unwrap();
+    let url = format!("http://{}/sessions", application.local_addr().unwrap());
+    tokio::spawn(application.serve(std::future::pending::<()>()));
+    let client = reqwest::Client::new();
+    let create = client.post(format!("{url}?box={BOX}"));
+    let created = create.body(pictures::png(0)).send().await.unwrap();
+    let created = expect(created, StatusCode::CREATED).await;
+    let session = format!("{url}/{}", created["id"].as_str().unwrap());
+    // A panic in the formatting of dates once made 500 of these.
+    let view = expect(client.get(&session).send().await.unwrap(), StatusCode::OK).await;
+    assert!(
+        view["expires_at"].as_str().unwrap().starts_with("1970-"),
+        "{view}"
+    );
+    let token = client
+        .post(format!("{session}/token"))
+        .send()
+        .await
+        .unwrap();
+    expect(token, StatusCode::OK).await;
 }
 
 #[tokio::test]

@@ -182,3 +182,39 @@ async fn a_request_names_exactly_one_host() {
     let answer = old.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.0 200"), "{answer}");
 }
+
+#[tokio::test]
+async fn what_stands_before_the_first_part_of_a_form_and_the_heads_of_parts_are_bounded() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let path = format!("/sessions/{id}/frames");
+    let lines = "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 8000000";
+    let head = "--b\r\nContent-Disposition: form-data; name=\"frame\"\r\nX: ";
+    for begin in ["", head] {
+        let mut client = RawConnection::hold_with(app.address, "POST", &path, lines).await;
+        client.send(begin).await;
+        // Each piece was once looked through together with all before it, up to the end of the body, which never comes.
+        for _ in 0..5 {
+            client.send("x".repeat(4_096)).await;
+        }
+        let answer = client.read_answer().await;
+        assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
+        assert!(answer.contains("16384 bytes"), "{answer}");
+    }
+    // Pieces of any size make a whole form.
+    let body = [
+        b"before\r\n--b\r\nContent-Disposition: form-data; name=\"frame\"\r\n\r\n".to_vec(),
+        pictures::png(1),
+        b"\r\n--b--\r\nbehind".to_vec(),
+    ]
+    .concat();
+    let length = body.len();
+    let lines =
+        format!("Content-Type: multipart/form-data; boundary=b\r\nContent-Length: {length}");
+    let mut client = RawConnection::hold_with(app.address, "POST", &path, &lines).await;
+    for piece in body.chunks(7) {
+        client.send(piece).await;
+    }
+    let answer = client.read_answer().await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}

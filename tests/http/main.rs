@@ -42,6 +42,7 @@ mod provoke;
 mod quotas;
 mod raw;
 mod replay;
+mod shares;
 mod short_flags;
 mod slow_line;
 mod snapshots;

@@ -161,4 +161,34 @@ async fn a_hangup_reads_the_keys_again() {
     service.signal(Signal::HUP);
     service.logs("the API keys stay as they were").await;
     assert_eq!(status("fedcba9876543210").await, StatusCode::OK);
+    // A pipe that nobody writes to once stopped this reload and all later ones.
+    std::fs::remove_file(&file).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(&file).status();
+    assert!(made.unwrap().success());
+    service.signal(Signal::HUP);
+    service.logs("the API keys stay as they were").await;
+    std::fs::remove_file(&file).unwrap();
+    std::fs::write(&file, "ann:0123456789abcdef").unwrap();
+    service.signal(Signal::HUP);
+    service.logs("API keys read again").await;
+    assert_eq!(status("fedcba9876543210").await, StatusCode::UNAUTHORIZED);
+}
+
+#[tokio::test]
+async fn a_limit_of_memory_below_the_bound_is_told_at_the_start() {
+    let mut command = Command::new("sh");
+    let start = "ulimit -v 1500000; exec \"$0\" serve --listen 127.0.0.1:0";
+    command.args(["-c", start, env!("CARGO_BIN_EXE_bagtrack")]);
+    command.stderr(Stdio::piped()).kill_on_drop(true);
+    let mut process = command.spawn().unwrap();
+    let mut log = BufReader::new(process.stderr.take().unwrap()).lines();
+    let told = async {
+        while let Some(line) = log.next_line().await.unwrap() {
+            if line.contains("address space (ulimit -v) is below what the service may take") {
+                return true;
+            }
+        }
+        false
+    };
+    assert!(timeout(PATIENCE, told).await.unwrap());
 }

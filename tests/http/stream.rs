@@ -371,3 +371,35 @@ async fn twenty_five_frames_a_second_over_a_round_trip_of_80_ms() {
     println!("{rate:.1} frames/s of {kilobytes} kB over a round trip of 80 ms");
     assert!(rate >= 25.0, "{rate:.1} frames/s");
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let mut client = StreamClient::open(&app, &id, "").await;
+    // Unmasked by a mask of zeros: `{}` as text, 22,000 times. The client may send 2,000 at once and 10,000 a second.
+    let text = [0x81, 0x82, 0, 0, 0, 0, b'{', b'}'];
+    let sent = Instant::now();
+    for _ in 0..22 {
+        client.send_raw(&text.repeat(1_000)).await;
+    }
+    client.send(pictures::png(1)).await;
+    let answer = client.message().await;
+    assert_eq!(answer["frame"], 1, "{answer}");
+    // All of them were once read in one turn of the network thread, whatever else waited for it.
+    let took = sent.elapsed();
+    assert!(took > Duration::from_millis(1_500), "{took:?}");
+    // Pings and empty fragments count like texts.
+    let ping = [0x89, 0x80, 0, 0, 0, 0];
+    let sent = Instant::now();
+    for _ in 0..12 {
+        client.send_raw(&ping.repeat(1_000)).await;
+    }
+    client.send(pictures::png(2)).await;
+    assert_eq!(client.message().await["frame"], 2);
+    assert!(
+        sent.elapsed() > Duration::from_millis(800),
+        "{:?}",
+        sent.elapsed()
+    );
+}

@@ -1,15 +1,15 @@
 //! JPEG, decoded strictly, to the channels that it stores.
 
-use super::deinterleave;
+use super::components::{self, Channels};
 use super::error::IngestError;
 use super::jpeg_markers::Markers;
 use super::limits::{Limits, MAX_JPEG_SCANS};
-use super::luma::luma_of_rgb8;
 use super::orientation;
 use super::scratch::Scratch;
 use super::sniff::Format;
 use super::stored_image::{Channel, StoredImage};
-use bagtrack_tracker::{FrameFormat, ycbcr};
+use bagtrack_tracker::FrameFormat;
+use bagtrack_tracker::ycbcr::{self, Order};
 use std::borrow::Cow;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -28,30 +28,27 @@ pub(super) fn decode<'scratch>(
     let source = (markers.width, markers.height);
     let orientation = orientation::of_exif(markers.exif(bytes));
     let format = format(orientation::upright(source, orientation));
-    let has_color = format.has_color && markers.has_usual_chroma();
     let format = FrameFormat {
-        has_color,
+        has_color: format.has_color && markers.has_usual_chroma(),
+        ..format
+    };
+    // Before it is turned upright, as the decoder sees it.
+    let stored_format = FrameFormat {
+        size: orientation::upright(format.size, orientation),
         ..format
     };
     #[cfg(feature = "turbo")]
     {
-        // Before it is turned upright, as the decoder sees it.
-        let stored_format = FrameFormat {
-            size: orientation::upright(format.size, orientation),
-            ..format
-        };
         let pixels = &mut scratch.pixels;
         if let Some(planes) = super::turbo::decode(bytes, &markers, limits, stored_format, pixels) {
             let stored = planes.of(&scratch.pixels, source, orientation);
             return Ok((stored, format));
         }
     }
-    let (luma, chroma) = decode_whole(bytes, &markers, limits, format.has_color, scratch)?;
-    let channel = |values, size| Channel { values, size };
-    let half = ycbcr::chroma_size(source);
+    let (luma, chroma) = decode_channels(bytes, &markers, limits, stored_format, scratch)?;
     let stored = StoredImage {
-        luma: channel(luma, source),
-        chroma: chroma.map(|planes| planes.map(|plane| channel(Cow::Owned(plane), half))),
+        luma,
+        chroma,
         source,
         orientation,
     };
@@ -71,6 +68,10 @@ pub(super) fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestEr
 fn read_markers(bytes: &[u8], limits: &Limits) -> Result<Markers, IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
     let markers = Markers::read(bytes).map_err(damaged)?;
+    // A height of 0 would be told after the first scan; no decoder here reads that.
+    if markers.width == 0 || markers.height == 0 {
+        return Err(damaged("its width or its height is 0"));
+    }
     limits.check_size(markers.width, markers.height)?;
     if markers.is_implausibly_small() {
         return Err(damaged("it holds less data than its size needs"));
@@ -78,30 +79,26 @@ fn read_markers(bytes: &[u8], limits: &Limits) -> Result<Markers, IngestError> {
     Ok(markers)
 }
 
-/// Luma and, where it is wanted, chroma in half of its columns and rows.
-type Channels<'a> = (Cow<'a, [u8]>, Option<[Vec<u8>; 2]>);
-
-/// The channels at full size, with zune-jpeg.
-fn decode_whole<'scratch>(
+/// Luma and chroma, without libjpeg-turbo. zune-jpeg reads the headers of every file, and decodes those that are not
+/// usual.
+fn decode_channels<'scratch>(
     bytes: &[u8],
     markers: &Markers,
     limits: &Limits,
-    has_color: bool,
+    format: FrameFormat,
     scratch: &'scratch mut Scratch,
 ) -> Result<Channels<'scratch>, IngestError> {
     let damaged = |reason: &str| Format::Jpeg.damaged(reason);
-    // Most of the decoder's messages come in quotes.
-    let reason = |error: DecodeErrors| damaged(error.to_string().trim_matches('"'));
-    let guarded = &mut scratch.file;
-    markers.with_guarded_end(bytes, guarded);
+    let file = &mut scratch.file;
+    markers.with_guarded_end(bytes, file);
     let options = DecoderOptions::new_fast()
         .set_strict_mode(true)
         .set_max_width(limits.max_side as usize)
         .set_max_height(limits.max_side as usize)
         .jpeg_set_max_scans(MAX_JPEG_SCANS)
         .jpeg_set_out_colorspace(ColorSpace::Luma);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&guarded[..]), options);
-    decoder.decode_headers().map_err(reason)?;
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options);
+    decoder.decode_headers().map_err(typed)?;
     let info = decoder.info().expect("the headers were decoded just now");
     if (u32::from(info.width), u32::from(info.height)) != (markers.width, markers.height) {
         return Err(damaged("its headers contradict each other"));
@@ -111,33 +108,61 @@ fn decode_whole<'scratch>(
         return Err(damaged(reason));
     }
     let output = match stored {
-        Some(ColorSpace::YCbCr) if has_color || !markers.can_skip_color() => ColorSpace::YCbCr,
-        Some(ColorSpace::YCbCr | ColorSpace::Luma) => ColorSpace::Luma,
+        Some(ColorSpace::Luma) => ColorSpace::Luma,
+        Some(ColorSpace::YCbCr) if !format.has_color && markers.can_skip_color() => {
+            ColorSpace::Luma
+        }
         // RGB and CMYK have no Y channel to take.
         _ => ColorSpace::RGB,
     };
-    limits
-        .check_memory(markers.memory(output.num_components() as u64 + 2) + guarded.len() as u64)?;
+    let per_pixel = output.num_components() as u64 + 2;
+    let memory = markers
+        .memory(per_pixel)
+        .max(markers.memory_of_components());
+    limits.check_memory(memory + file.len() as u64)?;
+    if markers.is_sequential() && matches!(stored, Some(ColorSpace::Luma | ColorSpace::YCbCr)) {
+        // What it does not take is left to zune-jpeg, which may.
+        if let Ok(channels) = components::decode(file, markers, format, &mut scratch.components) {
+            return Ok(channels);
+        }
+    }
     decoder.set_options(options.jpeg_set_out_colorspace(output));
+    decode_pixels(
+        decoder,
+        markers,
+        output,
+        format.has_color,
+        &mut scratch.pixels,
+    )
+}
+
+/// The channels of what a decoder gives as pixels.
+fn decode_pixels<'memory>(
+    mut decoder: JpegDecoder<ZCursor<&[u8]>>,
+    markers: &Markers,
+    output: ColorSpace,
+    has_color: bool,
+    pixels: &'memory mut Vec<u8>,
+) -> Result<Channels<'memory>, IngestError> {
     let bytes = decoder
         .output_buffer_size()
-        .ok_or_else(|| damaged("its size is unknown"))?;
+        .ok_or_else(|| Format::Jpeg.damaged("its size is unknown"))?;
     // The decoder may leave pixels of a damaged file unwritten. They must not show the frame before.
-    scratch.pixels.clear();
-    scratch.pixels.resize(bytes, 0);
-    decoder.decode_into(&mut scratch.pixels).map_err(reason)?;
+    pixels.clear();
+    pixels.resize(bytes, 0);
+    decoder.decode_into(pixels).map_err(typed)?;
     let size = (markers.width, markers.height);
-    let pixels = scratch.pixels.as_chunks::<3>().0;
-    Ok(match output {
-        ColorSpace::Luma => (Cow::Borrowed(&scratch.pixels[..]), None),
-        ColorSpace::YCbCr if has_color => {
-            let (luma, chroma) = deinterleave::planes(&scratch.pixels, size);
-            (Cow::Owned(luma), Some(chroma))
-        }
-        ColorSpace::YCbCr => (pixels.iter().map(|pixel| pixel[0]).collect(), None),
-        _ => {
-            let chroma = has_color.then(|| ycbcr::chroma(size, |i| pixels[i]));
-            (Cow::Owned(luma_of_rgb8(&scratch.pixels)), chroma)
-        }
-    })
+    let channel = |values, size| Channel { values, size };
+    if output == ColorSpace::Luma {
+        return Ok((channel(Cow::Borrowed(&pixels[..]), size), None));
+    }
+    let (luma, chroma) = ycbcr::planes(pixels.as_chunks().0, size, Order::Rgb);
+    let half = ycbcr::chroma_size(size);
+    let chroma = has_color.then(|| chroma.map(|plane| channel(Cow::Owned(plane), half)));
+    Ok((channel(Cow::Owned(luma), size), chroma))
+}
+
+fn typed(error: DecodeErrors) -> IngestError {
+    // Most of the decoder's messages come in quotes.
+    Format::Jpeg.damaged(error.to_string().trim_matches('"'))
 }

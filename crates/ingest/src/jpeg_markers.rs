@@ -110,10 +110,27 @@ impl Markers {
             && self.unsupported(false).is_none()
     }
 
+    /// Whether it is baseline or extended with Huffman codes, in a single scan.
+    pub(super) fn is_sequential(&self) -> bool {
+        self.process <= 1 && self.scans == 1
+    }
+
     /// Where the image ends, its end marker included.
     #[cfg(feature = "turbo")]
     pub(super) fn after_end(&self) -> usize {
         self.end + 2
+    }
+
+    /// The largest of these divisors, in falling order, that divides both sides and leaves at least the working size.
+    /// With another one the last column would stand for fewer pixels than the others, and boxes would be off.
+    pub(super) fn reduction(&self, working: (u32, u32), divisors: &[u32]) -> u32 {
+        let fits = |side: u32, working: u32, divisor: u32| {
+            side.is_multiple_of(divisor) && side / divisor >= working
+        };
+        let mut divisors = divisors.iter().copied();
+        divisors
+            .find(|&by| fits(self.width, working.0, by) && fits(self.height, working.1, by))
+            .unwrap_or(1)
     }
 
     fn is_progressive(&self) -> bool {
@@ -153,16 +170,31 @@ impl Markers {
         guarded.extend([0xFF, 0xD9]);
     }
 
-    /// Bytes that decoding allocates at most: the output (`output_channels` bytes a pixel) and, where the image
-    /// comes in several scans, 16-bit coefficients for every sample of every component.
+    /// Bytes that decoding to pixels allocates at most, with so many bytes a pixel.
     pub(super) fn memory(&self, output_channels: u64) -> u64 {
         let pixels = u64::from(self.width) * u64::from(self.height);
-        let (h_max, v_max) = self.largest_sampling();
-        let output = pixels * output_channels;
+        pixels * output_channels + self.working_memory()
+    }
+
+    /// Bytes that decoding to the components as they are stored allocates at most: whole blocks.
+    pub(super) fn memory_of_components(&self) -> u64 {
+        self.samples() + self.working_memory()
+    }
+
+    /// Bytes beside the output: rows of blocks and, where the image comes in several scans, 16-bit coefficients for
+    /// every sample of every component.
+    fn working_memory(&self) -> u64 {
+        let v_max = self.largest_sampling().1;
         let row_buffers = 16 * u64::from(self.width + 64) * u64::from(v_max) * 8;
         if !self.is_progressive() && self.scans < 2 {
-            return output + row_buffers;
+            return row_buffers;
         }
+        row_buffers + self.samples() * 2
+    }
+
+    /// How many samples the components have, in whole blocks.
+    fn samples(&self) -> u64 {
+        let (h_max, v_max) = self.largest_sampling();
         let unit_columns = u64::from(self.width.div_ceil(8 * h_max));
         let unit_rows = u64::from(self.height.div_ceil(8 * v_max));
         let blocks: u64 = self
@@ -170,7 +202,7 @@ impl Markers {
             .iter()
             .map(|&(h, v)| u64::from(h) * u64::from(v) * unit_columns * unit_rows)
             .sum();
-        output + row_buffers + blocks * 64 * 2
+        blocks * 64
     }
 
     /// Whether there are fewer bits than any encoder needs: at least one, the DC code, for each 8 x 8 block of the

@@ -26,8 +26,8 @@
 //! ```
 
 mod catch_decoder_panic;
+mod components;
 mod decode;
-mod deinterleave;
 mod error;
 mod jpeg;
 mod jpeg_markers;

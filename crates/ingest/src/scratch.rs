@@ -13,6 +13,8 @@ pub(super) struct Scratch {
     pub(super) file: Vec<u8>,
     /// Decoded values. Those behind the values of this frame are left from an earlier one.
     pub(super) pixels: Vec<u8>,
+    /// Decoded components, likewise.
+    pub(super) components: Vec<Vec<u8>>,
     /// Memory for the planes of a frame; empty while a frame has it.
     pub(super) planes: Planes,
 }
@@ -20,7 +22,8 @@ pub(super) struct Scratch {
 impl Scratch {
     /// Frees what an unusually large frame took.
     pub(super) fn trim(&mut self) {
-        for buffer in [&mut self.file, &mut self.pixels] {
+        let components = self.components.iter_mut();
+        for buffer in components.chain([&mut self.file, &mut self.pixels]) {
             if buffer.capacity() > MAX_KEPT_BYTES {
                 *buffer = Vec::new();
             }

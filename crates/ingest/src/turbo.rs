@@ -11,13 +11,8 @@ use image::metadata::Orientation;
 use std::borrow::Cow;
 use turbojpeg::{Colorspace, Decompressor, Image, PixelFormat, ScalingFactor, Subsamp, YuvImage};
 
-/// The reductions for which it has vector instructions; the last one is none.
-const REDUCTIONS: [ScalingFactor; 4] = [
-    ScalingFactor::ONE_EIGHTH,
-    ScalingFactor::ONE_QUARTER,
-    ScalingFactor::ONE_HALF,
-    ScalingFactor::ONE,
-];
+/// The reductions for which it has vector instructions, the strongest first.
+const REDUCTIONS: [u32; 3] = [8, 4, 2];
 
 /// The sizes of the planes that were decoded, one after the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +69,12 @@ pub(super) fn decode(
     // A new one each time: it would lend the tables of one file to the next one that has none.
     let mut decompressor = new_decompressor()?;
     let size = (markers.width, markers.height);
-    let reduction = reduction(size, format.size);
+    let reduction = match markers.reduction(format.size, &REDUCTIONS) {
+        8 => ScalingFactor::ONE_EIGHTH,
+        4 => ScalingFactor::ONE_QUARTER,
+        2 => ScalingFactor::ONE_HALF,
+        _ => ScalingFactor::ONE,
+    };
     let scaled = |side: u32| reduction.scale(side as usize);
     let (width, height) = (scaled(size.0), scaled(size.1));
     decompressor.set_scaling_factor(reduction).ok()?;
@@ -138,19 +138,6 @@ fn new_decompressor() -> Option<Decompressor> {
     let mut decompressor = Decompressor::new().ok()?;
     decompressor.set_scan_limit(MAX_JPEG_SCANS as u32).ok()?;
     Some(decompressor)
-}
-
-/// The strongest reduction that leaves at least the working size and divides both sides. With another one the last
-/// column would stand for fewer pixels than the others, and boxes would be off.
-fn reduction((width, height): (u32, u32), working: (u32, u32)) -> ScalingFactor {
-    let fits = |side: u32, working: u32, factor: &ScalingFactor| {
-        let divisor = factor.denom() as u32;
-        side.is_multiple_of(divisor) && side / divisor >= working
-    };
-    let strongest = REDUCTIONS
-        .into_iter()
-        .find(|factor| fits(width, working.0, factor) && fits(height, working.1, factor));
-    strongest.unwrap_or(ScalingFactor::ONE)
 }
 
 #[cfg(test)]

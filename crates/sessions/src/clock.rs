@@ -9,6 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 pub struct Clock {
     start: Instant,
     advanced_ms: Arc<AtomicU64>,
+    wall: fn() -> SystemTime,
 }
 
 impl Default for Clock {
@@ -16,11 +17,20 @@ impl Default for Clock {
         Self {
             start: Instant::now(),
             advanced_ms: Arc::default(),
+            wall: SystemTime::now,
         }
     }
 }
 
 impl Clock {
+    /// One whose time of day is this.
+    pub fn with_wall(wall: fn() -> SystemTime) -> Self {
+        Self {
+            wall,
+            ..Self::default()
+        }
+    }
+
     /// Time since the clock was made.
     pub fn now(&self) -> Duration {
         let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));
@@ -33,15 +43,13 @@ impl Clock {
         self.advanced_ms.fetch_add(ms, Ordering::Relaxed);
     }
 
-    /// The wall-clock time of a moment of this clock.
+    /// The wall-clock time of a moment of this clock; none before 1970, which machines without a battery begin in.
     pub fn wall(&self, moment: Duration) -> SystemTime {
         let now = self.now();
         let advanced = Duration::from_millis(self.advanced_ms.load(Ordering::Relaxed));
-        let wall_now = SystemTime::now() + advanced;
-        if moment >= now {
-            wall_now + (moment - now)
-        } else {
-            wall_now - (now - moment)
-        }
+        let since_1970 = (self.wall)().duration_since(SystemTime::UNIX_EPOCH);
+        let wall_now = since_1970.unwrap_or_default() + advanced;
+        let wall = (wall_now + moment).saturating_sub(now);
+        SystemTime::UNIX_EPOCH + wall
     }
 }

@@ -3,12 +3,12 @@
 use super::new_session::NewSession;
 use super::opening::Opening;
 use super::registry::{Registry, TooManySessions};
+use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
 use super::session::Session;
 use super::state::SessionState;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
-use tokio::sync::OwnedSemaphorePermit;
 use uuid::Uuid;
 
 /// Of the sessions in the map, one in so many goes where there is no room.
@@ -76,7 +76,7 @@ impl Registry {
     }
 
     /// Memory for a state.
-    fn hold(&self, state: &SessionState) -> Option<OwnedSemaphorePermit> {
+    fn hold(&self, state: &SessionState) -> Option<Charge> {
         let bytes = state.session_bytes();
         let held = self.memory.hold(bytes);
         if held.is_none() && self.evicts {

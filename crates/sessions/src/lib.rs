@@ -58,7 +58,10 @@ pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
 pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
-pub use scheduler::byte_budget::{ByteBudget, ByteCharge, BytesFull};
+pub use scheduler::budget::{
+    Budget, Budget as ByteBudget, Charge, Charge as ByteCharge, Full as BytesFull,
+};
+pub use scheduler::charged_bytes::ChargedBytes;
 pub use scheduler::fair_queue::WorkerSlot;
 pub use scheduler::flows::Flow;
 pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};

@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::expired::ExpiredIds;
 use super::lease::Lease;
 use super::owner::Owner;
-use super::scheduler::byte_budget::ByteBudget;
+use super::scheduler::budget::Budget;
 use super::session::Session;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -43,7 +43,7 @@ pub struct Registry {
     pub(super) max_requests: usize,
     pub(super) lease: Lease,
     pub(super) clock: Clock,
-    pub(super) memory: ByteBudget,
+    pub(super) memory: Budget,
 }
 
 impl Registry {
@@ -58,13 +58,13 @@ impl Registry {
             max_requests,
             lease,
             clock,
-            memory: ByteBudget::new(usize::MAX),
+            memory: Budget::new(usize::MAX),
         }
     }
 
     /// The states of all sessions together take at most so many bytes.
     pub fn with_memory(mut self, bytes: usize) -> Self {
-        self.memory = ByteBudget::new(bytes);
+        self.memory = Budget::new(bytes);
         self
     }
 

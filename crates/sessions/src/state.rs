@@ -17,7 +17,7 @@ pub struct SessionState {
 
 /// Why no frame of several was taken.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StepError {
+pub enum StepError<E> {
     /// The tracker refused one of them.
     #[error("frame {index}: {error}")]
     Refused {
@@ -29,6 +29,9 @@ pub enum StepError {
     /// The work was stopped before all of them were taken.
     #[error(transparent)]
     Stopped(Stopped),
+    /// One of them cannot be had.
+    #[error(transparent)]
+    Frame(E),
 }
 
 impl SessionState {
@@ -177,26 +180,29 @@ impl SessionState {
         self.recent.extend(answered);
     }
 
-    /// Tracks through `frames` in order. In the first one the user may correct a target, which
-    /// there must be. Between frames and targets `meter` says whether to go on. The answers are stored, and at least the
-    /// last `kept`. `seen` becomes what the trackers saw in the last frame.
+    /// Tracks through frames with these digests in order; `frame` gives each in its turn. In the first one the user may
+    /// correct a target, which there must be. Between frames and targets `meter` says whether to go on. The answers are
+    /// stored, and at least the last `kept`. `seen` becomes what the trackers saw in the last frame.
     ///
     /// # Errors
-    /// The tracker refused a frame or the box, or the work was stopped. Some frames may have been taken then, so callers
-    /// work on a copy.
-    pub fn advance(
+    /// A frame cannot be had, the tracker refused one or the box, or the work was stopped. Some frames may have been taken
+    /// then, so callers work on a copy.
+    pub fn advance<E>(
         &mut self,
-        frames: &[(Fingerprint, Frame)],
+        fingerprints: &[Fingerprint],
+        mut frame: impl FnMut(usize, &mut WorkMeter) -> Result<Frame, E>,
         correction: Option<Correction>,
         meter: &mut WorkMeter,
         kept: usize,
         mut seen: Option<&mut Vec<Diagnostics>>,
-    ) -> Result<Vec<Estimates>, StepError> {
-        let mut answered = Vec::with_capacity(frames.len());
-        for (index, (fingerprint, frame)) in frames.iter().enumerate() {
+    ) -> Result<Vec<Estimates>, StepError<E>> {
+        let mut answered = Vec::with_capacity(fingerprints.len());
+        for (index, fingerprint) in fingerprints.iter().enumerate() {
+            let frame = frame(index, meter).map_err(StepError::Frame)?;
             let correction = correction.filter(|_| index == 0);
             let seen = seen.as_deref_mut();
-            let advanced = self.targets.advance(frame, correction, meter, seen);
+            let advanced = self.targets.advance(&frame, correction, meter, seen);
+            bagtrack_ingest::recycle(frame);
             advanced.map_err(|error| match error {
                 TargetsError::Refused(error) => StepError::Refused { index, error },
                 TargetsError::Stopped(stopped) => StepError::Stopped(stopped),

@@ -102,11 +102,9 @@ impl<T> KeyFrames<T> {
             .segment
             .as_ref()
             .is_some_and(|segment| segment.reaches(&point));
-        if !is_reached {
-            if let Some((last, row)) = self.last.take() {
-                self.segment = Some(Segment::from(last));
-                found[0] = Some(row);
-            }
+        if !is_reached && let Some((last, row)) = self.last.take() {
+            self.segment = Some(Segment::from(last));
+            found[0] = Some(row);
         }
         match &mut self.segment {
             Some(segment) if segment.key.is_shown == is_shown => {

@@ -4,18 +4,18 @@ use super::token::SessionToken;
 use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
-use bagtrack_sessions::Owner;
+use bagtrack_sessions::{Owner, SessionName};
 use std::io;
 use std::sync::Arc;
 use std::time::SystemTime;
 use uuid::Uuid;
 
-/// Who makes a request, as the layer [`authenticate`](super::layer::authenticate) has found.
+/// Who makes a request, as the layer [`authenticate`](crate::http::middleware::authenticate::authenticate) has found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Caller {
     owner: Owner,
     /// The only session that may be used, where the request came with a session token.
-    only: Option<Uuid>,
+    only: Option<SessionName>,
     /// When the token ends, where the request came with one.
     until: Option<SystemTime>,
 }
@@ -49,9 +49,14 @@ impl Caller {
         &self.owner
     }
 
-    /// Whether the session of this id may be used, if it is one of the owner's.
-    pub fn may_use(&self, id: Uuid) -> bool {
-        self.only.is_none_or(|only| only == id)
+    /// Whether a session of this id may be used, if it is one of the owner's: see [`Self::may_use`].
+    pub fn may_ask_for(&self, id: Uuid) -> bool {
+        self.only.is_none_or(|only| only.id == id)
+    }
+
+    /// Whether this session of the owner's may be used.
+    pub fn may_use(&self, session: SessionName) -> bool {
+        self.only.is_none_or(|only| only == session)
     }
 
     /// Refuses what a session token is not good for.

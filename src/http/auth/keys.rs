@@ -3,7 +3,7 @@
 //! Only digests are kept. A key that is presented is hashed and compared with all of them in constant time.
 
 use super::token::PREFIX;
-use crate::http::config::access::Secret;
+use crate::http::config::settings::Secret;
 use bagtrack_sessions::Owner;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,8 @@ impl ApiKeys {
             file: file.map(Path::to_owned),
             current: RwLock::default(),
         }));
-        keys.reload()?;
+        // A file that can be read once only, like a pipe, will do for the start.
+        keys.read(&|path| std::fs::read_to_string(path))?;
         Ok(keys)
     }
 
@@ -78,9 +79,13 @@ impl ApiKeys {
     /// # Errors
     /// See [`KeysError`]. The keys are then as before.
     pub fn reload(&self) -> Result<usize, KeysError> {
+        self.read(&read_regular)
+    }
+
+    fn read(&self, file: &dyn Fn(&Path) -> io::Result<String>) -> Result<usize, KeysError> {
         let mut keys = self.0.fixed.clone();
         if let Some(path) = &self.0.file {
-            let text = std::fs::read_to_string(path).map_err(|source| KeysError::File {
+            let text = file(path).map_err(|source| KeysError::File {
                 path: path.clone(),
                 source,
             })?;
@@ -125,6 +130,17 @@ impl ApiKeys {
         // Nothing panics while it is held.
         let current = self.0.current.read();
         current.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// The text of a file that is none of those which may never end: a pipe nobody writes to would stop all later reloads.
+pub fn read_regular(path: &Path) -> io::Result<String> {
+    match std::fs::metadata(path)?.is_file() {
+        true => std::fs::read_to_string(path),
+        false => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is no regular file",
+        )),
     }
 }
 

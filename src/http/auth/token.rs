@@ -1,13 +1,13 @@
 //! Session tokens: what a web page gets in place of an API key.
 //!
-//! A token holds the id of its session, the moment at which it ends, the name of the key that made it, and a code of
-//! all of these under a secret of the service. So nothing is stored, and it ends with its session, its time, its key or
-//! the secret.
+//! A token holds the id of its session and the random number that this was opened with, the moment at which it ends, the name of the key that made it, and a code of
+//! all of these under a secret of the service. So nothing is stored, and it ends with its session (another one may have
+//! the id later), its time, its key or the secret.
 //!
-//! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 bytes of seconds since 1970 (big endian), 32 bytes of code,
-//! and the name.
+//! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 of the incarnation, 8 of seconds since 1970 (both big
+//! endian), 32 of code, and the name.
 
-use bagtrack_sessions::{MAC_BYTES, MacKeys, Owner};
+use bagtrack_sessions::{MAC_BYTES, MacKeys, Owner, SessionName};
 use base64::Engine;
 use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -17,13 +17,14 @@ use uuid::Uuid;
 pub const PREFIX: &str = "bagtrack-session.";
 const KEY_CONTEXT: &str = "bagtrack 2026-11 session token";
 const ID_BYTES: usize = 16;
+const INCARNATION_BYTES: usize = 8;
 const TIME_BYTES: usize = 8;
 
 /// What a token says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SessionToken {
     /// The only session that it is good for.
-    pub session: Uuid,
+    pub session: SessionName,
     /// Whose session that is.
     pub owner: Owner,
     /// When it ends, in whole seconds.
@@ -43,7 +44,8 @@ impl TokenKeys {
     /// The text of a token.
     pub fn sign(&self, token: &SessionToken) -> String {
         let seconds = token.expires.duration_since(UNIX_EPOCH).unwrap_or_default();
-        let mut bytes = token.session.as_bytes().to_vec();
+        let SessionName { id, incarnation } = token.session;
+        let mut bytes = [&id.as_bytes()[..], &incarnation.to_be_bytes()].concat();
         bytes.extend_from_slice(&seconds.as_secs().to_be_bytes());
         let name = token.owner.name().unwrap_or("");
         let code = self.0.sign(&[&bytes, name.as_bytes()].concat());
@@ -57,9 +59,13 @@ impl TokenKeys {
         let text = text.strip_prefix(PREFIX)?;
         let bytes = BASE64_URL_SAFE_NO_PAD.decode(text).ok()?;
         let (id, rest) = bytes.split_first_chunk::<ID_BYTES>()?;
+        let (incarnation, rest) = rest.split_first_chunk::<INCARNATION_BYTES>()?;
         let (seconds, rest) = rest.split_first_chunk::<TIME_BYTES>()?;
         let (code, name) = rest.split_first_chunk::<MAC_BYTES>()?;
-        if !self.0.verify(&[id, &seconds[..], name].concat(), code) {
+        if !self
+            .0
+            .verify(&[&id[..], incarnation, seconds, name].concat(), code)
+        {
             return None;
         }
         let expires = Duration::from_secs(u64::from_be_bytes(*seconds));
@@ -69,7 +75,10 @@ impl TokenKeys {
             name => Owner::named(name),
         };
         (now < expires).then_some(SessionToken {
-            session: Uuid::from_bytes(*id),
+            session: SessionName {
+                id: Uuid::from_bytes(*id),
+                incarnation: u64::from_be_bytes(*incarnation),
+            },
             owner,
             expires,
         })
@@ -85,7 +94,10 @@ mod tests {
         let keys = TokenKeys::new(&["a secret"]);
         let expires = UNIX_EPOCH + Duration::from_secs(1_000_000);
         let token = SessionToken {
-            session: Uuid::from_u128(7),
+            session: SessionName {
+                id: Uuid::from_u128(7),
+                incarnation: 11,
+            },
             owner: Owner::named("me"),
             expires,
         };

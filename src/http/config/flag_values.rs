@@ -1,6 +1,7 @@
 //! Settings as they are written on the command line and in the environment.
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use ipnet::IpNet;
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::time::Duration;
 
 /// Reads a duration: `10m`, `30s`, `500ms`, or a number of seconds alone.
@@ -28,6 +29,13 @@ pub fn parse_listen(text: &str) -> Result<SocketAddr, String> {
     let first = found.iter().find(|address| address.is_ipv4());
     let address = first.or(found.first()).copied();
     address.ok_or_else(|| format!("it must be {usage}: the name has no address"))
+}
+
+/// Reads a network, or a single address.
+pub(super) fn parse_network(text: &str) -> Result<IpNet, String> {
+    let address = || text.parse().map(|address: IpAddr| address.into());
+    let network = text.parse().or_else(|_| address());
+    network.map_err(|_| "neither an address nor a network like 10.0.0.0/8".to_owned())
 }
 
 #[cfg(test)]

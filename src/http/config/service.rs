@@ -1,210 +1,102 @@
-//! Every setting of the service, with its default and its range. With the feature `cli` also with its flag and its
-//! environment variable, which only the program reads.
+//! Every setting of the service.
 
 use super::access::AccessConfig;
+use super::base_path::BasePath;
 use super::limits::LimitsConfig;
+use super::settings::{ConfigError, delay, in_range, moment, origins, permits, positive, settings};
 use super::store::StoreConfig;
 #[cfg(feature = "tls")]
 use super::tls::TlsConfig;
-use crate::http::middleware::base_path::BasePath;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
-use super::flag_values::{parse_duration, parse_listen};
-
-use super::limits::shown;
-
 /// What a session with usual parameters is charged at most.
 const USUAL_SESSION_BYTES: usize = 512 << 10;
 
-/// The settings of the service. Durations are written like `10m`, `30s`, `500ms`; a number alone is seconds.
-#[derive(Debug, Clone, clap::Args)]
-pub struct Config {
-    /// Address to listen on, or a host's name with a port; port 0 picks a free one.
-    #[arg(
-        long, env = "BAGTRACK_LISTEN", default_value_t = Config::default().listen, value_parser = parse_listen
-    )]
-    pub listen: SocketAddr,
-    /// The certificate that clients see.
-    #[cfg(feature = "tls")]
-    #[command(flatten)]
-    pub tls: TlsConfig,
-    /// Frames decoded and tracked at the same time [default: the number of cores].
-    #[arg(long, env = "BAGTRACK_WORKERS")]
-    pub workers: Option<usize>,
-    /// Requests with a frame that are inside at the same time, the ones at work included.
-    #[arg(long, env = "BAGTRACK_QUEUE", default_value_t = Config::default().queue)]
-    pub queue: usize,
-    /// Most sessions alive.
-    #[arg(
-        long, env = "BAGTRACK_MAX_SESSIONS",
-        default_value_t = Config::default().max_sessions
-    )]
-    pub max_sessions: usize,
-    /// Requests at one session at the same time, the one at work included.
-    #[arg(
-        long, env = "BAGTRACK_SESSION_QUEUE",
-        default_value_t = Config::default().session_queue
-    )]
-    pub session_queue: usize,
-    /// A session expires when no frame comes for this long.
-    #[arg(
-        long, env = "BAGTRACK_SESSION_IDLE",
-        default_value = shown(Config::default().session_idle),
-        value_parser = parse_duration
-    )]
-    pub session_idle: Duration,
-    /// A new session expires when its first frame does not come for this long.
-    #[arg(
-        long, env = "BAGTRACK_SESSION_FIRST",
-        default_value = shown(Config::default().session_first),
-        value_parser = parse_duration
-    )]
-    pub session_first: Duration,
-    /// Most bytes of a request body.
-    #[arg(
-        long, env = "BAGTRACK_MAX_BODY_BYTES",
-        default_value_t = Config::default().max_body_bytes
-    )]
-    pub max_body_bytes: usize,
-    /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
-    #[arg(
-        long, env = "BAGTRACK_MAX_UPLOAD_BYTES",
-        default_value_t = Config::default().max_upload_bytes
-    )]
-    pub max_upload_bytes: usize,
-    /// Most frames of one post.
-    #[arg(
-        long, env = "BAGTRACK_MAX_FRAMES",
-        default_value_t = Config::default().max_frames
-    )]
-    pub max_frames: usize,
-    /// Most bytes of one encoded frame.
-    #[arg(
-        long, env = "BAGTRACK_MAX_FRAME_BYTES",
-        default_value_t = Config::default().max_frame_bytes
-    )]
-    pub max_frame_bytes: usize,
-    /// Longest side of a frame in pixels.
-    #[arg(
-        long, env = "BAGTRACK_MAX_FRAME_SIDE",
-        default_value_t = Config::default().max_frame_side
-    )]
-    pub max_frame_side: u32,
-    /// Most pixels of a frame.
-    #[arg(
-        long, env = "BAGTRACK_MAX_FRAME_PIXELS",
-        default_value_t = Config::default().max_frame_pixels
-    )]
-    pub max_frame_pixels: u64,
-    /// Most memory in bytes that decoding one frame may take.
-    #[arg(
-        long, env = "BAGTRACK_MAX_FRAME_MEMORY",
-        default_value_t = Config::default().max_frame_memory
-    )]
-    pub max_frame_memory: u64,
-    /// Most connections open at the same time.
-    #[arg(
-        long, env = "BAGTRACK_MAX_CONNECTIONS",
-        default_value_t = Config::default().max_connections
-    )]
-    pub max_connections: usize,
-    /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
-    /// commas; `*` for all. Requests of other pages are refused.
-    #[arg(long, env = "BAGTRACK_CORS_ORIGINS", value_delimiter = ',')]
-    pub cors_origins: Vec<String>,
-    /// The path of the service on a host that it shares with others, like `/tracker`.
-    #[arg(
-        long, env = "BAGTRACK_BASE_PATH", value_name = "PATH",
-        default_value_t = Config::default().base_path
-    )]
-    pub base_path: BasePath,
-    /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
-    /// longer is closed too.
-    #[arg(
-        long, env = "BAGTRACK_HEADER_TIMEOUT",
-        default_value = shown(Config::default().header_timeout),
-        value_parser = parse_duration
-    )]
-    pub header_timeout: Duration,
-    /// Time for a client to send its request body.
-    #[arg(
-        long, env = "BAGTRACK_BODY_TIMEOUT",
-        default_value = shown(Config::default().body_timeout),
-        value_parser = parse_duration
-    )]
-    pub body_timeout: Duration,
-    /// Time for a request to wait for its session and a worker and to be worked on.
-    #[arg(
-        long, env = "BAGTRACK_WORK_TIMEOUT",
-        default_value = shown(Config::default().work_timeout),
-        value_parser = parse_duration
-    )]
-    pub work_timeout: Duration,
-    /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
-    /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
-    #[arg(
-        long, env = "BAGTRACK_SHUTDOWN_DELAY",
-        default_value = shown(Config::default().shutdown_delay),
-        value_parser = parse_duration
-    )]
-    pub shutdown_delay: Duration,
-    /// Time for open requests to end on shutdown.
-    #[arg(
-        long, env = "BAGTRACK_SHUTDOWN_TIMEOUT",
-        default_value = shown(Config::default().shutdown_timeout),
-        value_parser = parse_duration
-    )]
-    pub shutdown_timeout: Duration,
-    /// What one request and one client may take.
-    #[command(flatten)]
-    pub limits: LimitsConfig,
-    /// The store that replicas share.
-    #[command(flatten)]
-    pub store: StoreConfig,
-    /// Who may use the service.
-    #[command(flatten)]
-    pub access: AccessConfig,
-}
-
-impl Default for Config {
-    /// The settings that hold where no other is given. Neither flags nor the environment are read.
-    fn default() -> Self {
-        let limits = bagtrack_ingest::Limits::default();
-        Self {
-            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
-            #[cfg(feature = "tls")]
-            tls: TlsConfig::default(),
-            workers: None,
-            queue: 256,
-            max_sessions: 1024,
-            session_queue: 8,
-            session_idle: Duration::from_secs(600),
-            session_first: Duration::from_secs(60),
-            max_body_bytes: 32 << 20,
-            max_upload_bytes: 512 << 20,
-            max_frames: 64,
-            max_frame_bytes: limits.max_bytes,
-            max_frame_side: limits.max_side,
-            max_frame_pixels: limits.max_pixels,
-            max_frame_memory: limits.max_memory,
-            max_connections: 4096,
-            cors_origins: Vec::new(),
-            base_path: BasePath::default(),
-            header_timeout: Duration::from_secs(30),
-            body_timeout: Duration::from_secs(30),
-            work_timeout: Duration::from_secs(30),
-            shutdown_delay: Duration::from_secs(5),
-            shutdown_timeout: Duration::from_secs(20),
-            limits: LimitsConfig::default(),
-            store: StoreConfig::default(),
-            access: AccessConfig::default(),
-        }
+settings! {
+    /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`; a number alone is seconds.
+    pub struct Config {
+        /// Address to listen on, or a host's name with a port; port 0 picks a free one.
+        listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080));
+        /// Frames decoded and tracked at the same time [default: the number of cores].
+        workers: Option<usize> = None, |workers| workers.as_ref().map_or(Ok(()), permits);
+        /// Requests with a frame that are inside at the same time, the ones at work included.
+        queue: usize = 256, permits;
+        /// Most sessions alive.
+        max_sessions: usize = 1024, positive;
+        /// Requests at one session at the same time, the one at work included.
+        session_queue: usize = 8, permits;
+        /// A session expires when no frame comes for this long.
+        session_idle: Duration = Duration::from_secs(600), moment;
+        /// A new session expires when its first frame does not come for this long.
+        session_first: Duration = Duration::from_secs(60), moment;
+        /// Most bytes of a request body.
+        max_body_bytes: usize = 32 << 20, positive;
+        /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
+        max_upload_bytes: usize = 512 << 20;
+        /// Most frames of one post.
+        max_frames: usize = 64, positive;
+        /// Most bytes of one encoded frame.
+        max_frame_bytes: usize = bagtrack_ingest::Limits::default().max_bytes, positive;
+        /// Longest side of a frame in pixels.
+        max_frame_side: u32 = bagtrack_ingest::Limits::default().max_side, positive;
+        /// Most pixels of a frame.
+        max_frame_pixels: u64 = bagtrack_ingest::Limits::default().max_pixels, positive;
+        /// Most memory in bytes that decoding one frame may take.
+        max_frame_memory: u64 = bagtrack_ingest::Limits::default().max_memory, positive;
+        /// Most connections open at the same time.
+        max_connections: usize = 4096, permits;
+        /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
+        /// commas; `*` for all. Requests of other pages are refused.
+        cors_origins: Vec<String> = Vec::new(), origins;
+        /// The path of the service on a host that it shares with others, like `/tracker`.
+        base_path: BasePath = BasePath::default();
+        /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
+        /// longer is closed too.
+        header_timeout: Duration = Duration::from_secs(30), moment;
+        /// Time for a client to send its request body.
+        body_timeout: Duration = Duration::from_secs(30), moment;
+        /// Time for a request to wait for its session and a worker and to be worked on.
+        work_timeout: Duration = Duration::from_secs(30), moment;
+        /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
+        /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
+        shutdown_delay: Duration = Duration::from_secs(5), delay;
+        /// Time for open requests to end on shutdown.
+        shutdown_timeout: Duration = Duration::from_secs(20), delay;
+    }    flattened {
+        /// The certificate that clients see.
+        #[cfg(feature = "tls")]
+        tls: TlsConfig;
+        /// What one request and one client may take.
+        limits: LimitsConfig;
+        /// The store that replicas share.
+        store: StoreConfig;
+        /// Who may use the service.
+        access: AccessConfig;
     }
 }
 
 impl Config {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, by its flag and variable.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        self.check_ranges()?;
+        self.store.check_address()?;
+        let uploads = self.max_body_bytes..=(4 << 40);
+        let held = in_range(
+            uploads.contains(&self.max_upload_bytes),
+            "at least max-body-bytes, at most 4 TiB",
+        );
+        ConfigError::check("max_upload_bytes", held)?;
+        let share = self.limits.client_upload_bytes;
+        let fits = share.is_none_or(|bytes| bytes >= self.max_body_bytes);
+        let held = in_range(fits, "at least max-body-bytes");
+        ConfigError::check("client_upload_bytes", held)
+    }
+
     /// The number of workers, with its default.
     pub fn worker_count(&self) -> usize {
         self.workers.unwrap_or_else(cores)
@@ -240,6 +132,24 @@ fn cores() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_defaults_are_valid() {
+        assert_eq!(Config::default().validate(), Ok(()));
+    }
+
+    #[test]
+    fn a_setting_out_of_range_is_named() {
+        let config = Config {
+            max_frames: 0,
+            ..Config::default()
+        };
+        let message = config.validate().unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "--max-frames (BAGTRACK_MAX_FRAMES) must be at least 1"
+        );
+    }
 
     /// Set for the process that [`the_defaults_do_not_come_from_the_environment`] starts.
     const CHILD: &str = "BAGTRACK_TEST_CHILD";

@@ -3,7 +3,9 @@
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
 
-use super::pace::TooSlow;
+use super::multipart::{HeadTooLong, MAX_HEAD_BYTES};
+use super::pace::{TooSlow, paced};
+use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
@@ -61,18 +63,19 @@ impl<'a> Buffer<'a> {
     }
 }
 
-/// Reads the whole body, of at most `max_bytes` bytes.
+/// Reads the whole body.
 ///
 /// # Errors
 /// It is too large, too slow or cut short, or there is no memory for it.
 pub(super) async fn read(
     body: Body,
-    max_bytes: usize,
+    config: &Config,
     charge: &mut ByteCharge,
 ) -> Result<Bytes, Problem> {
+    let max_bytes = config.max_body_bytes;
     let announced = http_body::Body::size_hint(&body).upper();
     let announced = announced.and_then(|bytes| usize::try_from(bytes).ok());
-    let mut body = Limited::new(body, max_bytes);
+    let mut body = Limited::new(paced(body, config, None), max_bytes);
     let mut buffer = Buffer::new(announced.unwrap_or(max_bytes).min(max_bytes), charge);
     while let Some(frame) = body.frame().await {
         let frame = frame.map_err(|error| problem(error.as_ref(), max_bytes))?;
@@ -94,6 +97,12 @@ pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Proble
         }
         if error.is::<TimeoutError>() || error.is::<TooSlow>() {
             return Problem::body_timeout();
+        }
+        if error.is::<HeadTooLong>() {
+            return Problem::malformed(format!(
+                "A part of the multipart form has a head of more than {MAX_HEAD_BYTES} bytes, or so many stand before the \
+                 first part."
+            ));
         }
         if let Some(full) = error.downcast_ref::<BytesFull>() {
             return (*full).into();

@@ -1,9 +1,9 @@
 //! JSON uploads: `frame` and `frames` are base64, all other fields are settings.
 
 use super::base64_file;
-use super::fields::Fields;
 use super::misnamed;
 use super::settings::{FrameCount, Settings};
+use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;

@@ -1,15 +1,14 @@
 //! A request with frames for a live session.
 
-use super::admit::admit;
+use super::instance::Instance;
 use super::settings::Settings;
 use super::texts::Texts;
 use super::uploaded::Upload;
-use crate::http::middleware::base_path::client_path;
-use crate::http::middleware::request_id;
+use super::uploaded::admit;
+use crate::http::extract::answer_form::AnswerForm;
+use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::resources::session_path::SessionPath;
-use crate::http::respond::response_format::AnswerForm;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Request};
 use bagtrack_sessions::{QueuePermit, SessionPermit};
@@ -21,10 +20,8 @@ pub struct SessionRequest<S> {
     pub client: Client,
     /// The form of the answer.
     pub form: AnswerForm,
-    /// The path of the request, as its client knows it.
-    pub path: String,
-    /// The id of the request.
-    pub request_id: String,
+    /// What names it to its client.
+    pub instance: Instance,
     /// The permit of the session.
     pub permit: SessionPermit,
     /// The place in the queue.
@@ -38,7 +35,7 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
 
     async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
         let texts = Texts::of_query::<S>(request.uri())?;
-        let (uri, request_id) = (client_path(&request), request_id::of(&request));
+        let instance = Instance::of(&request);
         let (mut parts, body) = request.into_parts();
         let path = SessionPath::from_request_parts(&mut parts, state).await?;
         let permit = path.find(state).await?.enter()?;
@@ -60,8 +57,7 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
         Ok(Self {
             client,
             form,
-            path: uri,
-            request_id,
+            instance,
             permit,
             queue,
             upload,

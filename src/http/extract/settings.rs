@@ -16,9 +16,8 @@ pub enum FrameCount {
     Several,
 }
 
-/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` and `ToSchema` describe
-/// them in the query and in a body.
-pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
+/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` describes them.
+pub trait Settings: DeserializeOwned + IntoParams + Send + 'static {
     /// How many frames the route takes.
     const FRAMES: FrameCount;
     /// Whether a snapshot may come beside the frames.
@@ -27,6 +26,20 @@ pub trait Settings: DeserializeOwned + IntoParams + ToSchema + Send + 'static {
     const TAKES_VIDEO: bool = false;
     /// What the names of the schemas of its bodies begin with.
     const SCHEMA_PREFIX: &'static str;
+}
+
+/// Off, unless it is given: as `name`, `name=true` or `name=1`. Python clients write `True` and `False`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Switch(pub bool);
+
+impl<'de> Deserialize<'de> for Switch {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match &*Cow::<str>::deserialize(deserializer)? {
+            "" | "true" | "True" | "1" => Ok(Self(true)),
+            "false" | "False" | "0" => Ok(Self(false)),
+            _ => Err(D::Error::custom("a switch is `true` or `false`")),
+        }
+    }
 }
 
 /// The greatest number that JSON holds exactly in every language: 2^53 - 1.
@@ -85,40 +98,11 @@ pub fn number_schema(schema_type: impl Into<SchemaType>, max: u64) -> ObjectBuil
         )))
 }
 
-/// A whole number from 0 to `MAX` in the query and in forms.
-#[derive(Debug)]
-pub struct NumberText<const MAX: u64>;
+impl<const MAX: u64> ToSchema for WholeNumber<MAX> {}
 
-/// A whole number from 0 to `MAX` in a JSON body, which may be a text.
-#[derive(Debug)]
-pub struct NumberInput<const MAX: u64>;
-
-/// A seed or the number of a frame, as a text.
-pub type ExactText = NumberText<MAX_EXACT>;
-/// The same in JSON.
-pub type ExactInput = NumberInput<MAX_EXACT>;
-/// Which target is meant, as a text.
-pub type TargetText = NumberText<MAX_TARGET>;
-/// The same in JSON.
-pub type TargetInput = NumberInput<MAX_TARGET>;
-
-impl<const MAX: u64> ToSchema for NumberText<MAX> {}
-
-impl<const MAX: u64> PartialSchema for NumberText<MAX> {
+impl<const MAX: u64> PartialSchema for WholeNumber<MAX> {
+    /// As a text in the query and in forms.
     fn schema() -> RefOr<Schema> {
         number_schema(Type::Integer, MAX).build().into()
-    }
-}
-
-impl<const MAX: u64> ToSchema for NumberInput<MAX> {}
-
-impl<const MAX: u64> PartialSchema for NumberInput<MAX> {
-    fn schema() -> RefOr<Schema> {
-        let types = [Type::Integer, Type::String, Type::Null];
-        let number = number_schema(SchemaType::from_iter(types), MAX);
-        // All of fewer digits than the greatest.
-        let digits = MAX.ilog10().max(1);
-        let pattern = format!("^[0-9]{{1,{digits}}}$");
-        number.pattern(Some(pattern)).build().into()
     }
 }

@@ -82,14 +82,3 @@ impl Texts {
         }
     }
 }
-
-/// Refuses any query, for calls that take none.
-///
-/// # Errors
-/// There is one.
-pub fn refuse_query(uri: &Uri) -> Result<(), Problem> {
-    match uri.query() {
-        None | Some("") => Ok(()),
-        Some(_) => Err(Problem::malformed("This call takes no query parameters.")),
-    }
-}

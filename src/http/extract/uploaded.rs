@@ -1,24 +1,26 @@
 //! The frames and settings of a request, whichever form they came in.
 
 use super::body;
-use super::fields::Fields;
 use super::json;
 use super::multipart;
-use super::pace::{Pace, PacedBody};
+use super::pace::paced;
 use super::settings::{FrameCount, Settings};
 use super::texts::Texts;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::RequestPermit;
-use crate::http::resources::snapshot::MEDIA_TYPE;
 use crate::http::state::AppState;
-use axum::body::{Body, Bytes};
+use axum::body::Bytes;
 use axum::extract::Request;
-use axum::http::header::CONTENT_TYPE;
+use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
+use axum::http::request::Parts;
 use bagtrack_ingest::video::{VideoFormat, video_format};
-use bagtrack_sessions::{ByteCharge, QueuePermit, WorkMeter};
+use bagtrack_sessions::{ByteCharge, ChargedBytes, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
+/// The media type of session snapshots.
+pub const SNAPSHOT: &str = "application/vnd.bagtrack.snapshot";
 /// What curl calls a body, whatever it is.
 const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
 /// Least bytes of a body that is told to have lost some.
@@ -47,8 +49,8 @@ pub struct Upload<S> {
 
 impl<S: Settings> Upload<S> {
     /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
-    /// their names. JSON is parsed on a worker. The place holds `permit` and the memory of the files until the request's
-    /// work has ended.
+    /// their names. JSON is parsed on a worker. The place holds `permit` until the request's work has
+    /// ended, and the files their memory.
     ///
     /// # Errors
     /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
@@ -60,7 +62,6 @@ impl<S: Settings> Upload<S> {
         request: Request,
     ) -> Result<(Self, QueuePermit), Problem> {
         let max_bytes = state.config.max_body_bytes;
-        let pace = Pace::of(&state.config.limits);
         let new_charge = || ByteCharge::new(&state.uploads, permit.bytes());
         let mut charge = new_charge();
         let max_files = match S::FRAMES {
@@ -77,11 +78,11 @@ impl<S: Settings> Upload<S> {
         if media_type == "multipart/form-data" {
             // The parser keeps bytes that it has not given out yet; they are charged beside the files.
             let arriving = Some(new_charge());
-            let request = request.map(|body| Body::new(PacedBody::new(body, pace, arriving)));
+            let request = request.map(|body| paced(body, &state.config, arriving));
             multipart::read::<S>(request, max_bytes, max_files, &mut fields, &mut charge).await?;
         } else {
-            let body = Body::new(PacedBody::new(request.into_body(), pace, None));
-            let bytes = body::read(body, max_bytes, &mut charge).await?;
+            let body = request.into_body();
+            let bytes = body::read(body, &state.config, &mut charge).await?;
             // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
             let is_labelled = media_type == "application/json";
             if let Some(text) = json::text_of(&bytes, is_labelled) {
@@ -94,9 +95,11 @@ impl<S: Settings> Upload<S> {
             }
         }
         let (flow, permit) = (permit.flow(), Arc::new(permit));
-        let held = Box::new((charge, permit.clone()));
+        let held = Box::new(permit.clone());
         let queue = state.service.admission.enter(flow, held)?;
-        if let Some(bytes) = json {
+        let charge = Arc::new(charge);
+        let own = |bytes| Bytes::from(ChargedBytes::sharing(bytes, &charge));
+        if let Some(bytes) = json.map(own) {
             let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;
                 Ok(fields)
@@ -109,7 +112,7 @@ impl<S: Settings> Upload<S> {
         let Fields {
             files,
             snapshot,
-            texts: own,
+            texts: of_body,
         } = fields;
         check_files(&files, max_files)?;
         let formats = files.iter().map(|file| video_format(file, &media_type));
@@ -118,17 +121,43 @@ impl<S: Settings> Upload<S> {
             return Err(Problem::new(Kind::UnsupportedImage, VIDEO));
         }
         let upload = Self {
-            settings: own.or(texts).parse()?,
-            is_snapshot: media_type == MEDIA_TYPE,
-            snapshot,
+            settings: of_body.or(texts).parse()?,
+            is_snapshot: media_type == SNAPSHOT,
+            snapshot: snapshot.map(own),
             video,
-            files,
+            files: files.into_iter().map(own).collect(),
         };
         if upload.video.is_none() {
             permit.count_frames(upload.files.len())?;
         }
         Ok((upload, queue))
     }
+}
+
+/// The files of a body, and the texts of its settings.
+#[derive(Debug)]
+pub(super) struct Fields {
+    /// The files, in order.
+    pub(super) files: Vec<Bytes>,
+    /// The snapshot beside the files.
+    pub(super) snapshot: Option<Bytes>,
+    /// The texts.
+    pub(super) texts: Texts,
+}
+
+/// Lets in a request before any of its body is read: takes a place among the client's requests in flight.
+///
+/// # Errors
+/// The announced body is too large, the queue is full, or the client has too many requests in flight.
+pub fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> {
+    let max = state.config.max_body_bytes;
+    let length = parts.headers.get(CONTENT_LENGTH);
+    let length = length.and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
+    if length.is_some_and(|length| length > max as u64) {
+        return Err(Problem::body_too_large(max));
+    }
+    state.service.admission.check_place()?;
+    state.clients.account(&Client::of(parts)).request()
 }
 
 /// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.

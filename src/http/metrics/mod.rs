@@ -9,6 +9,5 @@
 //! What can go wrong: nobody asks for `/metrics`, and measurements pile up. So the sweeper sums them up from time to
 //! time ([`Metrics::upkeep`](registry::Metrics::upkeep)).
 
-pub mod layer;
 mod maker;
 pub mod registry;

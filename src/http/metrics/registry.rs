@@ -3,7 +3,7 @@
 use super::maker::{METADATA, Maker};
 use crate::http::problems::kind::Kind;
 use bagtrack_sessions::TrackingMetrics;
-use metrics::{Counter, Gauge, Histogram, Key, Label, Recorder};
+use metrics::{Counter, Histogram, Key, Label, Recorder};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};
 
 /// Bounds in seconds for requests and for waiting.
@@ -32,26 +32,6 @@ pub struct Metrics {
     pub shed_connections: Counter,
     /// What decoding and tracking measure.
     pub tracking: TrackingMetrics,
-    /// What is set when somebody asks.
-    pub gauges: Gauges,
-}
-
-/// Values of a moment.
-pub struct Gauges {
-    /// Sessions in memory.
-    pub sessions: Gauge,
-    /// Most sessions.
-    pub max_sessions: Gauge,
-    /// Requests inside.
-    pub queued: Gauge,
-    /// Workers at work.
-    pub workers_busy: Gauge,
-    /// Workers.
-    pub workers: Gauge,
-    /// Resident memory of the process.
-    pub resident_memory: Gauge,
-    /// 1 while the service is asked to end.
-    pub draining: Gauge,
 }
 
 impl Metrics {
@@ -89,7 +69,6 @@ impl Metrics {
                 &[],
             ),
             tracking: tracking(&make),
-            gauges: Gauges::new(&make),
             recorder,
         }
     }
@@ -117,15 +96,14 @@ impl Metrics {
             .increment(1);
     }
 
-    /// Of a service with a store: whether it is ready, and how many calls failed.
-    pub fn store(&self, is_ready: bool, failures: u64) {
-        let make = Maker(&self.recorder);
-        let up = make.gauge(
-            "bagtrack_store_up",
-            "1 while the store answers and takes writes.",
-        );
-        up.set(if is_ready { 1.0 } else { 0.0 });
-        let failed = make.counter(
+    /// A value of this moment.
+    pub fn set(&self, name: &'static str, description: &'static str, value: f64) {
+        Maker(&self.recorder).gauge(name, description).set(value);
+    }
+
+    /// How many calls of a store failed.
+    pub fn store_failures(&self, failures: u64) {
+        let failed = Maker(&self.recorder).counter(
             "bagtrack_store_failures_total",
             "Calls that the store did not answer or refused, probes among them.",
             &[],
@@ -153,26 +131,6 @@ impl Default for Metrics {
 impl std::fmt::Debug for Metrics {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str("Metrics")
-    }
-}
-
-impl Gauges {
-    fn new(make: &Maker) -> Self {
-        Self {
-            sessions: make.gauge("bagtrack_sessions", "Sessions in memory."),
-            max_sessions: make.gauge("bagtrack_sessions_max", "Most sessions there may be."),
-            queued: make.gauge(
-                "bagtrack_requests_inside",
-                "Requests with a place in the queue.",
-            ),
-            workers_busy: make.gauge("bagtrack_workers_busy", "Workers at work."),
-            workers: make.gauge("bagtrack_workers", "Workers."),
-            resident_memory: make.gauge(
-                "process_resident_memory_bytes",
-                "Resident memory of the process.",
-            ),
-            draining: make.gauge("bagtrack_draining", "1 while the service is about to end."),
-        }
     }
 }
 

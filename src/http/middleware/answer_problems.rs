@@ -1,14 +1,14 @@
 //! Writes the document of a problem that a handler or a layer answered with, and its line in the log.
 
-use super::base_path::client_path;
-use super::request_id;
-use crate::http::problems::document::respond;
+use crate::http::extract::instance::Instance;
+use crate::http::problems::document::MEDIA_TYPE;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::StatusCode;
-use axum::http::header::CONTENT_LENGTH;
+use axum::http::HeaderValue;
+use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, RETRY_AFTER};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
@@ -16,36 +16,27 @@ use std::any::Any;
 /// The middleware.
 pub async fn answer_problems(
     State(state): State<AppState>,
+    instance: Instance,
     request: Request,
     next: Next,
 ) -> Response {
-    let (path, id) = (client_path(&request), request_id::of(&request));
     let mut response = next.run(request).await;
     let Some(problem) = response.extensions_mut().remove::<Problem>() else {
         return response;
     };
-    state.metrics.problem(problem.kind());
-    log_problem(&problem);
-    let mut written = respond(&problem, state.config.base_path.as_str(), path, id);
-    // The first response's headers stay: it may have some that the problem does not know, like `Allow`.
-    for (name, value) in response.headers() {
-        written.headers_mut().entry(name).or_insert(value.clone());
+    let document = Json(instance.report(&state, &problem)).into_response();
+    *response.body_mut() = document.into_body();
+    // The response's own headers stay: it may have some that the problem does not know, like `Allow`.
+    let headers = response.headers_mut();
+    headers.remove(CONTENT_LENGTH);
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
+    if let Some(seconds) = problem.retry_seconds() {
+        headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
     }
-    written.headers_mut().remove(CONTENT_LENGTH);
-    written
+    response
 }
 
 /// The answer to a panic in a handler. The panic hook has already reported the panic itself.
 pub fn panic_response(_panic: Box<dyn Any + Send + 'static>) -> Response<Body> {
     Problem::panicked().into_response()
-}
-
-fn log_problem(problem: &Problem) {
-    let (kind, cause) = (problem.kind().slug(), problem.cause());
-    let cause = cause.as_deref().unwrap_or("none");
-    if problem.kind().status() == StatusCode::INTERNAL_SERVER_ERROR {
-        tracing::error!(kind, cause, "problem");
-    } else {
-        tracing::info!(kind, cause, "problem");
-    }
 }

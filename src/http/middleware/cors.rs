@@ -1,11 +1,12 @@
 //! Which pages of other origins may call.
 
 use super::draining::DRAINING;
-use super::request_id::REQUEST_ID;
 use super::trace_context::TRACEPARENT;
 use crate::http::extract::idempotency_key::IDEMPOTENCY_KEY;
+use crate::http::extract::instance::REQUEST_ID;
 use crate::http::quotas::clients::{RATE_LIMIT, RATE_LIMIT_POLICY};
 use crate::http::respond::annotated_image::ANSWER;
+use crate::http::respond::answer::{CHECKPOINT, REPLAYED};
 use axum::http::header::{AUTHORIZATION, CONTENT_TYPE, LOCATION, RETRY_AFTER};
 use axum::http::{HeaderName, HeaderValue, Method};
 use std::time::Duration;
@@ -42,8 +43,8 @@ pub fn cors(origins: &[String]) -> CorsLayer {
             DRAINING,
             RATE_LIMIT,
             RATE_LIMIT_POLICY,
-            name("replayed"),
-            name("checkpoint"),
+            REPLAYED,
+            CHECKPOINT,
             ANSWER,
         ])
         .max_age(MAX_AGE)

@@ -1,4 +1,4 @@
-//! The layers that requests pass through before their handlers. [`router`](super::router) gives their order.
+//! The layers that requests pass through before their handlers. [`router`](super::server::router) gives their order.
 //!
 //! In: a request. Out: the request, with what the layer found in its extensions, or a response in its place.
 //!
@@ -6,15 +6,17 @@
 //! answer because it is still sending its body ([`lingering_close`]).
 
 pub mod answer_problems;
+pub mod authenticate;
 pub mod base_path;
+pub mod check_origin;
 pub mod client_identity;
 pub mod cors;
+pub mod count_requests;
 pub mod draining;
 #[cfg(feature = "otel")]
 pub mod exported_span;
 pub mod forwarded;
 pub mod lingering_close;
-pub mod request_id;
 pub mod request_log;
 pub mod security_headers;
 pub mod single_host;

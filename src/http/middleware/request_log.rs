@@ -6,13 +6,14 @@
 //! only where `debug` is asked for.
 
 use super::client_identity::note_address;
-use super::request_id;
 use super::trace_context::{TRACEPARENT, TraceContext};
+use crate::http::extract::instance::Instance;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
 use bagtrack_sessions::short_id;
+use percent_encoding::percent_decode_str;
 use std::net::IpAddr;
 use std::time::Instant;
 use tracing::field::Empty;
@@ -21,6 +22,8 @@ use uuid::Uuid;
 
 /// Bytes of a path that are logged.
 const MAX_LOGGED_PATH: usize = 200;
+/// Characters of a session's id that are logged.
+const SHOWN_OF_ID: usize = 8;
 const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 /// The middleware.
@@ -55,7 +58,7 @@ pub async fn log_request(
 }
 
 fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
-    let id = request_id::of(request);
+    let id = Instance::of(request).request_id;
     let (method, path) = (request.method(), logged(request.uri().path()));
     match is_probe {
         true => {
@@ -70,13 +73,26 @@ fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
 /// The path as it is logged.
 fn logged(path: &str) -> String {
     let path = path.get(..MAX_LOGGED_PATH).unwrap_or(path);
-    let shown = path
-        .split('/')
-        .map(|segment| match segment.parse::<Uuid>() {
+    let mut before = "";
+    let shown = path.split('/').map(|segment| {
+        let follows = std::mem::replace(&mut before, segment) == "sessions";
+        let text = percent_decode_str(segment).decode_utf8_lossy();
+        match text.parse::<Uuid>() {
             Ok(id) => short_id(id),
+            // It may be an id with more behind it.
+            Err(_) if follows => shortened(&text),
             Err(_) => segment.to_owned(),
-        });
+        }
+    });
     shown.collect::<Vec<String>>().join("/")
+}
+
+/// The beginning of what may be an id.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(SHOWN_OF_ID) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -88,10 +104,13 @@ mod tests {
         for id in [
             "67e55044-10b1-426f-9247-bb680e5fe0c8",
             "67E5504410B1426F9247BB680E5FE0C8",
+            "%367e55044-10b1-426f-9247-bb680e5fe0c8",
+            "67e55044-10b1-426f-9247-bb680e5fe0c8;x=1",
         ] {
             let path = format!("/sessions/{id}/frames");
             assert_eq!(logged(&path), "/sessions/67e55044…/frames");
         }
+        assert_eq!(logged("/sessions/short/frames"), "/sessions/short/frames");
         assert_eq!(logged("/healthz"), "/healthz");
     }
 }

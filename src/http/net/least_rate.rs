@@ -1,7 +1,7 @@
 //! The least rate at which a client has to send or to take bytes.
 //!
 //! Only the time counts in which the service waits for the client. The client may use up a fixed time of it; bytes that go
-//! over pay some of it back. So a client that now and then moves a byte does not hold its connection for long.
+//! over pay some of it back, and where that is allowed some in advance. So a client that now and then moves a byte does not hold its connection for long.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -11,11 +11,12 @@ use tokio::time::{Instant, Sleep, sleep_until};
 /// How long a client may be waited for.
 #[derive(Debug)]
 pub struct LeastRate {
-    grace: Duration,
     /// Bytes a second.
     min_rate: u32,
-    /// Time that was waited, less what bytes have paid back.
-    waited: Duration,
+    /// Time that the client may still be waited for.
+    left: Duration,
+    /// Most of it that bytes can pay for.
+    most: Duration,
     /// Since when the service waits.
     since: Option<Instant>,
     late: Pin<Box<Sleep>>,
@@ -25,11 +26,19 @@ impl LeastRate {
     /// `min_rate` bytes a second, with `grace` to use up.
     pub fn new(grace: Duration, min_rate: u32) -> Self {
         Self {
-            grace,
             min_rate: min_rate.max(1),
-            waited: Duration::ZERO,
+            left: grace,
+            most: grace,
             since: None,
             late: Box::pin(sleep_until(Instant::now())),
+        }
+    }
+
+    /// Bytes that come sooner than they have to pay for a longer wait, up to `most`.
+    pub fn with_credit(self, most: Duration) -> Self {
+        Self {
+            most: most.max(self.most),
+            ..self
         }
     }
 
@@ -37,13 +46,14 @@ impl LeastRate {
     pub fn moved(&mut self, bytes: usize) {
         self.pause();
         let paid = bytes as f64 / f64::from(self.min_rate);
-        self.waited = self.waited.saturating_sub(Duration::from_secs_f64(paid));
+        let left = self.left.saturating_add(Duration::from_secs_f64(paid));
+        self.left = left.min(self.most);
     }
 
     /// The service does not wait for the client any more.
     pub fn pause(&mut self) {
         if let Some(since) = self.since.take() {
-            self.waited += since.elapsed();
+            self.left = self.left.saturating_sub(since.elapsed());
         }
     }
 
@@ -52,8 +62,7 @@ impl LeastRate {
         if self.since.is_none() {
             let now = Instant::now();
             self.since = Some(now);
-            let left = self.grace.saturating_sub(self.waited);
-            self.late.as_mut().reset(now + left);
+            self.late.as_mut().reset(now + self.left);
         }
         self.late.as_mut().poll(cx)
     }
@@ -64,24 +73,45 @@ mod tests {
     use super::*;
     use futures_util::poll;
     use std::future::poll_fn;
+    use tokio::time::advance;
 
     const GRACE: Duration = Duration::from_secs(30);
 
-    #[tokio::test]
+    async fn is_late(rate: &mut LeastRate) -> bool {
+        poll!(poll_fn(|cx| rate.poll_late(cx))).is_ready()
+    }
+
+    #[tokio::test(start_paused = true)]
     async fn time_is_used_up_while_the_client_is_waited_for_and_paid_back_by_bytes() {
         let mut rate = LeastRate::new(GRACE, 1000);
-        // A byte in 29 seconds pays a thousandth of a second back.
-        for is_late in [false, true] {
-            let late = poll!(poll_fn(|cx| rate.poll_late(cx)));
-            assert!(late.is_pending());
-            rate.since = Instant::now().checked_sub(Duration::from_secs(29));
-            rate.moved(1);
-            assert_eq!(rate.waited > GRACE, is_late, "{rate:?}");
-        }
-        let late = poll_fn(|cx| rate.poll_late(cx));
-        let late = tokio::time::timeout(GRACE / 2, late).await;
-        assert!(late.is_ok(), "it has used up its time");
+        assert!(!is_late(&mut rate).await);
+        advance(Duration::from_secs(29)).await;
+        // A byte pays a thousandth of a second back.
+        rate.moved(1);
+        // Nobody waits for the client.
+        advance(Duration::from_secs(100)).await;
+        assert!(!is_late(&mut rate).await);
+        advance(Duration::from_secs(2)).await;
+        assert!(is_late(&mut rate).await, "it has used up its time");
         rate.moved(40_000);
-        assert!(poll!(poll_fn(|cx| rate.poll_late(cx))).is_pending());
+        assert!(!is_late(&mut rate).await);
+        advance(GRACE - Duration::from_secs(1)).await;
+        assert!(!is_late(&mut rate).await);
+        advance(Duration::from_secs(2)).await;
+        assert!(
+            is_late(&mut rate).await,
+            "bytes pay for no more than the grace"
+        );
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn bytes_that_come_early_pay_for_a_longer_wait_where_that_is_allowed() {
+        let mut rate = LeastRate::new(GRACE, 1000).with_credit(2 * GRACE);
+        rate.moved(1_000_000);
+        assert!(!is_late(&mut rate).await);
+        advance(2 * GRACE - Duration::from_secs(1)).await;
+        assert!(!is_late(&mut rate).await);
+        advance(Duration::from_secs(2)).await;
+        assert!(is_late(&mut rate).await);
     }
 }

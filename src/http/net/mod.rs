@@ -1,6 +1,6 @@
-//! The network: listening, connections, and how slowly a client may read and write.
+//! The network: connections, and how slowly a client may read and write.
 //!
-//! In: sockets. Out: requests for the [router](super::router), and their responses.
+//! In: sockets. Out: the bytes of requests, for whom serves them.
 //!
 //! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, or keeps idle ones.
 //! [`least_rate`] and the time limits for handshakes and heads bound the first, [`connections`] the others.
@@ -10,9 +10,6 @@ pub mod activity;
 pub mod certificate;
 pub mod connection_hold;
 pub mod connection_io;
-pub mod connection_service;
 pub mod connections;
 pub mod handshake;
 pub mod least_rate;
-pub mod refusal;
-pub mod server;

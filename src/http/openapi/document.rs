@@ -1,9 +1,10 @@
 //! The document as it is sent: what the handlers say, and what follows from all of them together.
 
 use super::key_order::InOrder;
-use super::routes;
+use super::problem_responses::problem_responses;
 use crate::http::extract::settings::MAX_EXACT;
 use serde_json::{Map, Value, json};
+use utoipa::openapi::OpenApi;
 
 /// The id in all examples: that of `putSession` opens the session which the others use.
 const EXAMPLE_ID: &str = "67e55044-10b1-426f-9247-bb680e5fe0c8";
@@ -12,20 +13,17 @@ const OPENING: [&str; 2] = ["createSession", "putSession"];
 /// A handshake cannot be made by following a link.
 const HANDSHAKE: &str = "openStream";
 
-/// The OpenAPI document as JSON, of a service at the root of its host.
-pub fn document() -> String {
-    document_at("/")
-}
-
-/// The OpenAPI document of a service at this path.
-pub fn document_at(base_path: &str) -> String {
-    let document = serde_json::to_value(routes::handlers());
+/// The OpenAPI document as JSON: what `handlers` say, of a service at this path.
+pub fn document(handlers: &OpenApi, base_path: &str) -> String {
+    let document = serde_json::to_value(handlers);
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
+    share_opening(&mut document);
     let links = links(&document);
     bound_integers(&mut document);
     for operation in operations(&mut document) {
         complete_parameters(operation);
+        add_problems(operation);
         if operation["tags"] != json!(["service"]) {
             add_rate_limits(operation);
         }
@@ -34,6 +32,15 @@ pub fn document_at(base_path: &str) -> String {
         }
     }
     serde_json::to_string_pretty(&InOrder(&document)).expect("the document is plain JSON")
+}
+
+/// `putSession` takes and answers what `createSession` does.
+fn share_opening(document: &mut Value) {
+    let create = &document["paths"]["/sessions"]["post"];
+    let shared = ["requestBody", "responses"].map(|member| (member, create[member].clone()));
+    for (member, value) in shared {
+        document["paths"]["/sessions/{id}"]["put"][member] = value;
+    }
 }
 
 /// Whole numbers of 64 bits are no greater than JSON holds exactly in every language.
@@ -70,6 +77,15 @@ fn complete_parameters(operation: &mut Value) {
         if parameter["in"] == "query" && parameter["schema"]["type"] == "boolean" {
             parameter["allowEmptyValue"] = true.into();
         }
+    }
+}
+
+/// The problems that the operation may answer, beside its responses.
+fn add_problems(operation: &mut Value) {
+    let id = operation["operationId"].as_str().unwrap_or_default();
+    let problems = problem_responses(id);
+    if let Some(responses) = operation["responses"].as_object_mut() {
+        responses.extend(problems);
     }
 }
 

@@ -1,27 +1,21 @@
-//! The problem responses in the OpenAPI document: one for the client's faults and one for the service's, which name the
-//! kinds of the operation.
+//! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's faults
+//! and one for the service's.
 
 use crate::http::problems::document::MEDIA_TYPE;
 use crate::http::problems::kind::Kind;
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
-use utoipa::openapi::schema::{KnownFormat, SchemaFormat, Type};
-use utoipa::openapi::{
-    ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder,
-};
 
-/// The problem that every operation may answer.
-pub const ALWAYS: &[Kind] = &[Kind::Internal];
-
-/// The problems that every operation on a session may answer.
-pub const SESSION: &[Kind] = &[
+/// What every operation on a session may answer.
+const SESSION: &[Kind] = &[
     Kind::Unauthorized,
     Kind::SessionNotFound,
     Kind::SessionExpired,
     Kind::StoreUnavailable,
 ];
 
-/// The problems that every operation with frames may answer.
-pub const UPLOAD: &[Kind] = &[
+/// What every operation with frames may answer.
+const UPLOAD: &[Kind] = &[
     Kind::MalformedRequest,
     Kind::MissingFrame,
     Kind::BodyTimeout,
@@ -33,61 +27,104 @@ pub const UPLOAD: &[Kind] = &[
     Kind::QuotaExceeded,
     Kind::QueueFull,
     Kind::WorkTimeout,
-    Kind::Internal,
 ];
 
-/// The responses of these problems, one for each class of statuses. Each kind leads to its section of the page about
+/// What every operation that begins a track may answer.
+const START: &[Kind] = &[
+    Kind::Unauthorized,
+    Kind::Forbidden,
+    Kind::MissingBox,
+    Kind::InvalidBox,
+    Kind::InvalidParameter,
+    Kind::InvalidSnapshot,
+];
+
+/// What every operation that opens a session may answer.
+const OPEN: &[Kind] = &[
+    Kind::TooManySessions,
+    Kind::NotReady,
+    Kind::StoreUnavailable,
+];
+
+/// What every operation with frames of a session may answer.
+const FRAMES: &[Kind] = &[
+    Kind::FrameOutOfOrder,
+    Kind::NotInOrder,
+    Kind::FrameDiffers,
+    Kind::FrameSizeMismatch,
+    Kind::SessionBusy,
+];
+
+/// What every operation that looks at a session's state may answer.
+const READ: &[Kind] = &[
+    Kind::MalformedRequest,
+    Kind::SessionBusy,
+    Kind::QuotaExceeded,
+    Kind::QueueFull,
+    Kind::WorkTimeout,
+];
+
+/// The problems of an operation, beside the one that every operation may answer.
+fn kinds(operation_id: &str) -> Vec<Kind> {
+    use Kind::*;
+    let kinds: &[&[Kind]] = match operation_id {
+        "createSession" => &[UPLOAD, START, OPEN, &[IdempotencyKeyReused]],
+        "putSession" => &[UPLOAD, START, OPEN, &[SessionExists]],
+        "track" => &[UPLOAD, START, &[FrameSizeMismatch, RequestTooCostly]],
+        "postFrames" => &[UPLOAD, SESSION, FRAMES, &[RequestTooCostly]],
+        "putTarget" => &[UPLOAD, SESSION, FRAMES, &[MissingBox, InvalidBox]],
+        "getSnapshot" | "getBagPicture" => &[SESSION, READ],
+        "getSession" | "deleteSession" => &[SESSION, &[MalformedRequest]],
+        "createToken" => &[SESSION, &[MalformedRequest, Forbidden]],
+        "openStream" => {
+            let others = &[
+                MalformedRequest,
+                FrameOutOfOrder,
+                SessionBusy,
+                QuotaExceeded,
+                WorkTimeout,
+            ];
+            &[SESSION, others]
+        }
+        "getMetrics" => &[&[MalformedRequest, Unauthorized, Forbidden]],
+        "getVersion" => &[&[MalformedRequest]],
+        "getReadiness" => &[&[NotReady]],
+        "getHealth" => &[],
+        other => unreachable!("the problems of {other} are not listed"),
+    };
+    kinds.concat()
+}
+
+/// The problem responses of an operation, by their classes of statuses. Each kind leads to its section of the page about
 /// problems, which stands beside the document's.
-pub fn problem_responses(kinds: &[&[Kind]]) -> BTreeMap<String, RefOr<Response>> {
+pub(super) fn problem_responses(operation_id: &str) -> Map<String, Value> {
     let mut by_class: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
-    for kind in kinds.concat() {
+    for kind in kinds(operation_id).into_iter().chain([Kind::Internal]) {
         let class = kind.status().as_u16() / 100;
         by_class.entry(class).or_default().push(kind);
     }
     let responses = by_class.into_iter().map(|(class, mut kinds)| {
         kinds.sort();
-        (format!("{class}XX"), RefOr::T(response(&kinds)))
+        (format!("{class}XX"), response(&kinds))
     });
     responses.collect()
 }
 
-/// Names the problems of an operation, for its `responses(…)`.
-macro_rules! operation_problems {
-    ($name:ident, $($kinds:expr),+) => {
-        struct $name;
-
-        impl utoipa::IntoResponses for $name {
-            fn responses() -> std::collections::BTreeMap<
-                String,
-                utoipa::openapi::RefOr<utoipa::openapi::Response>,
-            > {
-                $crate::http::openapi::problem_responses::problem_responses(&[$($kinds),+])
-            }
-        }
-    };
-}
-pub(crate) use operation_problems;
-
-fn response(kinds: &[Kind]) -> Response {
+fn response(kinds: &[Kind]) -> Value {
     let links = kinds.iter().map(|kind| {
         let (slug, status) = (kind.slug(), kind.status().as_u16());
         format!("[{slug}](problems#{slug}) ({status})")
     });
     let links: Vec<String> = links.collect();
-    let content = ContentBuilder::new()
-        .schema(Some(Ref::from_schema_name("Problem")))
-        .build();
-    let mut response = ResponseBuilder::new()
-        .description(format!("A problem: {}", links.join(", ")))
-        .content(MEDIA_TYPE, content);
+    let mut response = json!({
+        "description": format!("A problem: {}", links.join(", ")),
+        "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+    });
     if kinds.iter().any(|kind| kind.retry_after().is_some()) {
-        let seconds = ObjectBuilder::new()
-            .schema_type(Type::Integer)
-            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Int32)));
-        let header = HeaderBuilder::new().schema(Some(seconds)).description(Some(
-            "Seconds after which trying again makes sense, with 429 and 503.",
-        ));
-        response = response.header("Retry-After", header.build());
+        response["headers"]["Retry-After"] = json!({
+            "description": "Seconds after which trying again makes sense, with 429 and 503.",
+            "schema": {"type": "integer", "format": "int32"},
+        });
     }
-    response.build()
+    response
 }

@@ -1,15 +1,18 @@
 //! The bodies that have frames and settings in them, as a form and as JSON.
 
+use crate::http::extract::overrides::{ParamOverrides, PresetName};
 use crate::http::extract::settings::{FrameCount, Settings};
+use crate::http::respond::target_box::TargetBox;
+use bagtrack_sessions::MAX_TARGETS;
 use std::borrow::Cow;
 use std::marker::PhantomData;
-use utoipa::openapi::path::ParameterIn;
+use utoipa::openapi::path::{Parameter, ParameterIn};
 use utoipa::openapi::schema::{
-    AdditionalProperties, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema, SchemaFormat,
-    Type,
+    AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder,
+    OneOfBuilder, Schema, SchemaFormat, Type,
 };
-use utoipa::openapi::{RefOr, Required};
-use utoipa::{PartialSchema, ToSchema};
+use utoipa::openapi::{Ref, RefOr, Required};
+use utoipa::{Number, PartialSchema, ToSchema};
 
 /// A body that is one file, and the answer that is one.
 #[derive(Debug)]
@@ -40,55 +43,35 @@ impl<S: Settings> ToSchema for FormBody<S> {
     }
 
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        S::schemas(schemas);
+        schemas.push((PresetName::name().into(), PresetName::schema()));
     }
 }
 
 impl<S: Settings> PartialSchema for FormBody<S> {
     fn schema() -> RefOr<Schema> {
-        let file = ObjectBuilder::new()
-            .schema_type(Type::String)
-            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
-            .content_media_type("application/octet-stream")
-            .description(Some(FILE));
+        let mut body = body_of("Files and the settings as texts.");
+        for setting in S::into_params(|| Some(ParameterIn::Query)) {
+            let (name, required) = (setting.name.clone(), setting.required.clone());
+            if let Some(schema) = in_form(setting) {
+                body.properties.insert(name.clone(), schema);
+            }
+            if matches!(required, Required::True) {
+                body.required.push(name);
+            }
+        }
         let file: Schema = match S::FRAMES {
-            FrameCount::One => file.build().into(),
+            FrameCount::One => binary("application/octet-stream", FILE).into(),
             FrameCount::Several => ArrayBuilder::new()
-                .items(file.build())
+                .items(binary("application/octet-stream", FILE))
                 .min_items(Some(1))
                 .description(Some("One file or more, each as a part with this name."))
                 .build()
                 .into(),
         };
-        let settings = S::into_params(|| Some(ParameterIn::Query));
-        let mut body = Object::new();
-        body.description = Some("Files and the settings as texts.".to_owned());
-        body.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
-        for setting in settings {
-            // The field itself is private.
-            let example = serde_json::to_value(&setting).ok();
-            let example = example.and_then(|setting| setting.get("example").cloned());
-            let required = matches!(setting.required, Required::True);
-            if let Some(RefOr::T(Schema::Object(mut schema))) = setting.schema {
-                schema.description = setting.description;
-                schema.example = example;
-                body.properties.insert(setting.name.clone(), schema.into());
-            } else if let Some(schema) = setting.schema {
-                body.properties.insert(setting.name.clone(), schema);
-            }
-            if required {
-                body.required.push(setting.name);
-            }
-        }
         body.properties.insert("frame".to_owned(), file.into());
         body.required.push("frame".to_owned());
         if S::TAKES_SNAPSHOT {
-            let snapshot = ObjectBuilder::new()
-                .schema_type(Type::String)
-                .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
-                .content_media_type("application/vnd.bagtrack.snapshot")
-                .description(Some(SNAPSHOT));
-            let snapshot: Schema = snapshot.build().into();
+            let snapshot: Schema = binary("application/vnd.bagtrack.snapshot", SNAPSHOT).into();
             body.properties
                 .insert("snapshot".to_owned(), snapshot.into());
         }
@@ -100,23 +83,16 @@ impl<S: Settings> ToSchema for JsonBody<S> {
     fn name() -> Cow<'static, str> {
         format!("{}Json", S::SCHEMA_PREFIX).into()
     }
-
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        S::schemas(schemas);
-    }
 }
 
 impl<S: Settings> PartialSchema for JsonBody<S> {
     fn schema() -> RefOr<Schema> {
-        let RefOr::T(Schema::Object(mut body)) = S::schema() else {
-            unreachable!("settings are a struct with named fields")
-        };
-        body.description = Some(
-            "Frames as base64 or data URLs, and the settings. At least one frame has to be there."
-                .to_owned(),
+        let mut body = body_of(
+            "Frames as base64 or data URLs, and the settings. At least one frame has to be there.",
         );
-        for property in body.properties.values_mut() {
-            describe_itself(property);
+        for setting in S::into_params(|| Some(ParameterIn::Query)) {
+            let name = setting.name.clone();
+            body.properties.insert(name, in_json(setting));
         }
         body.properties
             .insert("frame".to_owned(), base64(FILE).into());
@@ -140,24 +116,70 @@ impl<S: Settings> PartialSchema for JsonBody<S> {
     }
 }
 
-/// A schema that stands beside an object with nothing but its description gets that description. The two together would
-/// allow objects only.
-fn describe_itself(property: &mut RefOr<Schema>) {
-    let RefOr::T(Schema::AllOf(both)) = property else {
-        return;
+fn body_of(description: &str) -> Object {
+    let mut body = Object::new();
+    body.description = Some(description.to_owned());
+    body.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
+    body
+}
+
+/// A setting as a part of a form: a text, as in the query.
+fn in_form(setting: Parameter) -> Option<RefOr<Schema>> {
+    // The field itself is private.
+    let example = serde_json::to_value(&setting).ok();
+    let example = example.and_then(|setting| setting.get("example").cloned());
+    Some(match setting.schema? {
+        RefOr::T(Schema::Object(mut schema)) => {
+            schema.description = setting.description;
+            schema.example = example;
+            schema.into()
+        }
+        schema => schema,
+    })
+}
+
+/// A setting as a field of a JSON object. A box may be four numbers or a text, too; the document has the object alone,
+/// since typed clients can make nothing of a choice with arrays.
+fn in_json(setting: Parameter) -> RefOr<Schema> {
+    let (description, null) = (setting.description, Object::with_type(Type::Null));
+    let choice = |schema: RefOr<Schema>| {
+        let choice = AnyOfBuilder::new().item(schema).item(null.clone());
+        choice.description(description.clone()).into()
     };
-    let [inner, RefOr::T(Schema::Object(beside))] = &both.items[..] else {
-        return;
+    let reference = |mut schema: Ref| {
+        schema.description = description.clone().unwrap_or_default();
+        OneOfBuilder::new().item(schema).item(null.clone()).into()
     };
-    let description = beside.description.clone();
-    let mut inner = inner.clone();
-    match &mut inner {
-        RefOr::Ref(schema) => schema.description = description.unwrap_or_default(),
-        RefOr::T(Schema::Object(schema)) => schema.description = description,
-        RefOr::T(Schema::AnyOf(schema)) => schema.description = description,
-        RefOr::T(_) => return,
+    let target = || Ref::from_schema_name(TargetBox::name());
+    let mut schema = match setting.schema {
+        Some(RefOr::T(Schema::Object(schema))) => schema,
+        Some(RefOr::Ref(schema)) => return reference(schema),
+        _ => unreachable!("a setting is an object or has a name"),
+    };
+    match schema.format.as_ref() {
+        Some(SchemaFormat::Custom(format)) if format == "box" => return choice(target().into()),
+        Some(SchemaFormat::Custom(format)) if format == "boxes" => {
+            let list = ArrayBuilder::new()
+                .items(target())
+                .min_items(Some(1))
+                .max_items(Some(MAX_TARGETS));
+            return choice(list.into());
+        }
+        Some(SchemaFormat::Custom(format)) if format == "json" => {
+            return reference(Ref::from_schema_name(ParamOverrides::name()));
+        }
+        _ => {}
     }
-    *property = inner;
+    if let Some(Number::UInt(max)) = schema.maximum {
+        // It may be a text, too: all of fewer digits than the greatest.
+        schema.schema_type = [Type::Integer, Type::String, Type::Null]
+            .into_iter()
+            .collect();
+        let digits = max.ilog10().max(1);
+        schema.pattern = Some(format!("^[0-9]{{1,{digits}}}$"));
+    }
+    schema.description = description;
+    schema.into()
 }
 
 const FILE: &str = "A frame: a JPEG, PNG or WebP file. In the call `createSession` it may be a session snapshot; \
@@ -170,6 +192,15 @@ fn base64(description: &str) -> Object {
     ObjectBuilder::new()
         .schema_type(Type::String)
         .content_encoding("base64")
+        .description(Some(description))
+        .build()
+}
+
+fn binary(media_type: &str, description: &str) -> Object {
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+        .content_media_type(media_type)
         .description(Some(description))
         .build()
 }

@@ -1,9 +1,7 @@
 //! `/openapi.json`, `/docs/problems`, and `/docs`: Swagger UI from within the program, so that it needs no other host.
 
 use super::static_file::StaticFile;
-use crate::http::middleware::base_path::BasePath;
 use crate::http::middleware::security_headers::{DOCS_POLICY, STRICT};
-use crate::http::openapi::document;
 use crate::http::problems::page;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
@@ -28,12 +26,8 @@ static PROBLEMS: LazyLock<Arc<StaticFile>> = LazyLock::new(|| {
     StaticFile::new(html, DOCS_POLICY, "no-cache", page::page().into())
 });
 
-/// `/openapi.json` of a service below this path.
-pub fn document(base: &BasePath) -> Arc<StaticFile> {
-    let document = match base.as_str() {
-        "" => document::document(),
-        path => document::document_at(path),
-    };
+/// `/openapi.json` with this text.
+pub fn document(document: String) -> Arc<StaticFile> {
     let bytes = (document + "\n").into();
     StaticFile::new("application/json", STRICT, "no-cache", bytes)
 }

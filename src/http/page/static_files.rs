@@ -3,13 +3,13 @@
 //! Browsers ask again each time, and get 304 as long as the program is the same.
 
 use super::static_file::StaticFile;
-use crate::http::middleware::base_path::client_path;
+use crate::http::extract::instance::Instance;
 use crate::http::middleware::security_headers::PAGE_POLICY;
 use crate::http::page::sample_clips;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
+use axum::extract::Path;
 use axum::extract::rejection::PathRejection;
-use axum::extract::{Path, Request};
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
 use std::collections::BTreeMap;
@@ -101,11 +101,10 @@ static SERVED: LazyLock<BTreeMap<&str, Arc<StaticFile>>> = LazyLock::new(|| {
 });
 
 /// `/`. Its links are relative, so a base path needs its slash.
-pub async fn index(request: Request) -> Response {
+pub async fn index(instance: Instance, headers: HeaderMap) -> Response {
     sample_clips::draw_ahead();
-    let path = client_path(&request);
-    match path.ends_with('/') {
-        true => SERVED[INDEX.0].respond(request.headers()).await,
+    match instance.path.ends_with('/') {
+        true => SERVED[INDEX.0].respond(&headers).await,
         false => Redirect::permanent("/").into_response(),
     }
 }

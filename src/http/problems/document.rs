@@ -1,10 +1,6 @@
 //! The problem document as it is sent.
 
 use super::problem::Problem;
-use crate::http::respond::json::Json;
-use axum::http::HeaderValue;
-use axum::http::header::{CONTENT_TYPE, RETRY_AFTER};
-use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
 /// The media type of problem documents.
@@ -56,22 +52,4 @@ impl ProblemDocument {
             index: problem.index(),
         }
     }
-}
-
-/// The response that answers the request to this path with this id.
-pub fn respond(
-    problem: &Problem,
-    base_path: &str,
-    instance: String,
-    request_id: String,
-) -> Response {
-    let document = ProblemDocument::new(problem, base_path, instance, request_id);
-    let document = Json(document);
-    let mut response = (problem.kind().status(), document).into_response();
-    let headers = response.headers_mut();
-    headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
-    if let Some(seconds) = problem.retry_seconds() {
-        headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
-    }
-    response
 }

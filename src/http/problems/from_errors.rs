@@ -175,8 +175,8 @@ impl From<WorkPanicked> for Problem {
 }
 
 impl From<QuotaExhausted> for Problem {
-    fn from(QuotaExhausted { limit }: QuotaExhausted) -> Self {
-        Self::quota_exceeded("sessions", limit)
+    fn from(QuotaExhausted { what, limit }: QuotaExhausted) -> Self {
+        Self::quota_exceeded(what, limit)
     }
 }
 

@@ -12,6 +12,5 @@
 pub mod document;
 mod from_errors;
 pub mod kind;
-mod limits;
 pub mod page;
 pub mod problem;

@@ -39,20 +39,6 @@ impl Problem {
         Self::new(Kind::MalformedRequest, detail)
     }
 
-    /// No frame came.
-    pub fn missing_frame() -> Self {
-        let detail = "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON \
-            field `frame`.";
-        Self::new(Kind::MissingFrame, detail)
-    }
-
-    /// No box came.
-    pub fn missing_box() -> Self {
-        let detail = "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query \
-            or as a field; for several targets `boxes=x,y,width,height;x,y,width,height`.";
-        Self::new(Kind::MissingBox, detail)
-    }
-
     /// It is not told which target is meant, or there is none of this number.
     pub fn which_target(count: usize) -> Self {
         let detail = match count {
@@ -63,11 +49,6 @@ impl Problem {
             ),
         };
         Self::malformed(detail)
-    }
-
-    /// No route has this path.
-    pub fn route_not_found() -> Self {
-        Self::new(Kind::RouteNotFound, "See /docs for the paths there are.")
     }
 
     /// No route has this path.
@@ -85,99 +66,9 @@ impl Problem {
         }
     }
 
-    /// The request has no key, or none that is valid.
-    pub fn unauthorized() -> Self {
-        let detail =
-            "Send an API key, or a session token that has not ended: `Authorization: Bearer …`.";
-        Self::new(Kind::Unauthorized, detail)
-    }
-
-    /// The request needs an API key, and came with a session token.
-    pub fn forbidden() -> Self {
-        let detail =
-            "Use an API key: a session token is good for what is below its own session only.";
-        Self::new(Kind::Forbidden, detail)
-    }
-
-    /// A browser sent the request for a page of another origin.
-    pub fn origin_not_allowed() -> Self {
-        let detail = "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
-        Self::new(Kind::OriginNotAllowed, detail)
-    }
-
-    /// The request names another host.
-    pub fn host_not_allowed() -> Self {
-        let detail =
-            "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
-        Self::new(Kind::HostNotAllowed, detail)
-    }
-
-    /// No live session of the client has this id.
-    pub fn session_not_found() -> Self {
-        let detail = "The session was never opened here with this key, or was deleted; open a new one with POST \
-            /sessions.";
-        Self::new(Kind::SessionNotFound, detail)
-    }
-
-    /// The session was not used for too long.
-    pub fn session_expired() -> Self {
-        let detail = "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST \
-            /sessions.";
-        Self::new(Kind::SessionExpired, detail)
-    }
-
-    /// The idempotency key came with another request before.
-    pub fn idempotency_key_reused() -> Self {
-        let detail =
-            "Send the same frame and settings as the first time, or a new `Idempotency-Key`.";
-        Self::new(Kind::IdempotencyKeyReused, detail)
-    }
-
-    /// A live session that another request opened has the id.
-    pub fn session_exists() -> Self {
-        let detail = "A live session has this id, and another frame, other settings or another key opened it. Make a new \
-            id.";
-        Self::new(Kind::SessionExists, detail)
-    }
-
-    /// The route has other methods.
-    pub fn method_not_allowed() -> Self {
-        Self::new(
-            Kind::MethodNotAllowed,
-            "The header `Allow` lists the methods there are.",
-        )
-    }
-
-    /// The frame has no number, and came while another request was at the session.
-    pub fn not_in_order() -> Self {
-        let detail = "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each \
-            answer. This one was not tracked.";
-        Self::new(Kind::NotInOrder, detail)
-    }
-
     /// A parameter is unknown, has the wrong type or is out of its range.
     pub fn invalid_parameter(detail: impl Into<String>) -> Self {
         Self::new(Kind::InvalidParameter, detail)
-    }
-
-    /// The work took too long.
-    pub fn work_timeout() -> Self {
-        let detail = "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is \
-            never tracked twice.";
-        Self::new(Kind::WorkTimeout, detail)
-    }
-
-    /// The store has no record of a session whose time is not over.
-    pub fn session_lost() -> Self {
-        let detail = "The store has lost this session. Open a new one with POST /sessions, from your last snapshot, or from \
-            a frame and a box.";
-        Self::new(Kind::SessionNotFound, detail)
-    }
-
-    /// The service is about to end.
-    pub fn not_ready() -> Self {
-        let detail = "The service is about to end. Open sessions at another instance.";
-        Self::new(Kind::NotReady, detail)
     }
 
     /// Something of the service is full.
@@ -191,10 +82,36 @@ impl Problem {
         Self::panicked().caused_by(cause)
     }
 
-    /// The service failed, and the log already has the cause.
-    pub fn panicked() -> Self {
-        let detail = "The fault is the service's. The log has the cause under this request id.";
-        Self::new(Kind::Internal, detail)
+    /// The body has more bytes than it may.
+    pub fn body_too_large(limit: usize) -> Self {
+        let detail =
+            format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
+        Self::new(Kind::BodyTooLarge, detail)
+    }
+
+    /// The frames of the request have more pixels than those of one request may.
+    pub fn too_many_pixels(pixels: u64, limit: u64) -> Self {
+        let detail = format!(
+            "The frames of this request have {pixels} pixels together; at most {limit} are taken. Send fewer frames \
+             in a request. None of them was tracked."
+        );
+        Self::new(Kind::RequestTooCostly, detail)
+    }
+
+    /// The client has as many of something as one client may have.
+    pub fn quota_exceeded(what: &str, limit: usize) -> Self {
+        let detail = format!(
+            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
+        );
+        Self::new(Kind::QuotaExceeded, detail)
+    }
+
+    /// The request has more frames than it may.
+    pub fn too_many_frames(limit: usize) -> Self {
+        let detail = format!(
+            "A request may have at most {limit} frames here; send the rest in another one."
+        );
+        Self::new(Kind::TooManyFrames, detail)
     }
 
     /// Says which of `count` frames is meant.
@@ -280,6 +197,74 @@ impl Problem {
         }
         Some(text)
     }
+}
+
+/// Makes the constructors of problems whose text is always the same.
+macro_rules! fixed {
+    ($($(#[doc = $doc:literal])* $name:ident: $kind:ident $detail:literal;)*) => {
+        impl Problem {
+            $($(#[doc = $doc])* pub fn $name() -> Self {
+                Self::new(Kind::$kind, $detail)
+            })*
+        }
+    };
+}
+
+fixed! {
+    /// No frame came.
+    missing_frame: MissingFrame
+        "Send the image as the body, as the multipart part `frame`, or as base64 in the JSON field `frame`.";
+    /// No box came.
+    missing_box: MissingBox
+        "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query or as a field; for \
+            several targets `boxes=x,y,width,height;x,y,width,height`.";
+    /// No route has this path.
+    route_not_found: RouteNotFound "See /docs for the paths there are.";
+    /// The request has no key, or none that is valid.
+    unauthorized: Unauthorized "Send an API key, or a session token that has not ended: `Authorization: Bearer …`.";
+    /// The request needs an API key, and came with a session token.
+    forbidden: Forbidden "Use an API key: a session token is good for what is below its own session only.";
+    /// A browser sent the request for a page of another origin.
+    origin_not_allowed: OriginNotAllowed
+        "Start the service with the origin of the page in --cors-origins (BAGTRACK_CORS_ORIGINS).";
+    /// The request names another host.
+    host_not_allowed: HostNotAllowed "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
+    /// No live session of the client has this id.
+    session_not_found: SessionNotFound
+        "The session was never opened here with this key, or was deleted; open a new one with POST /sessions.";
+    /// The session was not used for too long.
+    session_expired: SessionExpired
+        "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST /sessions.";
+    /// The idempotency key came with another request before.
+    idempotency_key_reused: IdempotencyKeyReused
+        "Send the same frame and settings as the first time, or a new `Idempotency-Key`.";
+    /// A live session that another request opened has the id.
+    session_exists: SessionExists
+        "A live session has this id, and another frame, other settings or another key opened it. Make a new id.";
+    /// The route has other methods.
+    method_not_allowed: MethodNotAllowed "The header `Allow` lists the methods there are.";
+    /// The frame has no number, and came while another request was at the session.
+    not_in_order: NotInOrder
+        "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each answer. \
+            This one was not tracked.";
+    /// The work took too long.
+    work_timeout: WorkTimeout
+        "Try again after the time in `Retry-After`. A frame sent with its number (`?frame=N`) is never tracked \
+            twice.";
+    /// The store has no record of a session whose time is not over.
+    session_lost: SessionNotFound
+        "The store has lost this session. Open a new one with POST /sessions, from your last snapshot, or from a \
+            frame and a box.";
+    /// The service is about to end.
+    not_ready: NotReady "The service is about to end. Open sessions at another instance.";
+    /// The service failed, and the log already has the cause.
+    panicked: Internal "The fault is the service's. The log has the cause under this request id.";
+    /// The address has as many connections as it may, and all of them are busy.
+    too_many_connections: QuotaExceeded
+        "This address has as many connections as one may, all of them busy. Use them again, or try again after the \
+            time in `Retry-After`.";
+    /// The body did not arrive in time.
+    body_timeout: BodyTimeout "Send the whole body faster, or a smaller frame. The session is unchanged.";
 }
 
 impl IntoResponse for Problem {

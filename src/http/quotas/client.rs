@@ -5,8 +5,10 @@ use ipnet::Ipv6Net;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 
-/// Bits of an IPv6 address that a provider gives to one customer (RFC 6177).
+/// Bits of an IPv6 address that a provider gives to one customer at least (RFC 6177).
 const IPV6_PREFIX: u8 = 64;
+/// Those that some customers get.
+const WIDER_PREFIXES: [u8; 2] = [48, 56];
 
 /// The address at the other end of the connection.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +37,16 @@ impl Client {
         Self::Address(address)
     }
 
+    /// The networks that the client is in, which its provider may have given to one customer too.
+    pub fn networks(&self) -> impl Iterator<Item = Ipv6Net> {
+        let address = match self {
+            Self::Address(IpAddr::V6(address)) => Some(*address),
+            Self::Key(_) | Self::Address(IpAddr::V4(_)) => None,
+        };
+        let networks = WIDER_PREFIXES.map(|bits| Some(Ipv6Net::new(address?, bits).ok()?.trunc()));
+        networks.into_iter().flatten()
+    }
+
     /// The client of a request that has passed the layer that notes it.
     pub fn of(parts: &Parts) -> Self {
         let client = parts.extensions.get::<Self>().cloned();
@@ -53,5 +65,9 @@ mod tests {
         assert_ne!(at("2001:db8:1:2::"), at("2001:db8:1:3::"));
         assert_eq!(at("::ffff:192.0.2.7"), at("192.0.2.7"));
         assert_ne!(at("192.0.2.7"), at("192.0.2.8"));
+        let networks = |text: &str| at(text).networks().collect::<Vec<_>>();
+        assert_eq!(networks("2001:db8:1:2::9"), networks("2001:db8:1:77::"));
+        assert_ne!(networks("2001:db8:1:2::9"), networks("2001:db8:1:102::"));
+        assert!(networks("192.0.2.7").is_empty());
     }
 }

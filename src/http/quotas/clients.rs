@@ -1,17 +1,22 @@
 //! What each client has in use, against its quotas.
 //!
-//! Quotas are shares of what the service has: sessions, requests in flight, bytes of uploads, and frames a second. They
-//! are told in the headers `RateLimit-Policy` and `RateLimit` (draft-ietf-httpapi-ratelimit-headers).
+//! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and frames
+//! a second. They are told in the headers `RateLimit-Policy` and `RateLimit` (draft-ietf-httpapi-ratelimit-headers).
 
 use super::client::Client;
+use super::holdings::Holdings;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
-use bagtrack_sessions::{ByteBudget, Flow, QuotaExhausted, Reservation, SessionQuota};
+use bagtrack_sessions::{
+    Budget, BytesFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
+    SessionQuota, TooManySessions,
+};
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
-use governor::{Quota, RateLimiter};
+use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
+use ipnet::Ipv6Net;
 use std::collections::HashMap;
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -29,22 +34,45 @@ const MAX_IDLE_ACCOUNTS: usize = 1024;
 
 type FrameRate = RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInformationMiddleware>;
 
+/// How many frames of WebSockets a client may send.
+pub type MessageRate = DefaultDirectRateLimiter;
+
+/// Frames of WebSockets a second, which carry messages: as many as some hundred cameras send, and so few that they take a
+/// network thread little time, whatever is in them.
+const MESSAGES: NonZeroU32 = NonZeroU32::new(10_000).expect("it is not 0");
+/// And at once.
+const MESSAGES_AT_ONCE: NonZeroU32 = NonZeroU32::new(2_000).expect("it is not 0");
+
 /// What one client may have.
 #[derive(Debug, Clone, Copy)]
 struct Quotas {
     sessions: usize,
+    session_bytes: usize,
     requests: usize,
     streams: usize,
-    bytes: usize,
+    upload_bytes: usize,
     /// Frames a second, and frames at once.
     frames: Option<(NonZeroU32, NonZeroU32)>,
+}
+
+impl Quotas {
+    /// What a client in these networks may hold.
+    fn holdings(&self, networks: &[Arc<Holdings>]) -> Holdings {
+        Holdings {
+            sessions: of_client(self.sessions, networks, |held| &held.sessions),
+            session_bytes: of_client(self.session_bytes, networks, |held| &held.session_bytes),
+            upload_bytes: of_client(self.upload_bytes, networks, |held| &held.upload_bytes),
+        }
+    }
 }
 
 /// The accounts of all clients.
 #[derive(Debug)]
 pub struct Clients {
     quotas: Quotas,
+    all: Holdings,
     accounts: Mutex<HashMap<Client, Arc<Account>>>,
+    networks: Mutex<HashMap<Ipv6Net, Arc<Holdings>>>,
     next_flow: AtomicU64,
 }
 
@@ -53,11 +81,14 @@ pub struct Clients {
 pub struct Account {
     flow: Flow,
     quotas: Quotas,
-    sessions: Arc<Semaphore>,
+    all: Holdings,
+    held: Holdings,
+    /// They are known as long as one of their clients is.
+    _networks: Vec<Arc<Holdings>>,
     requests: Arc<Semaphore>,
     streams: Arc<Semaphore>,
     videos: Arc<Semaphore>,
-    bytes: ByteBudget,
+    messages: Arc<MessageRate>,
     frames: Option<FrameRate>,
     /// Frames that were left at some moment.
     frames_left: Mutex<(u32, Instant)>,
@@ -71,8 +102,8 @@ pub struct RequestPermit {
 }
 
 impl Clients {
-    /// No client yet, with the quotas of this configuration.
-    pub fn new(config: &Config) -> Self {
+    /// No client yet, with the quotas of this configuration. Where there is a store, memory is only a cache of sessions.
+    pub fn new(config: &Config, has_store: bool) -> Self {
         let limits = &config.limits;
         let quarter = |share: Option<usize>, whole: usize| share.unwrap_or(whole.div_ceil(4));
         let frames = NonZeroU32::new(limits.client_frame_rate).map(|rate| {
@@ -84,12 +115,16 @@ impl Clients {
         Self {
             quotas: Quotas {
                 sessions: quarter(limits.client_sessions, config.max_sessions),
+                // One session must fit.
+                session_bytes: quarter(None, config.session_bytes()).max(MAX_LIST_BYTES),
                 requests: quarter(limits.client_requests, config.queue),
                 streams: quarter(limits.client_connections, config.max_connections),
-                bytes: bytes.max(config.max_body_bytes),
+                upload_bytes: bytes.max(config.max_body_bytes),
                 frames,
             },
+            all: Holdings::of_all(config, has_store),
             accounts: Mutex::default(),
+            networks: Mutex::default(),
             next_flow: AtomicU64::new(0),
         }
     }
@@ -104,9 +139,29 @@ impl Clients {
             accounts.retain(|_, account| Arc::strong_count(account) > 1);
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
-        let account = Arc::new(Account::new(flow, self.quotas));
+        let networks = client.networks().map(|network| self.network(network));
+        let networks: Vec<Arc<Holdings>> = networks.collect();
+        let account = Arc::new(Account::new(flow, self.quotas, self.all.clone(), networks));
         accounts.insert(client.clone(), account.clone());
         account
+    }
+
+    /// What all clients hold together.
+    pub fn all(&self) -> &Holdings {
+        &self.all
+    }
+
+    /// What the clients of a network hold.
+    fn network(&self, network: Ipv6Net) -> Arc<Holdings> {
+        // Nothing panics while it is held.
+        let mut networks = self.networks.lock().unwrap_or_else(PoisonError::into_inner);
+        if networks.len() >= MAX_IDLE_ACCOUNTS {
+            networks.retain(|_, held| Arc::strong_count(held) > 1);
+        }
+        networks
+            .entry(network)
+            .or_insert_with(|| Arc::new(Holdings::of_network()))
+            .clone()
     }
 
     /// Tells a client its quotas and what is left of them.
@@ -120,7 +175,7 @@ impl Clients {
         let mut left = format!(
             "\"requests\";r={}, \"sessions\";r={}",
             account.requests.available_permits(),
-            account.sessions.available_permits()
+            account.held.sessions.left()
         );
         if let Some((rate, burst)) = quotas.frames {
             let window = burst.get().div_ceil(rate.get());
@@ -142,7 +197,8 @@ impl Clients {
 }
 
 impl Account {
-    fn new(flow: Flow, quotas: Quotas) -> Self {
+    fn new(flow: Flow, quotas: Quotas, all: Holdings, networks: Vec<Arc<Holdings>>) -> Self {
+        let held = quotas.holdings(&networks);
         let frames = quotas.frames.map(|(rate, burst)| {
             let quota = Quota::per_second(rate).allow_burst(burst);
             RateLimiter::direct(quota).with_middleware()
@@ -151,11 +207,15 @@ impl Account {
         Self {
             flow,
             quotas,
-            sessions: permits(quotas.sessions),
+            all,
+            held,
+            _networks: networks,
             requests: permits(quotas.requests),
             streams: permits(quotas.streams),
             videos: permits(1),
-            bytes: ByteBudget::new(quotas.bytes),
+            messages: Arc::new(MessageRate::direct(
+                Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
+            )),
             frames,
             frames_left: Mutex::new((
                 quotas.frames.map_or(0, |(_, burst)| burst.get()),
@@ -191,15 +251,25 @@ impl Account {
         permit.map_err(|_| Problem::quota_exceeded("streams", self.quotas.streams))
     }
 
+    /// How many frames of WebSockets the client may send.
+    pub fn messages(&self) -> Arc<MessageRate> {
+        self.messages.clone()
+    }
+
     /// The place for a video that is decoded.
     pub fn videos(&self) -> Arc<Semaphore> {
         self.videos.clone()
     }
 
     /// The bytes that the client may have inside.
-    pub fn bytes(&self) -> &ByteBudget {
-        &self.bytes
+    pub fn bytes(&self) -> &Budget {
+        &self.held.upload_bytes
     }
+}
+
+/// The budget of a client in these networks.
+fn of_client(most: usize, networks: &[Arc<Holdings>], of: fn(&Holdings) -> &Budget) -> Budget {
+    Budget::of_client(most, networks.iter().map(|held| of(held).clone()).collect())
 }
 
 /// The sessions of a client: as many places as sessions with one target would take.
@@ -207,18 +277,29 @@ impl Account {
 pub struct ClientSessions(pub Arc<Account>);
 
 impl SessionQuota for ClientSessions {
-    fn check(&self) -> Result<(), QuotaExhausted> {
-        match self.0.sessions.available_permits() {
-            0 => Err(self.0.too_many_sessions()),
+    fn check(&self) -> Result<(), OpenError> {
+        match self.0.held.sessions.left() {
+            0 => Err(self
+                .0
+                .refusal(BytesFull::Client, "sessions", self.0.quotas.sessions)),
             _ => Ok(()),
         }
     }
 
-    fn reserve(&self, targets: usize) -> Result<Reservation, QuotaExhausted> {
-        let places = u32::try_from(targets).unwrap_or(u32::MAX);
-        let permit = self.0.sessions.clone().try_acquire_many_owned(places);
-        let permit = permit.map_err(|_| self.0.too_many_sessions())?;
-        Ok(Box::new((self.0.clone(), permit)))
+    fn reserve(&self, targets: usize, bytes: usize) -> Result<Reservation, OpenError> {
+        let Account {
+            all, held, quotas, ..
+        } = &*self.0;
+        let mut places = Charge::new(&all.sessions, &held.sessions);
+        let full = places.grow(targets);
+        full.map_err(|full| self.0.refusal(full, "sessions", quotas.sessions))?;
+        let mut memory = Charge::new(&all.session_bytes, &held.session_bytes);
+        let full = memory.grow(bytes);
+        full.map_err(|full| {
+            self.0
+                .refusal(full, "bytes of sessions", quotas.session_bytes)
+        })?;
+        Ok(Box::new((self.0.clone(), places, memory)))
     }
 }
 
@@ -229,7 +310,7 @@ impl RequestPermit {
     }
 
     /// The bytes that the client may have inside.
-    pub fn bytes(&self) -> &ByteBudget {
+    pub fn bytes(&self) -> &Budget {
         self.account.bytes()
     }
 
@@ -243,9 +324,11 @@ impl RequestPermit {
 }
 
 impl Account {
-    fn too_many_sessions(&self) -> QuotaExhausted {
-        QuotaExhausted {
-            limit: self.quotas.sessions,
+    /// Why no session can be opened: the client has its maximum, or too little is left of what all may have.
+    fn refusal(&self, full: BytesFull, what: &'static str, limit: usize) -> OpenError {
+        match full {
+            BytesFull::Client => QuotaExhausted { what, limit }.into(),
+            BytesFull::All => TooManySessions(self.all.sessions.held()).into(),
         }
     }
 

@@ -1,41 +1,33 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{
-    ExactInput, ExactText, FrameCount, FrameNumber, Settings, TargetInput, TargetNumber, TargetText,
-};
+use crate::http::extract::settings::{FrameCount, FrameNumber, Settings, TargetNumber};
 use crate::http::openapi::example_frames;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::{Answer, replayed_header};
-use crate::http::respond::checkpoint::with_checkpoint;
+use crate::http::respond::answer::{Answer, with_standing};
 use crate::http::respond::json::Json;
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
+use crate::http::respond::target_box::{BoxText, TargetBox};
 use crate::http::state::AppState;
 use axum::extract::State;
-use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::{FrameBatch, GivenBox, Tracked, box_warnings};
+use axum::response::Response;
+use bagtrack_sessions::{FrameBatch, GivenBox, box_warnings};
 use serde::Deserialize;
 
 /// The settings of a correction.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct TargetSettings {
     /// The corrected box: `x,y,width,height`, or a JSON object with these names. In the query or in the
     /// body; that of the body counts.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = FrameNumber, inline, required = false)]
     frame: Option<FrameNumber>,
     /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
-    #[param(value_type = TargetText, inline, required = false)]
-    #[schema(value_type = TargetInput, inline, required = false)]
+    #[param(value_type = TargetNumber, inline, required = false)]
     target: Option<TargetNumber>,
 }
 
@@ -46,21 +38,6 @@ impl Settings for TargetSettings {
 
 type TargetForm = FormBody<TargetSettings>;
 type TargetJson = JsonBody<TargetSettings>;
-
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    problem_responses::SESSION,
-    &[
-        Kind::MissingBox,
-        Kind::FrameOutOfOrder,
-        Kind::NotInOrder,
-        Kind::FrameDiffers,
-        Kind::FrameSizeMismatch,
-        Kind::InvalidBox,
-        Kind::SessionBusy,
-    ]
-);
 
 /// Correct the box
 ///
@@ -97,41 +74,34 @@ operation_problems!(
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
-        ),
-        Problems
+        )
     )
 )]
 pub async fn put(
     State(state): State<AppState>,
     request: SessionRequest<TargetSettings>,
 ) -> Result<Response, Problem> {
-    let settings = request.upload.settings;
-    let to = settings.r#box.ok_or_else(Problem::missing_box)?;
-    let target = settings.target.map(|number| number.as_index());
-    let number = settings.frame.map(|number| number.0);
-    let next = FrameBatch::posted(
-        number,
-        request.upload.files,
-        Some(GivenBox {
-            target,
-            to: to.into(),
-        }),
-    );
-    let targets = request.permit.session().target_count();
-    let size = request.permit.session().source_size();
-    let queue = request.queue.for_frames(targets);
+    let (number, given) = request.upload.settings.asked()?;
+    let batch = FrameBatch::posted(number, request.upload.files, Some(given));
     let permit = request.permit;
+    let size = permit.session().source_size();
+    let queue = request.queue.for_frames(permit.session().target_count());
     let queue = state.service.wait_for_turn(&permit, queue, number).await?;
-    let Tracked {
-        estimates,
-        replayed,
-        checkpoint,
-        ..
-    } = state.service.advance(permit, queue, next).await?;
-    let warnings = box_warnings(&[to.into()], size);
-    let answer = Json(Answer::from(&estimates[0]).with_warnings(warnings)).into_response();
-    Ok(with_checkpoint(
-        checkpoint,
-        replayed_header(replayed, answer),
+    let tracked = state.service.advance(permit, queue, batch).await?;
+    let answer = Answer::from(&tracked.estimates[0]).with_warnings(box_warnings(&[given.to], size));
+    Ok(with_standing(
+        tracked.replayed,
+        tracked.checkpoint,
+        Json(answer),
     ))
+}
+
+impl TargetSettings {
+    /// The number of the frame, and the box in it.
+    fn asked(&self) -> Result<(Option<u64>, GivenBox), Problem> {
+        let to = self.r#box.ok_or_else(Problem::missing_box)?.into();
+        let target = self.target.map(|number| number.as_index());
+        let number = self.frame.map(|number| number.0);
+        Ok((number, GivenBox { target, to }))
+    }
 }

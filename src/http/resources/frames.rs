@@ -1,45 +1,34 @@
 //! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
 
-use super::snapshot::charged;
+use super::frame_lines;
+use crate::http::extract::answer_form::AnswerForm;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, FrameNumber, Settings};
-use crate::http::extract::switch::Switch;
-use crate::http::extract::video_frames::VideoFrames;
-use crate::http::extract::video_place::VideoPlace;
+use crate::http::extract::settings::Switch;
+use crate::http::extract::settings::{FrameCount, FrameNumber, Settings};
 use crate::http::openapi::example_frames;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
-use crate::http::respond::answer::{FrameAnswers, answer_bytes, replayed_header};
-use crate::http::respond::checkpoint::with_checkpoint;
+use crate::http::respond::answer::{FrameAnswers, answer_bytes, with_standing};
 use crate::http::respond::json;
-use crate::http::respond::ndjson::{FrameSource, LineWork};
-use crate::http::respond::response_format::AnswerForm;
 use crate::http::state::AppState;
 use axum::extract::State;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::{IntoResponse, Response};
-use bagtrack_ingest::video::VideoFormat;
-use bagtrack_sessions::{ByteCharge, FrameBatch};
+use axum::response::Response;
+use bagtrack_sessions::FrameBatch;
 use serde::Deserialize;
-use std::sync::Arc;
 
 /// The settings of a request with the next frames.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct FramesSettings {
     /// The number of the (first) frame of this request.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = FrameNumber, inline, required = false)]
     frame: Option<FrameNumber>,
     /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
     /// has the answer as JSON.
     #[serde(default)]
     #[param(value_type = bool, required = false, default = false)]
-    #[schema(value_type = bool, required = false, default = false)]
     draw: Switch,
 }
 
@@ -49,22 +38,11 @@ impl Settings for FramesSettings {
     const SCHEMA_PREFIX: &'static str = "Frames";
 }
 
+/// A request with the next frames.
+pub type FramesRequest = SessionRequest<FramesSettings>;
+
 type FramesForm = FormBody<FramesSettings>;
 type FramesJson = JsonBody<FramesSettings>;
-
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    problem_responses::SESSION,
-    &[
-        Kind::FrameOutOfOrder,
-        Kind::NotInOrder,
-        Kind::FrameDiffers,
-        Kind::FrameSizeMismatch,
-        Kind::SessionBusy,
-        Kind::RequestTooCostly,
-    ]
-);
 
 /// Send the next frame, or several
 ///
@@ -108,106 +86,57 @@ operation_problems!(
                 ("Checkpoint" = u64, description = "With a store: the last frame whose state is in it"),
                 ("Draining" = bool, description = "`true` where the service is about to end")
             )
-        ),
-        Problems
+        )
     )
 )]
 pub async fn post(
     State(state): State<AppState>,
-    mut request: SessionRequest<FramesSettings>,
+    mut request: FramesRequest,
 ) -> Result<Response, Problem> {
-    let number = request.upload.settings.frame.map(|number| number.0);
-    let form = match request.upload.settings.draw.0 {
-        true => AnswerForm::Picture,
-        false => request.form,
-    };
+    let number = request.number();
     let turn = state
         .service
         .wait_for_turn(&request.permit, request.queue, number);
     request.queue = turn.await?;
+    let form = match request.upload.settings.draw.0 {
+        true => AnswerForm::Picture,
+        false => request.form,
+    };
     match (request.upload.video.take(), form) {
         (Some(_), AnswerForm::Picture) => {
             let detail = "A drawn answer is one picture; leave out `draw` for a video.";
             Err(Problem::malformed(detail))
         }
-        (Some(format), _) => respond_to_video(state, request, format).await,
-        (None, AnswerForm::Lines) => respond_by_lines(state, request).await,
+        (Some(format), _) => frame_lines::respond_to_video(state, request, format).await,
+        (None, AnswerForm::Lines) => frame_lines::respond(state, request).await,
         (None, AnswerForm::Picture) => respond_drawn(&state, request).await,
         (None, AnswerForm::Json) => respond_at_once(&state, request).await,
     }
 }
 
-/// All frames are tracked before the first is answered.
-async fn respond_at_once(
-    state: &AppState,
-    mut request: SessionRequest<FramesSettings>,
-) -> Result<Response, Problem> {
-    let (batch, targets) = (batch(&mut request), request.permit.session().target_count());
-    let queue = request.queue.for_frames(batch.files.len() * targets);
-    let account = state.clients.account(&request.client);
-    // Before the frames are tracked: what cannot be answered must not count.
-    let mut charge = ByteCharge::new(&state.uploads, account.bytes());
-    charge.grow(answer_bytes(batch.files.len(), targets))?;
-    let tracked = state.service.advance(request.permit, queue, batch).await?;
-    let answers = json::line(&FrameAnswers::from(&tracked.estimates[..]));
-    let answers = answers.map_err(|error| Problem::internal(Arc::new(error)))?;
-    charge.shrink(answers.len());
-    let headers = [(CONTENT_TYPE, "application/json")];
-    let answers = (headers, charged(answers, charge)).into_response();
-    let response = replayed_header(tracked.replayed, answers);
-    Ok(with_checkpoint(tracked.checkpoint, response))
-}
-
-async fn respond_drawn(
-    state: &AppState,
-    mut request: SessionRequest<FramesSettings>,
-) -> Result<Response, Problem> {
-    let batch = batch(&mut request);
-    let targets = request.permit.session().target_count();
-    let queue = request.queue.for_frames(targets);
-    answer_drawn(state, request.permit, queue, &request.client, batch).await
-}
-
-async fn respond_by_lines(
-    state: AppState,
-    mut request: SessionRequest<FramesSettings>,
-) -> Result<Response, Problem> {
-    let files = std::mem::take(&mut request.upload.files);
-    let frames = FrameSource::of_files(&state, request.queue.clone(), files).await?;
-    line_work(state, request, frames).answer().await
-}
-
-async fn respond_to_video(
-    state: AppState,
-    mut request: SessionRequest<FramesSettings>,
-    format: VideoFormat,
-) -> Result<Response, Problem> {
-    let video = request.upload.files.swap_remove(0);
-    let place;
-    (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
-    let frames = FrameSource::Video(VideoFrames::decode(&state, video, format, place)?);
-    line_work(state, request, frames).answer().await
-}
-
-fn line_work(
-    state: AppState,
-    request: SessionRequest<FramesSettings>,
-    frames: FrameSource,
-) -> LineWork {
-    let targets = request.permit.session().target_count();
-    LineWork {
-        state,
-        queue: request.queue.for_frames(targets),
-        permit: request.permit,
-        client: request.client,
-        frames,
-        number: request.upload.settings.frame.map(|number| number.0),
-        path: request.path,
-        request_id: request.request_id,
+impl FramesRequest {
+    /// The number of the (first) frame, where the client numbers them.
+    pub fn number(&self) -> Option<u64> {
+        self.upload.settings.frame.map(|number| number.0)
     }
 }
 
-fn batch(request: &mut SessionRequest<FramesSettings>) -> FrameBatch {
-    let number = request.upload.settings.frame.map(|number| number.0);
-    FrameBatch::posted(number, std::mem::take(&mut request.upload.files), None)
+/// All frames are tracked before the first is answered.
+async fn respond_at_once(state: &AppState, request: FramesRequest) -> Result<Response, Problem> {
+    let targets = request.permit.session().target_count();
+    let batch = FrameBatch::posted(request.number(), request.upload.files, None);
+    let queue = request.queue.for_frames(batch.files.len() * targets);
+    // Before the frames are tracked: what cannot be answered must not count.
+    let mut charge = state.charge(&request.client);
+    charge.grow(answer_bytes(batch.files.len(), targets))?;
+    let tracked = state.service.advance(request.permit, queue, batch).await?;
+    let answers = json::charged(&FrameAnswers::from(&tracked.estimates[..]), charge)?;
+    Ok(with_standing(tracked.replayed, tracked.checkpoint, answers))
+}
+
+async fn respond_drawn(state: &AppState, request: FramesRequest) -> Result<Response, Problem> {
+    let batch = FrameBatch::posted(request.number(), request.upload.files, None);
+    let queue = request.queue;
+    let queue = queue.for_frames(request.permit.session().target_count());
+    answer_drawn(state, request.permit, queue, &request.client, batch).await
 }

@@ -1,6 +1,5 @@
 //! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
@@ -19,16 +18,12 @@ pub struct Health {
 
 const OK: Json<Health> = Json(Health { status: "ok" });
 
-operation_problems!(LiveProblems, problem_responses::ALWAYS);
-
-operation_problems!(ReadyProblems, problem_responses::ALWAYS, &[Kind::NotReady]);
-
 /// Whether the process runs
 ///
 /// Answers as long as the process can answer at all. A supervisor may end it when this does not come.
 #[utoipa::path(
     get, path = "/healthz", tag = "service", operation_id = "getHealth", security(()),
-    responses((status = 200, description = "It runs", body = Health), LiveProblems)
+    responses((status = 200, description = "It runs", body = Health))
 )]
 pub async fn live() -> Json<Health> {
     OK
@@ -41,7 +36,7 @@ pub async fn live() -> Json<Health> {
 /// half of it is free.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
-    responses((status = 200, description = "It does", body = Health), ReadyProblems)
+    responses((status = 200, description = "It does", body = Health))
 )]
 pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Problem> {
     if state.is_draining() {

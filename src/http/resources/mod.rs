@@ -5,17 +5,15 @@
 
 pub mod bag_picture;
 pub mod correction;
-pub mod create;
-pub mod create_named;
-pub mod create_request;
+mod frame_lines;
 pub mod frames;
 pub mod health;
 #[cfg(feature = "tls")]
 pub mod https_only;
 pub mod metrics;
-pub mod saturation;
+pub mod open;
+pub mod routes;
 pub mod session;
-pub mod session_path;
 pub mod snapshot;
 pub mod token;
 pub mod track;

@@ -1,16 +1,14 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
-use super::session_path::SessionPath;
 use crate::http::extract::overrides::ParamOverrides;
-use crate::http::extract::texts::refuse_query;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
+use crate::http::extract::query::NoQuery;
+use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{Answer, ImageSize};
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
-use axum::http::{StatusCode, Uri};
+use axum::http::StatusCode;
 use serde::Serialize;
 use uuid::Uuid;
 
@@ -34,27 +32,19 @@ pub struct SessionView {
     expires_at: String,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[Kind::MalformedRequest]
-);
-
 /// See where a session stands
 ///
 /// Answers at once, also while a frame is being tracked.
 #[utoipa::path(
     get, path = "/sessions/{id}", tag = "sessions", operation_id = "getSession",
     params(("id" = Uuid, Path, description = "The session's id")),
-    responses((status = 200, description = "The session", body = SessionView), Problems)
+    responses((status = 200, description = "The session", body = SessionView))
 )]
 pub async fn get(
     State(state): State<AppState>,
+    _: NoQuery,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<Json<SessionView>, Problem> {
-    refuse_query(&uri)?;
     let session = path.find_newest(&state).await?;
     let latest = session.latest();
     Ok(Json(SessionView {
@@ -73,14 +63,13 @@ pub async fn get(
 #[utoipa::path(
     delete, path = "/sessions/{id}", tag = "sessions", operation_id = "deleteSession",
     params(("id" = Uuid, Path, description = "The session's id")),
-    responses((status = 204, description = "The session has ended"), Problems)
+    responses((status = 204, description = "The session has ended"))
 )]
 pub async fn delete(
     State(state): State<AppState>,
+    _: NoQuery,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<StatusCode, Problem> {
-    refuse_query(&uri)?;
     path.end(&state).await?;
     Ok(StatusCode::NO_CONTENT)
 }

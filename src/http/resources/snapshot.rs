@@ -1,40 +1,16 @@
 //! `GET /sessions/{id}/snapshot`: a session as bytes, to go on elsewhere.
 
-use super::session_path::SessionPath;
-use crate::http::extract::texts::refuse_query;
-use crate::http::openapi::problem_responses::{self, operation_problems};
+use crate::http::extract::query::NoQuery;
+use crate::http::extract::read_request::ReadRequest;
+use crate::http::extract::uploaded::SNAPSHOT;
 use crate::http::openapi::request_bodies::BinaryBody;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use axum::Extension;
-use axum::body::{Body, Bytes, HttpBody};
+use axum::body::Bytes;
 use axum::extract::State;
-use axum::http::Uri;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::ByteCharge;
-use http_body_util::Full;
-use std::convert::Infallible;
-use std::pin::Pin;
-use std::task::{Context, Poll};
-
-/// The media type of session snapshots.
-pub const MEDIA_TYPE: &str = "application/vnd.bagtrack.snapshot";
-
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[
-        Kind::MalformedRequest,
-        Kind::SessionBusy,
-        Kind::QuotaExceeded,
-        Kind::QueueFull,
-        Kind::WorkTimeout,
-    ]
-);
+use bagtrack_sessions::ChargedBytes;
 
 /// Take a snapshot
 ///
@@ -51,64 +27,16 @@ operation_problems!(
         (
             status = 200, description = "The session as bytes", body = BinaryBody,
             content_type = "application/vnd.bagtrack.snapshot"
-        ),
-        Problems
+        )
     )
 )]
 pub async fn get(
     State(state): State<AppState>,
-    path: SessionPath,
-    uri: Uri,
-    Extension(client): Extension<Client>,
+    request: ReadRequest<NoQuery>,
 ) -> Result<Response, Problem> {
-    refuse_query(&uri)?;
-    let session = path.find(&state).await?;
-    state.service.admission.check_place()?;
-    let client = state.clients.account(&client).request()?;
-    let mut charge = ByteCharge::new(&state.uploads, client.bytes());
-    let queue = state
-        .service
-        .admission
-        .enter(client.flow(), Box::new(client))?;
-    let bytes = state
-        .service
-        .snapshot(session.read_permit()?, queue)
-        .await?;
-    // The bytes stay in memory until the client has taken them.
-    charge.grow(bytes.len())?;
-    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], charged(bytes, charge)).into_response())
-}
-
-/// A body with the memory that it is charged to.
-pub fn charged(bytes: Vec<u8>, charge: ByteCharge) -> Body {
-    Body::new(ChargedBody {
-        bytes: Full::from(bytes),
-        _charge: charge,
-    })
-}
-
-/// An answer with the memory that it is charged to.
-struct ChargedBody {
-    bytes: Full<Bytes>,
-    _charge: ByteCharge,
-}
-
-impl HttpBody for ChargedBody {
-    type Data = Bytes;
-    type Error = Infallible;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<http_body::Frame<Bytes>, Infallible>>> {
-        Pin::new(&mut self.bytes).poll_frame(cx)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.bytes.is_end_stream()
-    }
-
-    fn size_hint(&self) -> http_body::SizeHint {
-        self.bytes.size_hint()
-    }
+    let (permit, queue, mut charge) = (request.permit, request.queue, request.charge);
+    let snapshot = state.service.snapshot(permit, queue).await?;
+    charge.grow(snapshot.len())?;
+    let body = Bytes::from(ChargedBytes::new(snapshot, charge));
+    Ok(([(CONTENT_TYPE, SNAPSHOT)], body).into_response())
 }

@@ -1,15 +1,13 @@
 //! `POST /sessions/{id}/token`: a token with which a web page may use this session, and nothing else.
 
-use super::session_path::SessionPath;
 use crate::http::auth::caller::Caller;
 use crate::http::auth::token::SessionToken;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
+use crate::http::extract::query::QuerySettings;
+use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
-use axum::extract::{Query, State};
-use axum::http::Uri;
+use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -42,13 +40,6 @@ pub struct TokenView {
     expires_at: String,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[Kind::MalformedRequest, Kind::Forbidden]
-);
-
 /// Make a session token
 ///
 /// A web page should not hold an API key. Whoever has one opens a session and gives the page a token for it: the page
@@ -59,20 +50,20 @@ operation_problems!(
         ("id" = Uuid, Path, description = "The session's id"),
         TokenSettings,
     ),
-    responses((status = 200, description = "The token", body = TokenView), Problems)
+    responses((status = 200, description = "The token", body = TokenView))
 )]
 pub async fn create(
     State(state): State<AppState>,
+    QuerySettings(settings): QuerySettings<TokenSettings>,
     caller: Caller,
     path: SessionPath,
-    uri: Uri,
 ) -> Result<Json<TokenView>, Problem> {
-    let seconds = seconds(&uri)?;
+    let seconds = settings.seconds()?;
     caller.require_key()?;
     let session = path.find(&state).await?;
     let expires = state.now() + Duration::from_secs(seconds.into());
     let token = state.access.tokens.sign(&SessionToken {
-        session: session.id(),
+        session: session.name(),
         owner: session.owner().clone(),
         expires,
     });
@@ -82,13 +73,13 @@ pub async fn create(
     }))
 }
 
-fn seconds(uri: &Uri) -> Result<u32, Problem> {
-    let Query(TokenSettings { seconds }) = Query::try_from_uri(uri)
-        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
-    match seconds.unwrap_or(DEFAULT_SECONDS) {
-        seconds @ 1..=MAX_SECONDS => Ok(seconds),
-        _ => Err(Problem::malformed(format!(
-            "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
-        ))),
+impl TokenSettings {
+    fn seconds(&self) -> Result<u32, Problem> {
+        match self.seconds.unwrap_or(DEFAULT_SECONDS) {
+            seconds @ 1..=MAX_SECONDS => Ok(seconds),
+            _ => Err(Problem::malformed(format!(
+                "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
+            ))),
+        }
     }
 }

@@ -1,65 +1,56 @@
 //! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
 
-use super::snapshot::charged;
-use super::track_video::{self, VideoRequest};
+use super::track_video::{Track, VideoTrack};
 use crate::http::auth::caller::Caller;
-use crate::http::extract::admit::admit;
+use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{
-    ExactInput, ExactText, FrameCount, Seed, Settings, TargetInput, TargetNumber, TargetText,
-};
+use crate::http::extract::settings::{FrameCount, Seed, Settings, TargetNumber};
 use crate::http::extract::texts::Texts;
-use crate::http::extract::uploaded::Upload;
-use crate::http::middleware::base_path::client_path;
-use crate::http::middleware::request_id;
+use crate::http::extract::uploaded::{Upload, admit};
+use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::VideoPlace;
 use crate::http::openapi::example_frames;
 use crate::http::openapi::params_schema::ParametersText;
-use crate::http::openapi::problem_responses::{self, operation_problems};
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{FrameAnswers, answer_bytes};
-use crate::http::respond::json;
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::respond::json::{self, JsonBytes};
+use crate::http::respond::ndjson;
+use crate::http::respond::target_box::{BoxText, TargetBox};
+use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
 use crate::http::state::AppState;
 use axum::body::Bytes;
-use axum::extract::{FromRequestParts, Request, State};
-use axum::http::header::CONTENT_TYPE;
+use axum::extract::{FromRequest, FromRequestParts, Request, State};
 use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::{Boxes, ByteCharge, GivenBox, TrackFrom, TrackedAway};
+use bagtrack_ingest::video::VideoFormat;
+use bagtrack_sessions::{Boxes, ByteCharge, GivenBox, QueuePermit, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// The settings of a request without a session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct TrackSettings {
     /// Without a snapshot, the target's box in the first frame; with one, a correction, as in
     /// `PUT /sessions/{id}/target`: `x,y,width,height`, or a JSON object with these names.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     r#box: Option<TargetBox>,
     /// In place of `box`, the boxes of several targets; see `POST /sessions`. Only without a snapshot.
-    #[param(value_type = BoxesText, inline, required = false)]
-    #[schema(value_type = BoxesInput, inline, required = false)]
+    #[param(value_type = TargetBoxes, inline, required = false)]
     boxes: Option<TargetBoxes>,
     /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
-    #[param(value_type = TargetText, inline, required = false)]
-    #[schema(value_type = TargetInput, inline, required = false)]
+    #[param(value_type = TargetNumber, inline, required = false)]
     target: Option<TargetNumber>,
     /// `robust` (the default) or `paper`. Only without a snapshot.
     #[param(nullable = false)]
     preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
     /// snapshot.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = Seed, inline, required = false)]
     seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
     #[serde(rename = "parameters")]
@@ -87,21 +78,6 @@ pub struct Tracked {
     #[schema(content_encoding = "base64", example = "iWJhZ3RyYWNrDQo…")]
     snapshot: String,
 }
-
-operation_problems!(
-    Problems,
-    problem_responses::UPLOAD,
-    &[
-        Kind::Unauthorized,
-        Kind::Forbidden,
-        Kind::MissingBox,
-        Kind::InvalidBox,
-        Kind::InvalidParameter,
-        Kind::InvalidSnapshot,
-        Kind::FrameSizeMismatch,
-        Kind::RequestTooCostly,
-    ]
-);
 
 /// Track without a session
 ///
@@ -139,50 +115,79 @@ operation_problems!(
         (
             status = 200, description = "Where the target is, and the new snapshot; for a video, a line for each frame",
             content((Tracked = "application/json"), (String = "application/x-ndjson"))
-        ),
-        Problems
+        )
     )
 )]
-pub async fn post(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
-    let texts = Texts::of_query::<TrackSettings>(request.uri())?;
-    let (path, request_id) = (client_path(&request), request_id::of(&request));
-    let (mut parts, body) = request.into_parts();
-    let caller = Caller::from_request_parts(&mut parts, &state).await?;
-    caller.require_key()?;
-    let client = Client::of(&parts);
-    let admitted = admit(&state, &parts)?;
-    let mut charge = ByteCharge::new(&state.uploads, admitted.bytes());
-    let request = Request::from_parts(parts, body);
-    let (mut upload, queue) = Upload::read(&state, admitted, texts, request).await?;
-    if let Some(format) = upload.video {
-        if upload.snapshot.is_some() {
-            let detail = "A video begins a track; leave out the snapshot.";
-            return Err(Problem::malformed(detail));
-        }
-        let video = upload.files.swap_remove(0);
-        let (boxes, params) = begin(upload.settings)?;
-        let request = VideoRequest {
-            video,
-            format,
-            boxes,
-            params,
-            queue,
-            client,
-            path,
-            request_id,
-        };
-        return track_video::answer(state, request).await;
+pub async fn post(
+    State(state): State<AppState>,
+    request: TrackRequest,
+) -> Result<Response, Problem> {
+    match request.upload.video {
+        Some(format) => track_video(state, request, format).await,
+        None => track_frames(&state, request).await,
     }
-    let (from, files) = asked(upload)?;
-    let answer = move |tracked: TrackedAway| {
-        let body = answer_body(&tracked, &mut charge)?;
-        Ok((body, charge))
+}
+
+/// A request to track without a session, with its place in the queue.
+#[derive(Debug)]
+pub struct TrackRequest {
+    client: Client,
+    instance: Instance,
+    queue: QueuePermit,
+    upload: Upload<TrackSettings>,
+}
+
+impl FromRequest<AppState> for TrackRequest {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
+        let texts = Texts::of_query::<TrackSettings>(request.uri())?;
+        let instance = Instance::of(&request);
+        let (mut parts, body) = request.into_parts();
+        let caller = Caller::from_request_parts(&mut parts, state).await?;
+        caller.require_key()?;
+        let client = Client::of(&parts);
+        let admitted = admit(state, &parts)?;
+        let request = Request::from_parts(parts, body);
+        let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
+        Ok(Self {
+            client,
+            instance,
+            queue,
+            upload,
+        })
+    }
+}
+
+async fn track_frames(state: &AppState, request: TrackRequest) -> Result<Response, Problem> {
+    let charge = state.charge(&request.client);
+    let (from, files) = asked(request.upload)?;
+    let respond = move |tracked: TrackedAway| body(&tracked, charge);
+    let service = &state.service;
+    let body = service.track::<_, Problem, _>(request.queue, from, files, respond);
+    Ok(body.await?.into_response())
+}
+
+async fn track_video(
+    state: AppState,
+    mut request: TrackRequest,
+    format: VideoFormat,
+) -> Result<Response, Problem> {
+    if request.upload.snapshot.is_some() {
+        let detail = "A video begins a track; leave out the snapshot.";
+        return Err(Problem::malformed(detail));
+    }
+    let video = request.upload.files.swap_remove(0);
+    let (boxes, params) = begin(request.upload.settings)?;
+    let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let frames = VideoTrack {
+        queue: queue.for_frames(boxes.as_slice().len()),
+        frames: VideoFrames::decode(&state, video, format, place)?,
+        client: request.client,
+        track: Track::Start(boxes, params),
+        state: state.clone(),
     };
-    let answered = state
-        .service
-        .track::<_, Problem, _>(queue, from, files, answer);
-    let (body, charge) = answered.await?;
-    Ok(([(CONTENT_TYPE, "application/json")], charged(body, charge)).into_response())
+    ndjson::respond(state, request.instance, frames).await
 }
 
 /// What a new track begins with.
@@ -226,7 +231,7 @@ fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Probl
 }
 
 /// The body of the answer, whose memory is charged before it is taken.
-fn answer_body(tracked: &TrackedAway, charge: &mut ByteCharge) -> Result<Vec<u8>, Problem> {
+fn body(tracked: &TrackedAway, mut charge: ByteCharge) -> Result<JsonBytes, Problem> {
     let (estimates, snapshot) = (&tracked.estimates[..], &tracked.snapshot);
     // It is there as base64, and once more in the body.
     let text = snapshot.len().div_ceil(3) * 4;
@@ -236,7 +241,5 @@ fn answer_body(tracked: &TrackedAway, charge: &mut ByteCharge) -> Result<Vec<u8>
         answers: FrameAnswers::from(estimates).with_warnings(tracked.warnings.clone()),
         snapshot: STANDARD.encode(snapshot),
     };
-    let body = json::line(&tracked).map_err(|error| Problem::internal(Arc::new(error)))?;
-    charge.shrink(body.len());
-    Ok(body)
+    json::charged(&tracked, charge)
 }

@@ -1,17 +1,16 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
-use super::answer::{Answer, replayed_header};
-use super::checkpoint::with_checkpoint;
+use super::answer::{Answer, with_standing};
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::resources::snapshot::charged;
 use crate::http::state::AppState;
+use axum::body::Bytes;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
 use bagtrack_sessions::{
-    ByteCharge, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
+    ChargedBytes, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
 };
 use bagtrack_tracker::Diagnostics;
 use std::sync::Arc;
@@ -47,8 +46,7 @@ pub async fn answer_drawn(
         .service
         .run::<_, Problem, _>(queue.clone(), decode)
         .await?;
-    let account = state.clients.account(client);
-    let mut charge = ByteCharge::new(&state.uploads, account.bytes());
+    let mut charge = state.charge(client);
     // The pixels, and a file that is no larger but for a little.
     charge.grow(2 * picture.bytes())?;
     next.with_diagnostics = true;
@@ -59,12 +57,13 @@ pub async fn answer_drawn(
     let draw = move |_: &mut WorkMeter| draw(picture, &estimates, &seen);
     let bytes = state.service.run::<_, Problem, _>(queue, draw).await?;
     let headers = [(CONTENT_TYPE, HeaderValue::from_static("image/png"))];
-    let mut response = (headers, charged(bytes, charge)).into_response();
+    let picture = Bytes::from(ChargedBytes::new(bytes, charge));
+    let mut response = (headers, picture).into_response();
     if let Ok(answer) = HeaderValue::from_str(&answer) {
         response.headers_mut().insert(ANSWER, answer);
     }
-    let response = replayed_header(answered.replayed, response);
-    Ok(with_checkpoint(answered.checkpoint, response))
+    let (replayed, checkpoint) = (answered.replayed, answered.checkpoint);
+    Ok(with_standing(replayed, checkpoint, response))
 }
 
 /// The picture as a file. What was answered before has no particles.

@@ -1,13 +1,21 @@
 //! Answers as they are sent.
 
 use super::target_box::TargetBox;
+use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
 use bagtrack_sessions::{Estimates, PerTarget};
-use bagtrack_tracker::{Estimate, Status};
+use bagtrack_tracker::{Diagnostics, Estimate, Status};
 use serde::Serialize;
+
+/// The header of an answer that was given before.
+pub const REPLAYED: HeaderName = HeaderName::from_static("replayed");
+/// The header with the last frame whose state is in the store.
+pub const CHECKPOINT: HeaderName = HeaderName::from_static("checkpoint");
 
 /// Bytes of a target in an answer: the value, and its JSON with six numbers.
 const TARGET_BYTES: usize = 256;
+/// Most particles in an answer.
+const MAX_PARTICLES: usize = 200;
 
 /// How sure the tracker is of its box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
@@ -138,6 +146,97 @@ pub fn answer_bytes(frames: usize, targets: usize) -> usize {
     (frames + 1) * (targets + 1) * TARGET_BYTES
 }
 
+/// The answer to a frame in a stream or as a line.
+#[derive(Debug, Clone, Serialize)]
+pub struct StreamAnswer {
+    #[serde(flatten)]
+    answer: Answer,
+    /// Frames before it that were skipped, with `drop=true`.
+    #[serde(skip_serializing_if = "is_zero")]
+    skipped: u64,
+    /// Whether it was given before.
+    #[serde(skip_serializing_if = "is_false")]
+    replayed: bool,
+    /// With a store: the last frame whose state is in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<u64>,
+    /// Whether the service is about to end.
+    #[serde(skip_serializing_if = "is_false")]
+    draining: bool,
+    #[serde(flatten)]
+    seen: Option<SeenView>,
+}
+
+/// What the tracker saw in the frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct SeenView {
+    /// For the likeliest particles, likeliest first: centre (x, y), width, and weight.
+    particles: Vec<[f64; 4]>,
+    /// For each entry of the bag, oldest first, its share of the vote for the best particle.
+    votes: Vec<f64>,
+}
+
+impl From<Diagnostics> for SeenView {
+    fn from(mut seen: Diagnostics) -> Self {
+        seen.particles.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let shown = seen.particles.iter().take(MAX_PARTICLES);
+        let round = |value: f64, digits: f64| (value * digits).round() / digits;
+        let particles = shown.map(|(area, weight)| {
+            let (x, y) = area.center();
+            [
+                round(x, 10.0),
+                round(y, 10.0),
+                round(area.width, 10.0),
+                round(*weight, 1e5),
+            ]
+        });
+        Self {
+            particles: particles.collect(),
+            votes: seen.votes.iter().map(|vote| round(*vote, 1e4)).collect(),
+        }
+    }
+}
+
+impl StreamAnswer {
+    /// The answer to a frame before which so many were skipped.
+    pub fn new(estimates: &Estimates, skipped: u64, replayed: bool, draining: bool) -> Self {
+        Self {
+            answer: estimates.into(),
+            skipped,
+            replayed,
+            checkpoint: None,
+            draining,
+            seen: None,
+        }
+    }
+
+    /// With the last frame whose state is in the store.
+    pub fn with_checkpoint(mut self, checkpoint: Option<u64>) -> Self {
+        self.checkpoint = checkpoint;
+        self
+    }
+
+    /// With what may be wrong with the box that was given, where anything is.
+    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
+        self.answer = self.answer.with_warnings(warnings);
+        self
+    }
+
+    /// With what the tracker saw.
+    pub fn with_seen(mut self, seen: Option<Diagnostics>) -> Self {
+        self.seen = seen.map(SeenView::from);
+        self
+    }
+}
+
+fn is_zero(number: &u64) -> bool {
+    *number == 0
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
 /// Width and height of the session's frames, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
 pub struct ImageSize {
@@ -155,10 +254,19 @@ impl From<(u32, u32)> for ImageSize {
     }
 }
 
-/// Marks an answer that was given before.
-pub fn replayed_header(replayed: bool, response: Response) -> Response {
-    match replayed {
-        true => ([("replayed", "true")], response).into_response(),
-        false => response,
+/// Marks an answer that was given before, and with a store tells the last frame whose state is in it.
+pub fn with_standing(
+    replayed: bool,
+    checkpoint: Option<u64>,
+    response: impl IntoResponse,
+) -> Response {
+    let mut response = response.into_response();
+    let headers = response.headers_mut();
+    if replayed {
+        headers.insert(REPLAYED, HeaderValue::from_static("true"));
     }
+    if let Some(frame) = checkpoint {
+        headers.insert(CHECKPOINT, HeaderValue::from(frame));
+    }
+    response
 }

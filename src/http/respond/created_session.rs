@@ -1,13 +1,12 @@
 //! The answer to a request that opens a session.
 
-use super::answer::{ImageSize, replayed_header};
-use super::checkpoint::with_checkpoint;
+use super::answer::{ImageSize, with_standing};
 use super::json::Json;
 use super::target_box::TargetBox;
 use crate::http::extract::overrides::ParamOverrides;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use bagtrack_sessions::{Opened, PerTarget, Session, box_warnings};
 use serde::Serialize;
 use std::time::{Duration, SystemTime};
@@ -76,9 +75,6 @@ pub fn created(opened: &Opened, is_verbose: bool) -> Response {
     let session = &opened.session;
     let location = [(LOCATION, format!("/sessions/{}", session.id()))];
     let body = Json(CreatedSession::of(session, is_verbose));
-    let response = (StatusCode::CREATED, location, body).into_response();
-    with_checkpoint(
-        session.checkpoint(),
-        replayed_header(opened.replayed, response),
-    )
+    let response = (StatusCode::CREATED, location, body);
+    with_standing(opened.replayed, session.checkpoint(), response)
 }

@@ -1,9 +1,13 @@
 //! Answers as JSON, which end with a newline: a shell's prompt then stands on a line of its own.
 
-use axum::http::StatusCode;
+use crate::http::problems::problem::Problem;
+use axum::body::Bytes;
 use axum::http::header::CONTENT_TYPE;
+use axum::http::{HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::{ByteCharge, ChargedBytes};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// A JSON answer.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +23,19 @@ impl<T: Serialize> IntoResponse for Json<T> {
             }
         }
     }
+}
+
+/// JSON that is written already.
+pub type JsonBytes = ([(HeaderName, &'static str); 1], Bytes);
+
+/// A value as JSON, whose memory is charged until the client has taken it.
+///
+/// # Errors
+/// It cannot be written as JSON.
+pub fn charged(value: &impl Serialize, charge: ByteCharge) -> Result<JsonBytes, Problem> {
+    let body = line(value).map_err(|error| Problem::internal(Arc::new(error)))?;
+    let body = Bytes::from(ChargedBytes::new(body, charge));
+    Ok(([(CONTENT_TYPE, "application/json")], body))
 }
 
 /// A value as one line of JSON.

@@ -5,10 +5,8 @@
 
 pub mod annotated_image;
 pub mod answer;
-pub mod checkpoint;
 pub mod created_session;
 pub mod json;
 pub mod ndjson;
-pub mod response_format;
 pub mod target_box;
 pub mod target_boxes;

@@ -5,8 +5,8 @@ use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;
 use std::str::FromStr;
-use utoipa::openapi::schema::{AnyOfBuilder, ObjectBuilder, Schema, SchemaFormat, Type};
-use utoipa::openapi::{Ref, RefOr};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaFormat, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 /// A box in the pixels of the uploaded frame; the origin is the frame's top-left corner. It may reach over the edge.
@@ -47,27 +47,6 @@ impl ToSchema for BoxText {}
 impl PartialSchema for BoxText {
     fn schema() -> RefOr<Schema> {
         text_schema().build().into()
-    }
-}
-
-/// A box in a JSON body. Four numbers and a text are taken, too; the document has the object alone, since typed clients
-/// can make nothing of a choice with arrays.
-#[derive(Debug)]
-pub struct BoxInput;
-
-impl ToSchema for BoxInput {
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((TargetBox::name().into(), TargetBox::schema()));
-    }
-}
-
-impl PartialSchema for BoxInput {
-    fn schema() -> RefOr<Schema> {
-        let null = ObjectBuilder::new().schema_type(Type::Null);
-        AnyOfBuilder::new()
-            .item(Ref::from_schema_name(TargetBox::name()))
-            .item(null)
-            .into()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Lists of boxes as they are received, one for each target.
 
-use super::target_box::{BoxInput, NUMBER, TargetBox};
+use super::target_box::{NUMBER, TargetBox};
 use crate::http::problems::problem::Problem;
 use bagtrack_sessions::{Boxes, MAX_TARGETS, PerTarget};
 use bagtrack_tracker::Rect;
@@ -8,8 +8,8 @@ use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::Value;
 use std::borrow::Cow;
 use std::str::FromStr;
-use utoipa::openapi::schema::{AnyOfBuilder, ArrayBuilder, ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Ref, RefOr, SchemaFormat};
+use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
+use utoipa::openapi::{RefOr, SchemaFormat};
 use utoipa::{PartialSchema, ToSchema};
 
 /// The boxes of the targets, 1 to [`MAX_TARGETS`].
@@ -81,48 +81,18 @@ pub fn boxes_of(
     }
 }
 
-/// A list of boxes as a text, in the query and in forms.
-#[derive(Debug)]
-pub struct BoxesText;
+impl ToSchema for TargetBoxes {}
 
-impl ToSchema for BoxesText {}
-
-/// What a text has to be to be taken as a list of boxes. A JSON array in a text is taken, too.
-fn text_schema() -> ObjectBuilder {
-    let one = format!("-?{NUMBER},-?{NUMBER},{NUMBER},{NUMBER}");
-    let more = MAX_TARGETS - 1;
-    ObjectBuilder::new()
-        .schema_type(Type::String)
-        .format(Some(SchemaFormat::Custom("boxes".to_owned())))
-        .pattern(Some(format!("^{one}(?:;{one}){{0,{more}}}$")))
-}
-
-impl PartialSchema for BoxesText {
+impl PartialSchema for TargetBoxes {
+    /// What a text has to be to be taken as a list of boxes. A JSON array in a text is taken, too.
     fn schema() -> RefOr<Schema> {
-        text_schema().build().into()
-    }
-}
-
-/// A list of boxes in a JSON body; see [`BoxInput`].
-#[derive(Debug)]
-pub struct BoxesInput;
-
-impl ToSchema for BoxesInput {
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        BoxInput::schemas(schemas);
-    }
-}
-
-impl PartialSchema for BoxesInput {
-    fn schema() -> RefOr<Schema> {
-        let list = ArrayBuilder::new()
-            .items(Ref::from_schema_name(TargetBox::name()))
-            .min_items(Some(1))
-            .max_items(Some(MAX_TARGETS));
-        AnyOfBuilder::new()
-            .item(list)
-            .item(ObjectBuilder::new().schema_type(Type::Null))
-            .into()
+        let one = format!("-?{NUMBER},-?{NUMBER},{NUMBER},{NUMBER}");
+        let more = MAX_TARGETS - 1;
+        let text = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .format(Some(SchemaFormat::Custom("boxes".to_owned())))
+            .pattern(Some(format!("^{one}(?:;{one}){{0,{more}}}$")));
+        text.build().into()
     }
 }
 

@@ -3,18 +3,24 @@
 //! The library makes room for a whole frame when its head has come, and keeps that room for the next one: a few bytes, or
 //! one large message, would hold memory for the life of a stream. So it gets each frame in fragments (RFC 6455, section
 //! 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A fragment is handed over when
-//! its memory is charged. Where there is none the client waits: nothing more is read from it.
+//! its memory is charged. Where there is none the client waits: nothing more is read from it. So does a client whose
+//! streams send more frames a second than it may: the smallest ones cost next to no bytes. Each fragment counts as work of
+//! its task, which gives others their turn after some of them.
 
 use crate::http::net::least_rate::LeastRate;
+use crate::http::quotas::clients::MessageRate;
 use arrayvec::ArrayVec;
 use bagtrack_sessions::{ByteBudget, ByteCharge, BytesFull};
 use bytes::{Buf, BytesMut};
+use governor::clock::{Clock, DefaultClock};
 use std::future::poll_fn;
 use std::io;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::task::coop::poll_proceed;
 use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
@@ -25,6 +31,9 @@ pub const READ_BYTES: usize = 32 << 10;
 const COPIES: usize = 2;
 /// How long to wait before memory is asked for again.
 const RETRY: Duration = Duration::from_millis(20);
+
+/// A timer that is asked for less would cost more than the frames that it lets pass.
+const LEAST_WAIT: Duration = Duration::from_millis(5);
 
 /// The first byte of a frame: the last of its message.
 const FINAL: u8 = 0x80;
@@ -49,6 +58,15 @@ struct Frame {
     left: u64,
 }
 
+/// How slowly messages may come, and how fast.
+#[derive(Debug)]
+pub struct Rates {
+    /// Least bytes a second.
+    pub bytes: LeastRate,
+    /// Most frames a second, of all streams of the client.
+    pub messages: Arc<MessageRate>,
+}
+
 /// A connection whose incoming frames are fragments.
 #[derive(Debug)]
 pub struct Fragments<S> {
@@ -62,6 +80,8 @@ pub struct Fragments<S> {
     budgets: [ByteBudget; 2],
     /// The memory of the message that arrives.
     charge: ByteCharge,
+    /// How many frames the client may send.
+    messages: Arc<MessageRate>,
     retry: Pin<Box<Sleep>>,
     rate: LeastRate,
     /// Whether a message has begun.
@@ -71,8 +91,8 @@ pub struct Fragments<S> {
 
 impl<S> Fragments<S> {
     /// For a connection from which `read` was read already. Messages are charged to the budgets of all clients and of
-    /// this one, and come at `rate`.
-    pub fn new(stream: S, read: &[u8], budgets: [ByteBudget; 2], rate: LeastRate) -> Self {
+    /// this one, and come at these rates.
+    pub fn new(stream: S, read: &[u8], budgets: [ByteBudget; 2], rates: Rates) -> Self {
         let charge = ByteCharge::new(&budgets[0], &budgets[1]);
         Self {
             stream,
@@ -82,8 +102,9 @@ impl<S> Fragments<S> {
             fragment_left: 0,
             budgets,
             charge,
+            messages: rates.messages,
             retry: Box::pin(sleep_until(Instant::now())),
-            rate,
+            rate: rates.bytes,
             is_within: false,
             is_heard: false,
         }
@@ -108,6 +129,23 @@ impl<S> Fragments<S> {
     /// Whether the client owes the rest of a message.
     fn is_message_begun(&self) -> bool {
         self.is_within || self.fragment_left > 0 || !self.input.is_empty()
+    }
+
+    /// Waits for the client's turn to send one more frame, where its next one has come.
+    fn poll_frame_rate(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+        if self.frame.is_some() || self.input.len() < 2 {
+            return Poll::Ready(());
+        }
+        let Err(early) = self.messages.check() else {
+            return Poll::Ready(());
+        };
+        self.rate.pause();
+        let wait = early.wait_time_from(DefaultClock::default().now());
+        self.retry
+            .as_mut()
+            .reset(Instant::now() + wait.max(LEAST_WAIT));
+        let _ = self.retry.as_mut().poll(cx);
+        Poll::Pending
     }
 
     /// Makes the next fragment from what was read, where that has begun.
@@ -249,6 +287,8 @@ impl<S: AsyncRead + Unpin> AsyncRead for Fragments<S> {
                 return Poll::Ready(Ok(()));
             }
             if self.fragment_left == 0 {
+                ready!(self.poll_frame_rate(cx));
+                ready!(poll_proceed(cx)).made_progress();
                 match self.begin_fragment() {
                     Ok(true) => continue,
                     Ok(false) => {}

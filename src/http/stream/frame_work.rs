@@ -127,10 +127,12 @@ impl FrameWork {
             return Err(Problem::unauthorized());
         }
         let flow = self.account.flow();
-        Ok(state
-            .service
-            .find(self.session, caller.owner(), flow)
-            .await?)
+        let found = state.service.find(self.session, caller.owner(), flow);
+        let session = found.await?;
+        match caller.may_use(session.name()) {
+            true => Ok(session),
+            false => Err(Problem::session_not_found()),
+        }
     }
 
     /// Whether the caller may still use the session, which is there, and whether the stream has its place. Asks the

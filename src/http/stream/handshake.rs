@@ -1,19 +1,18 @@
 //! Opens a stream.
 
+use super::fragments::Rates;
 use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::Upgrade;
 use super::waiting::Waiting;
 use crate::http::auth::caller::Caller;
-use crate::http::extract::switch::Switch;
-use crate::http::middleware::request_id;
+use crate::http::extract::instance::Instance;
+use crate::http::extract::session_path::SessionPath;
+use crate::http::extract::settings::Switch;
 use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::net::least_rate::LeastRate;
-use crate::http::openapi::problem_responses::{self, operation_problems};
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::resources::session_path::SessionPath;
 use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, Query, Request, State};
 use axum::http::Uri;
@@ -43,19 +42,6 @@ pub struct StreamSettings {
     drop: Switch,
 }
 
-operation_problems!(
-    Problems,
-    problem_responses::ALWAYS,
-    problem_responses::SESSION,
-    &[
-        Kind::MalformedRequest,
-        Kind::FrameOutOfOrder,
-        Kind::SessionBusy,
-        Kind::QuotaExceeded,
-        Kind::WorkTimeout,
-    ]
-);
-
 /// Send frames over a WebSocket
 ///
 /// A binary message is a frame. A text message before it may give its number or a corrected box: `{"frame": 7}`,
@@ -79,10 +65,10 @@ operation_problems!(
         ("id" = Uuid, Path, description = "The session's id"),
         StreamSettings,
     ),
-    responses((status = 101, description = "The stream is open"), Problems)
+    responses((status = 101, description = "The stream is open"))
 )]
 pub async fn open(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
-    let request_id = request_id::of(&request);
+    let instance = Instance::of(&request);
     let (mut parts, _) = request.into_parts();
     let settings = settings(&parts.uri)?;
     let path = SessionPath::from_request_parts(&mut parts, &state).await?;
@@ -104,7 +90,10 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let max_bytes = max_message_bytes(&state, &session);
     let budgets = [state.uploads.clone(), account.bytes().clone()];
     let config = &state.config;
-    let rate = LeastRate::new(config.body_timeout, config.limits.min_body_rate);
+    let rates = Rates {
+        bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+        messages: account.messages(),
+    };
     let stream = SessionStream {
         work: Arc::new(FrameWork {
             state,
@@ -118,12 +107,11 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
         connection,
         permit,
         stand,
-        request_id,
-        path: parts.uri.path().to_owned(),
+        instance,
     };
     let span = tracing::Span::current();
     let serve = move |socket| stream.run(socket).instrument(span);
-    Ok(upgrade.answer(max_bytes, budgets, rate, serve))
+    Ok(upgrade.answer(max_bytes, budgets, rates, serve))
 }
 
 fn settings(uri: &Uri) -> Result<StreamSettings, Problem> {

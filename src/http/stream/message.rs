@@ -1,15 +1,11 @@
 //! The text messages of a stream, as JSON.
 
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::Answer;
 use crate::http::respond::target_box::TargetBox;
-use bagtrack_sessions::{Estimates, GivenBox};
-use bagtrack_tracker::Diagnostics;
+use bagtrack_sessions::GivenBox;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use serde_json::Value;
 
-/// Most particles in an answer.
-const MAX_PARTICLES: usize = 200;
 /// Most bytes of a text message.
 const MAX_TEXT_BYTES: usize = 4096;
 
@@ -75,97 +71,6 @@ impl FrameHeader {
 pub struct Hello {
     /// The number of the next frame.
     pub next: u64,
-}
-
-/// The answer to a frame.
-#[derive(Debug, Clone, Serialize)]
-pub struct StreamAnswer {
-    #[serde(flatten)]
-    answer: Answer,
-    /// Frames before it that were skipped, with `drop=true`.
-    #[serde(skip_serializing_if = "is_zero")]
-    skipped: u64,
-    /// Whether it was given before.
-    #[serde(skip_serializing_if = "is_false")]
-    replayed: bool,
-    /// With a store: the last frame whose state is in it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    checkpoint: Option<u64>,
-    /// Whether the service is about to end.
-    #[serde(skip_serializing_if = "is_false")]
-    draining: bool,
-    #[serde(flatten)]
-    seen: Option<SeenView>,
-}
-
-/// What the tracker saw in the frame.
-#[derive(Debug, Clone, Serialize)]
-pub struct SeenView {
-    /// For the likeliest particles, likeliest first: centre (x, y), width, and weight.
-    particles: Vec<[f64; 4]>,
-    /// For each entry of the bag, oldest first, its share of the vote for the best particle.
-    votes: Vec<f64>,
-}
-
-impl From<Diagnostics> for SeenView {
-    fn from(mut seen: Diagnostics) -> Self {
-        seen.particles.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let shown = seen.particles.iter().take(MAX_PARTICLES);
-        let round = |value: f64, digits: f64| (value * digits).round() / digits;
-        let particles = shown.map(|(area, weight)| {
-            let (x, y) = area.center();
-            [
-                round(x, 10.0),
-                round(y, 10.0),
-                round(area.width, 10.0),
-                round(*weight, 1e5),
-            ]
-        });
-        Self {
-            particles: particles.collect(),
-            votes: seen.votes.iter().map(|vote| round(*vote, 1e4)).collect(),
-        }
-    }
-}
-
-impl StreamAnswer {
-    /// The answer to a frame before which so many were skipped.
-    pub fn new(estimates: &Estimates, skipped: u64, replayed: bool, draining: bool) -> Self {
-        Self {
-            answer: estimates.into(),
-            skipped,
-            replayed,
-            checkpoint: None,
-            draining,
-            seen: None,
-        }
-    }
-
-    /// With the last frame whose state is in the store.
-    pub fn with_checkpoint(mut self, checkpoint: Option<u64>) -> Self {
-        self.checkpoint = checkpoint;
-        self
-    }
-
-    /// With what may be wrong with the box that was given, where anything is.
-    pub fn with_warnings(mut self, warnings: Option<Vec<String>>) -> Self {
-        self.answer = self.answer.with_warnings(warnings);
-        self
-    }
-
-    /// With what the tracker saw.
-    pub fn with_seen(mut self, seen: Option<Diagnostics>) -> Self {
-        self.seen = seen.map(SeenView::from);
-        self
-    }
-}
-
-fn is_zero(number: &u64) -> bool {
-    *number == 0
-}
-
-fn is_false(flag: &bool) -> bool {
-    !flag
 }
 
 #[cfg(test)]

@@ -3,13 +3,14 @@
 use super::end::End;
 use super::fragments::MessageTooSlow;
 use super::frame_work::{Done, FrameWork};
-use super::message::{FrameHeader, Hello, StreamAnswer};
+use super::message::{FrameHeader, Hello};
 use super::upgrade::Socket;
 use super::waiting::ArrivedFrame;
+use crate::http::extract::instance::Instance;
 use crate::http::net::connection_hold::ConnectionHold;
-use crate::http::problems::document::ProblemDocument;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::StreamAnswer;
 use axum::body::Bytes;
 use bagtrack_sessions::{ByteCharge, BytesFull, Estimates};
 use futures_util::stream::FusedStream;
@@ -47,10 +48,8 @@ pub struct SessionStream {
     pub permit: OwnedSemaphorePermit,
     /// Where the session stands.
     pub stand: Stand,
-    /// The id of the request that opened it, for problems.
-    pub request_id: String,
-    /// The path of that request.
-    pub path: String,
+    /// What names the request that opened it, for problems.
+    pub instance: Instance,
 }
 
 type Answering = Pin<Box<dyn Future<Output = Option<Done>> + Send>>;
@@ -242,13 +241,7 @@ impl SessionStream {
     }
 
     async fn send_problem(&self, socket: &mut Socket, problem: &Problem) -> Result<(), Error> {
-        self.work.state.metrics.problem(problem.kind());
-        if let Some(cause) = problem.cause() {
-            tracing::error!(problem = problem.kind().slug(), %cause, "a frame failed");
-        }
-        let (path, id) = (self.path.clone(), self.request_id.clone());
-        let base = self.work.state.config.base_path.as_str();
-        let document = ProblemDocument::new(problem, base, path, id);
+        let document = self.instance.report(&self.work.state, problem);
         self.send(socket, &document).await
     }
 

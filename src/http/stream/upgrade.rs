@@ -1,8 +1,7 @@
 //! From HTTP to a WebSocket: the answer to the handshake, and the connection after it.
 
-use super::fragments::Fragments;
+use super::fragments::{Fragments, Rates};
 use crate::http::net::connection_io::ConnectionIo;
-use crate::http::net::least_rate::LeastRate;
 use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::extract::ws::WebSocketUpgrade;
@@ -65,7 +64,7 @@ impl Upgrade {
         self,
         max_bytes: usize,
         budgets: [ByteBudget; 2],
-        rate: LeastRate,
+        rates: Rates,
         serve: F,
     ) -> Response
     where
@@ -81,7 +80,7 @@ impl Upgrade {
                 return tracing::error!("a stream over a connection of another kind");
             };
             let stream = parts.io.into_inner();
-            let fragments = Fragments::new(stream, &parts.read_buf, budgets, rate);
+            let fragments = Fragments::new(stream, &parts.read_buf, budgets, rates);
             let config = WebSocketConfig::default()
                 .read_buffer_size(READ_BYTES)
                 .write_buffer_size(0)

@@ -7,6 +7,7 @@ use crate::store::{Commit, Intent, Local, Outcome, Step, StoreUnavailable, recon
 use crate::{
     LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
 };
+use bytes::Bytes;
 use std::sync::Arc;
 use tokio::time::timeout;
 
@@ -35,6 +36,9 @@ impl SessionService {
         batch: FrameBatch,
     ) -> Result<Tracked, FramesError> {
         let (session, is_posted) = (permit.session().clone(), batch.stream.is_none());
+        let (width, height) = session.source_size();
+        let pixels = u64::from(width) * u64::from(height);
+        let queue = queue.for_size(pixels, largest(&batch.files));
         let advancing = self.advance_until_committed(permit, queue, Arc::new(batch));
         let advanced = timeout(self.settings.work_timeout, advancing).await;
         let advanced = advanced.unwrap_or_else(|_| Err(Stopped::Deadline.into()));
@@ -166,6 +170,11 @@ impl SessionService {
             }
         }
     }
+}
+
+/// Bytes of the largest file.
+pub(super) fn largest(files: &[Bytes]) -> usize {
+    files.iter().map(Bytes::len).max().unwrap_or(0)
 }
 
 impl Attempt {

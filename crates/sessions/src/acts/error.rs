@@ -131,10 +131,12 @@ impl From<FrameFault> for FramesError {
     }
 }
 
-/// A client has as many sessions as it may.
+/// A client has as many sessions as it may, or as large ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the client has {limit} sessions, which is its maximum")]
+#[error("the client has as many {what} as it may, {limit}")]
 pub struct QuotaExhausted {
+    /// What it has so many of.
+    pub what: &'static str,
     /// How many it may have.
     pub limit: usize,
 }

@@ -96,8 +96,8 @@ impl FrameBatch {
     }
 
     /// Takes the frames into `state`: the stored answers if the request was answered before, else those of the tracker.
-    /// The sizes of all frames are checked before the first is decoded, and all are decoded before the first is tracked.
-    /// Between frames `meter` says whether to go on.
+    /// The sizes of all frames are checked before the first is decoded; each is decoded in its turn, so that one of them is
+    /// in memory. Between frames `meter` says whether to go on.
     ///
     /// # Errors
     /// That of the first bad frame, or of a request that costs too much. The state is to be dropped then.
@@ -125,19 +125,26 @@ impl FrameBatch {
         }
         self.check_sizes(limits, state.source_size())?;
         let format = state.frame_format();
-        let decoded = decode(&self.files, &limits.frame, &|_| format, meter, metrics)?;
-        let frames: Vec<_> = fingerprints.into_iter().zip(decoded).collect();
         let before = state.latest();
         let mut diagnostics = Vec::new();
         let wanted = self.with_diagnostics && correction.is_none();
         let seen = wanted.then_some(&mut diagnostics);
-        let estimates = state.advance(&frames, correction, meter, self.min_answers, seen);
-        frames
-            .into_iter()
-            .for_each(|(_, frame)| bagtrack_ingest::recycle(frame));
+        let frame = |index: usize, meter: &mut WorkMeter| {
+            let (file, which) = (&self.files[index], (index, self.files.len()));
+            decode(file, which, &limits.frame, &|_| format, meter, metrics)
+        };
+        let estimates = state.advance(
+            &fingerprints,
+            frame,
+            correction,
+            meter,
+            self.min_answers,
+            seen,
+        );
         let estimates = estimates.map_err(|error| match error {
             StepError::Refused { index, error } => self.fault(index, error),
             StepError::Stopped(stopped) => stopped.into(),
+            StepError::Frame(error) => error,
         })?;
         metrics.tracked(&before, &estimates, &meter.take_steps());
         Ok(Tracked {
@@ -226,23 +233,20 @@ pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<
     limits.check_pixels(pixels.sum(), files.len())
 }
 
-/// Decodes all files of a request in the format that `format` says for uploads of a size. Between them `meter` says
-/// whether to go on.
+/// Decodes a file in the format that `format` says for uploads of a size, where `meter` says that the work goes on.
 ///
 /// # Errors
-/// That of the first bad file, or that the work was stopped.
+/// That of the file, which is the one of this index of so many; or that the work was stopped.
 pub(super) fn decode(
-    files: &[Bytes],
+    file: &Bytes,
+    (index, count): (usize, usize),
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
     meter: &mut WorkMeter,
     metrics: &TrackingMetrics,
-) -> Result<Vec<Frame>, FramesError> {
-    let decode_one = |(index, file): (usize, &Bytes)| {
-        meter.check()?;
-        metrics
-            .decoding(|| bagtrack_ingest::decode_to(file, limits, format))
-            .map_err(|error| fault_of(index, files.len(), error))
-    };
-    files.iter().enumerate().map(decode_one).collect()
+) -> Result<Frame, FramesError> {
+    meter.check()?;
+    metrics
+        .decoding(|| bagtrack_ingest::decode_to(file, limits, format))
+        .map_err(|error| fault_of(index, count, error))
 }

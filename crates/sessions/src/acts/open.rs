@@ -1,6 +1,6 @@
 //! Opens sessions: once for each name, so that a request that comes again gets the same answer.
 
-use super::error::{OpenError, QuotaExhausted};
+use super::error::OpenError;
 use super::idempotency::CreationKey;
 use super::service::SessionService;
 use super::start::Start;
@@ -20,13 +20,14 @@ pub trait SessionQuota: Debug + Send + Sync {
     ///
     /// # Errors
     /// It may not.
-    fn check(&self) -> Result<(), QuotaExhausted>;
+    fn check(&self) -> Result<(), OpenError>;
 
-    /// Takes the places of a session with so many targets, until what is returned is dropped.
+    /// Takes the places of a session with so many targets, whose state takes so many bytes, until what is returned is
+    /// dropped.
     ///
     /// # Errors
     /// There are not so many left.
-    fn reserve(&self, targets: usize) -> Result<Reservation, QuotaExhausted>;
+    fn reserve(&self, targets: usize, bytes: usize) -> Result<Reservation, OpenError>;
 }
 
 /// A request to open a session.
@@ -118,7 +119,7 @@ impl SessionService {
             return Err(OpenError::Draining);
         }
         self.registry.check_room()?;
-        Ok(quota.check()?)
+        quota.check()
     }
 
     /// The id of the session that an idempotency key names: of the one that is open, or a new one. With a store, all
@@ -149,14 +150,15 @@ impl SessionService {
             queue,
             ..
         } = request;
-        let (service, queue) = (self.clone(), queue.for_frames(start.target_count()));
+        let queue = queue.for_frames(start.target_count());
+        let (service, queue) = (self.clone(), queue.for_size(0, start.file_bytes()));
         let begin = move |meter: &mut WorkMeter| {
             let state = start.run(&service, meter)?;
             let bytes = service.store.is_some().then(|| state.stored());
             Ok((state, bytes))
         };
         let (state, bytes): (SessionState, _) = self.run::<_, OpenError, _>(queue, begin).await?;
-        let held = quota.reserve(state.target_count())?;
+        let held = quota.reserve(state.target_count(), state.session_bytes())?;
         let opening = self.registry.opening(digest, &state);
         let ttl = self.registry.first_lease();
         let mut version = None;

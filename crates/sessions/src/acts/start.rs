@@ -33,6 +33,13 @@ impl Start {
         }
     }
 
+    /// Bytes of its file.
+    pub(super) fn file_bytes(&self) -> usize {
+        match self {
+            Self::Frame { file, .. } | Self::Snapshot(file) => file.len(),
+        }
+    }
+
     /// The state of the session that begins so.
     ///
     /// # Errors
@@ -54,9 +61,8 @@ impl Start {
             } => (file, boxes, params),
         };
         let format = |source| frame_format(params, source, boxes);
-        let files = std::slice::from_ref(file);
         let limits = &service.settings.frame;
-        let frame = &frames::decode(files, limits, &format, meter, &service.tracking)?[0];
+        let frame = &frames::decode(file, (0, 1), limits, &format, meter, &service.tracking)?;
         for (target, given) in boxes.as_slice().iter().enumerate() {
             box_check::check(given, frame.source_size()).map_err(|error| OpenError::Box {
                 error,

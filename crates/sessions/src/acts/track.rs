@@ -1,5 +1,6 @@
 //! Tracks without a session: from a first frame or a snapshot to a new snapshot.
 
+use super::advance::largest;
 use super::box_check::box_warnings;
 use super::error::TrackError;
 use super::frames::{FrameBatch, GivenBox, RequestLimits, check_pixels};
@@ -48,6 +49,7 @@ impl SessionService {
     {
         let service = self.clone();
         let queue = queue.for_frames(files.len());
+        let queue = queue.for_size(0, largest(&files));
         self.run(queue, move |meter| {
             let tracked = service.track_away(from, files, meter)?;
             respond(tracked)

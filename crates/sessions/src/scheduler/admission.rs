@@ -6,7 +6,7 @@
 //! has ended, and never more threads work than there are workers.
 
 use super::fair_queue::{FairQueue, WorkerSlot};
-use super::flows::{Flow, SizeClass};
+use super::flows::{Flow, SizeClass, max_begun};
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
 use super::workers::Workers;
 use std::any::Any;
@@ -51,6 +51,11 @@ fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
         .take()
 }
 
+/// The threads for so many workers of one class.
+pub fn threads_of(workers: usize) -> usize {
+    workers + max_begun(workers)
+}
+
 /// A queue before the workers. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
@@ -65,8 +70,8 @@ impl Admission {
     /// # Errors
     /// The system gives no threads for the workers.
     pub fn new(queue: usize, workers: usize) -> io::Result<Self> {
-        // As many again may wait between two frames.
-        let threads = |pace: SizeClass| Workers::new(2 * workers, pace.niceness());
+        // Of work on several frames, what has begun may wait between two of them.
+        let threads = |class: SizeClass| Workers::new(threads_of(workers), class.niceness());
         Ok(Self {
             queue: Arc::new(Semaphore::new(queue)),
             workers: FairQueue::new(workers),
@@ -112,7 +117,7 @@ impl Admission {
         T: Send + 'static,
         F: FnOnce(&mut WorkerSlot) -> T + Send + 'static,
     {
-        let (flow, length) = queue.turn();
+        let (flow, length, expected) = queue.turn();
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
@@ -122,7 +127,7 @@ impl Admission {
             let Some((queue, work)) = take(&taken) else {
                 return Err(turn);
             };
-            let threads = &threads[turn.pace() as usize];
+            let threads = &threads[turn.class() as usize];
             threads.start(Box::new(move || {
                 turn.begin();
                 // A panic drops `work`, so no half-changed value is read.
@@ -136,7 +141,7 @@ impl Admission {
             }));
             Ok(())
         };
-        self.workers.enter(flow, length, Box::new(start));
+        self.workers.enter(flow, length, expected, Box::new(start));
         let outcome = outcome.await.expect("all work ends, and says how");
         outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()))
     }
@@ -215,7 +220,7 @@ mod tests {
     async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
         let admission = Admission::new(9, 1).unwrap();
         // A thread that starts late would be the one that became idle last.
-        while format!("{:?}", admission.threads[0]) != "Workers(2 idle)" {
+        while format!("{:?}", admission.threads[0]) != "Workers(9 idle)" {
             tokio::task::yield_now().await;
         }
         let (go, wait) = mpsc::channel::<()>();

@@ -5,14 +5,15 @@
 //! that had no work saves up a small claim, so a client that sends less than its share hardly waits for those that send
 //! all they can.
 //!
-//! Clients whose work is slow have workers of their own ([`SizeClass`]), so that the frames of the others need not wait until a
-//! slow one is done.
+//! Clients whose work is slow have workers of their own ([`SizeClass`]), so that the frames of the others need not wait
+//! until a slow one is done. How slow it was is remembered for some time, and what is known of work before it begins
+//! counts like what was measured.
 //!
 //! Work on several frames gives its worker up between two of them when another flow has the better claim. Its thread
-//! waits meanwhile, so there are more threads than workers, and only as much such work is begun as there are workers.
+//! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
 
 use super::cpu_time::thread_cpu_time;
-use super::flows::{Flow, Flows, Job, SizeClass};
+use super::flows::{Flow, Flows, Held, Job, SizeClass};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -32,9 +33,13 @@ pub struct WorkerSlot {
     queue: Option<FairQueue>,
     flow: Flow,
     length: Job,
-    pace: SizeClass,
+    class: SizeClass,
     /// Processor time of the worker's thread when work began, if it has.
     began: Option<Duration>,
+    /// The same when others could have had a turn last.
+    checked: Duration,
+    /// The longest time between two such moments.
+    longest: Duration,
 }
 
 impl FairQueue {
@@ -43,26 +48,30 @@ impl FairQueue {
         Self(Arc::new(Mutex::new(Flows::new(workers))))
     }
 
-    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up.
-    pub(super) fn enter(&self, flow: Flow, length: Job, give: Give) {
-        let pace = {
+    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. The work takes about
+    /// `expected`, as far as that is known.
+    pub(super) fn enter(&self, flow: Flow, length: Job, expected: Duration, give: Give) {
+        let worker = {
             let mut state = self.lock();
             state.forget_idle_flows();
-            state.enter(flow);
-            if !state.may_begin(&state.flows[&flow], length) {
-                return state.enter(flow).requests.push_back((length, give));
-            }
-            state.serve(flow, length)
+            state.enter(flow, expected);
+            let Some(worker) = state.worker_for(&state.flows[&flow], length) else {
+                let requests = &mut state.flows.entry(flow).or_default().requests;
+                return requests.push_back((length, give));
+            };
+            state.serve(flow, length, worker);
+            worker
         };
         // What is given back is handed on as it is dropped.
-        drop(give(self.turn(flow, length, pace)));
+        drop(give(self.turn(flow, length, worker)));
     }
 
     /// Asks for a worker; what is returned gets it.
     #[cfg(test)]
     pub(super) fn ask(&self, flow: Flow, length: Job) -> oneshot::Receiver<WorkerSlot> {
         let (give, given) = oneshot::channel();
-        self.enter(flow, length, Box::new(|turn| give.send(turn)));
+        let give = Box::new(|turn| give.send(turn));
+        self.enter(flow, length, Duration::ZERO, give);
         given
     }
 
@@ -75,56 +84,59 @@ impl FairQueue {
     fn yield_to_others(
         &self,
         flow: Flow,
-        pace: SizeClass,
-        time: Duration,
+        class: SizeClass,
+        held: Held,
     ) -> Option<oneshot::Receiver<WorkerSlot>> {
         let given = {
             let mut state = self.lock();
-            let own = state.flows.get(&flow)?;
-            let claim = (own.running - 1, own.used + time);
-            if !state.has_better(pace, claim) {
+            if !state.has_better(flow, class, held.time) {
                 return None;
             }
             let (give, given) = oneshot::channel();
             let own = state.flows.get_mut(&flow)?;
             let give: Give = Box::new(|turn| give.send(turn));
-            own.requests.push_front((Job::ResumedBatch, give));
+            own.requests.push_front((Job::ResumedBatch(class), give));
             given
         };
-        self.hand_on(flow, pace, time, false);
+        self.hand_on(flow, class, held);
         Some(given)
     }
 
-    fn turn(&self, flow: Flow, length: Job, pace: SizeClass) -> WorkerSlot {
+    fn turn(&self, flow: Flow, length: Job, class: SizeClass) -> WorkerSlot {
         WorkerSlot {
             queue: Some(self.clone()),
             flow,
             length,
-            pace,
+            class,
             began: None,
+            checked: Duration::ZERO,
+            longest: Duration::ZERO,
         }
     }
 
-    /// Counts the time that `flow` had a worker for, and gives the workers that are free now to the next requests. `ends`
-    /// says whether work on several frames has ended.
-    fn hand_on(&self, flow: Flow, pace: SizeClass, time: Duration, ends: bool) {
-        let mut ended = Some((flow, pace, time, ends));
+    /// Takes the worker back that `flow` had, and gives the workers that are free now to the next requests.
+    fn hand_on(&self, flow: Flow, class: SizeClass, held: Held) {
+        let mut ended = Some((flow, class, held));
         loop {
-            let (flow, length, pace, give) = {
+            let (flow, length, class, give) = {
                 let mut state = self.lock();
-                if let Some((flow, pace, time, ends)) = ended.take() {
-                    state.long -= usize::from(ends);
-                    state.release(flow, pace, time);
+                if let Some((flow, class, held)) = ended.take() {
+                    state.release(flow, class, held);
                 }
                 match state.next() {
                     Some(next) => next,
                     None => return,
                 }
             };
-            if let Err(mut refused) = give(self.turn(flow, length, pace)) {
+            if let Err(mut refused) = give(self.turn(flow, length, class)) {
                 // Its client has gone. The worker is still to be given away.
                 refused.queue = None;
-                ended = Some((flow, pace, Duration::ZERO, length != Job::Single));
+                let ends = length != Job::Single;
+                let held = Held {
+                    ends,
+                    ..Held::default()
+                };
+                ended = Some((flow, class, held));
             }
         }
     }
@@ -143,30 +155,44 @@ impl fmt::Debug for FairQueue {
 
 impl WorkerSlot {
     /// Which workers' turn it is.
-    pub(super) fn pace(&self) -> SizeClass {
-        self.pace
+    pub(super) fn class(&self) -> SizeClass {
+        self.class
     }
 
     /// Work begins on this thread.
     pub(super) fn begin(&mut self) {
-        self.began = Some(thread_cpu_time());
+        let now = thread_cpu_time();
+        (self.began, self.checked) = (Some(now), now);
     }
 
-    /// Processor time that the work took.
-    fn cpu_time(&self) -> Duration {
-        let began = self.began.unwrap_or_else(thread_cpu_time);
-        thread_cpu_time().saturating_sub(began)
+    /// How the worker was used so far. `ends` says whether work on several frames ends.
+    fn held(&mut self, ends: bool) -> Held {
+        let Some(began) = self.began else {
+            return Held {
+                ends,
+                ..Held::default()
+            };
+        };
+        let now = thread_cpu_time();
+        self.longest = self.longest.max(now.saturating_sub(self.checked));
+        self.checked = now;
+        Held {
+            time: now.saturating_sub(began),
+            longest: self.longest,
+            ends,
+        }
     }
 
     /// Lets a request of another flow go first, where that has the better claim. Blocks this thread until there is a
     /// worker again; it must not be one that runs tasks.
     pub(super) fn yield_to_others(&mut self) {
         // Work on one frame ends sooner than it would come back.
-        let (Some(queue), Job::Batch | Job::ResumedBatch) = (self.queue.clone(), self.length)
+        let (Some(queue), Job::Batch | Job::ResumedBatch(_)) = (self.queue.clone(), self.length)
         else {
             return;
         };
-        let Some(given) = queue.yield_to_others(self.flow, self.pace, self.cpu_time()) else {
+        let held = self.held(false);
+        let Some(given) = queue.yield_to_others(self.flow, self.class, held) else {
             return;
         };
         // Its worker was handed on.
@@ -180,8 +206,8 @@ impl WorkerSlot {
 impl Drop for WorkerSlot {
     fn drop(&mut self) {
         if let Some(queue) = self.queue.take() {
-            let ends = self.length != Job::Single;
-            queue.hand_on(self.flow, self.pace, self.cpu_time(), ends);
+            let held = self.held(self.length != Job::Single);
+            queue.hand_on(self.flow, self.class, held);
         }
     }
 }
@@ -229,7 +255,7 @@ mod tests {
         drop((short, done));
         frames.join().unwrap();
         assert_eq!(order.iter().collect::<Vec<_>>(), ["short", "long"]);
-        assert_eq!((queue.running(), queue.lock().long), (0, 0));
+        assert_eq!((queue.running(), queue.lock().begun), (0, 0));
     }
 
     #[test]
@@ -241,7 +267,7 @@ mod tests {
         short.yield_to_others();
         drop(short);
         drop(given(&mut other));
-        assert_eq!((queue.running(), queue.lock().long), (0, 0));
+        assert_eq!((queue.running(), queue.lock().begun), (0, 0));
     }
 
     #[test]
@@ -250,7 +276,13 @@ mod tests {
         let mut first = given(&mut queue.ask(Flow(1), Job::Single));
         // It took as long as a large picture takes.
         first.queue = None;
-        queue.hand_on(Flow(1), SizeClass::Small, Duration::from_millis(50), false);
+        let long = Duration::from_millis(50);
+        let held = Held {
+            time: long,
+            longest: long,
+            ends: false,
+        };
+        queue.hand_on(Flow(1), SizeClass::Small, held);
         let slow = given(&mut queue.ask(Flow(1), Job::Single));
         // The only worker of quick work is free.
         let quick = given(&mut queue.ask(Flow(2), Job::Single));

@@ -1,16 +1,17 @@
 //! The requests that wait, in a flow for each client, and which of them is next.
 
 use std::collections::{HashMap, VecDeque};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Work that takes more processor time without a break makes its flow a slow one. It is some ten times what a frame of a
 /// camera takes, and half of the time between two of them.
 const SLOW: Duration = Duration::from_millis(15);
-/// By how much the memory of the slowest work fades with each other work. A client that hides its slow work among quick
-/// work needs a dozen requests of that for each.
-const FADING: f64 = 0.9;
-/// Flows above which those without work and without debt are forgotten.
-const MAX_IDLE_LANES: usize = 1024;
+/// The memory of the longest work fades by half in this time, whatever else the client sends meanwhile.
+const HALF_LIFE: Duration = Duration::from_secs(5);
+/// Flows above which those without work, debt and slow work are forgotten.
+const MAX_IDLE_FLOWS: usize = 1024;
+/// Least number of requests with several frames that may have begun, whatever the number of workers.
+const MIN_BEGUN: usize = 8;
 
 /// Whose requests wait for each other only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -19,18 +20,21 @@ pub struct Flow(pub u64);
 /// All flows. `G` is what gives a request its worker.
 #[derive(Debug)]
 pub(super) struct Flows<G> {
-    /// Workers of each pace.
+    /// Workers of each class.
     workers: usize,
-    /// Those at work, by their pace.
+    /// Those at work, by their class.
     running: [usize; 2],
-    /// Requests with several frames that have begun and not ended, and how many may.
-    pub(super) long: usize,
-    max_long: usize,
-    /// The virtual time: the greatest that a flow of each pace had used when it was served.
+    /// Requests with several frames that have begun and not ended.
+    pub(super) begun: usize,
+    /// The virtual time: the greatest that a flow of each class had used when it was served.
     now: [Duration; 2],
     pub(super) flows: HashMap<Flow, Waiting<G>>,
     /// How often a request became the first of its flow.
     firsts: u64,
+    started: Instant,
+    /// Time that a test lets pass.
+    #[cfg(test)]
+    passed: Duration,
 }
 
 /// A flow.
@@ -38,11 +42,30 @@ pub(super) struct Flows<G> {
 pub(super) struct Waiting<G> {
     pub(super) used: Duration,
     pub(super) running: usize,
+    /// Of these, those that have a worker for small work.
+    quick: usize,
+    /// Requests with several frames that have begun and not ended.
+    begun: usize,
     pub(super) requests: VecDeque<(Job, G)>,
     /// Orders flows that have used the same time: those that start level are many.
     since: u64,
-    /// The longest time that a worker was held lately.
-    slowest: Duration,
+    class: SizeClass,
+    longest: Faded,
+}
+
+/// The longest time that a worker was held without a break, less what has faded since.
+#[derive(Debug, Clone, Copy, Default)]
+struct Faded {
+    value: Duration,
+    at: Duration,
+}
+
+impl Faded {
+    /// What is left of it.
+    fn at(self, now: Duration) -> Duration {
+        let half_lives = now.saturating_sub(self.at).div_duration_f64(HALF_LIFE);
+        self.value.mul_f64((-half_lives).exp2())
+    }
 }
 
 /// Which workers a flow has. Small work has workers of its own, so it never waits until slow work is done; the threads of
@@ -60,9 +83,12 @@ pub(super) enum Job {
     Single,
     /// Several frames.
     Batch,
-    /// Several frames, some of which are done.
-    ResumedBatch,
+    /// Several frames, some of which are done, on a thread of this class.
+    ResumedBatch(SizeClass),
 }
+
+/// How good a flow's claim to a worker is; the least is the best. A place that is only borrowed comes last.
+pub(super) type Claim = (bool, usize, Duration);
 
 impl SizeClass {
     /// By how much lower the priority of its threads is: slow work gets a tenth of a core that quick work wants too.
@@ -82,26 +108,34 @@ impl SizeClass {
         }
     }
 
-    /// That of a flow whose slowest work took this time.
-    fn of(slowest: Duration) -> Self {
-        match slowest > SLOW {
+    /// That of a flow whose longest work took this time.
+    fn of(longest: Duration) -> Self {
+        match longest > SLOW {
             true => Self::Large,
             false => Self::Small,
         }
     }
 }
 
+/// Most requests with several frames that have begun and not ended. Each needs a thread, which waits between two frames
+/// while others have the worker.
+pub(super) fn max_begun(workers: usize) -> usize {
+    MIN_BEGUN.max(2 * workers)
+}
+
 impl<G> Flows<G> {
-    /// For so many workers of each pace, and as many requests with several frames that have begun.
+    /// For so many workers of each class.
     pub(super) fn new(workers: usize) -> Self {
         Self {
             workers,
             running: [0; 2],
-            long: 0,
-            max_long: workers,
+            begun: 0,
             now: [Duration::ZERO; 2],
             flows: HashMap::new(),
             firsts: 0,
+            started: Instant::now(),
+            #[cfg(test)]
+            passed: Duration::ZERO,
         }
     }
 
@@ -110,13 +144,21 @@ impl<G> Flows<G> {
         self.running.iter().sum()
     }
 
-    /// The flow, to which a request comes. Where no other of its requests waits, it starts no further behind the others
-    /// than the claim that it may save up.
-    pub(super) fn enter(&mut self, flow: Flow) -> &mut Waiting<G> {
+    fn time(&self) -> Duration {
+        #[cfg(test)]
+        return self.started.elapsed() + self.passed;
+        #[cfg(not(test))]
+        self.started.elapsed()
+    }
+
+    /// The flow, to which a request comes whose work takes about `expected`. Where no other of its requests waits, it
+    /// starts no further behind the others than the claim that it may save up.
+    pub(super) fn enter(&mut self, flow: Flow, expected: Duration) -> &mut Waiting<G> {
+        self.note(flow, expected);
         let waiting = self.flows.entry(flow).or_default();
         if waiting.requests.is_empty() {
-            let pace = waiting.pace();
-            let least = self.now[pace as usize].saturating_sub(pace.claim());
+            let class = waiting.class;
+            let least = self.now[class as usize].saturating_sub(class.claim());
             waiting.used = waiting.used.max(least);
             self.firsts += 1;
             waiting.since = self.firsts;
@@ -124,87 +166,126 @@ impl<G> Flows<G> {
         waiting
     }
 
-    /// Whether such a request need not wait for another one with several frames to end.
-    fn has_place(&self, length: Job) -> bool {
-        length != Job::Batch || self.long < self.max_long
+    /// Notes work of a flow that took so long without a break, or will. Flows of another class have other times, so one
+    /// that changes its class starts level with them.
+    fn note(&mut self, flow: Flow, longest: Duration) {
+        let at = self.time();
+        let waiting = self.flows.entry(flow).or_default();
+        let value = waiting.longest.at(at).max(longest);
+        waiting.longest = Faded { value, at };
+        let class = SizeClass::of(value);
+        if class != waiting.class {
+            waiting.class = class;
+            waiting.used = self.now[class as usize];
+        }
     }
 
-    /// Whether a request of a flow may have a worker.
-    pub(super) fn may_begin(&self, waiting: &Waiting<G>, length: Job) -> bool {
-        let has_worker = self.running[waiting.pace() as usize] < self.workers;
-        has_worker && self.has_place(length)
+    /// Whether such a request need not wait for another one with several frames to end. A flow without one may always
+    /// begin one, as far as there are threads; more may begin as long as there are no more than workers.
+    fn has_place(&self, waiting: &Waiting<G>, length: Job) -> bool {
+        let is_first = waiting.begun == 0 && self.begun < max_begun(self.workers);
+        length != Job::Batch || is_first || self.begun < self.workers
     }
 
-    /// Whether the first request of a flow may have a worker.
-    pub(super) fn is_next(&self, waiting: &Waiting<G>) -> bool {
-        let first = waiting.requests.front();
-        first.is_some_and(|(length, _)| self.may_begin(waiting, *length))
+    /// Which worker a request of a flow may have now. A flow has one worker for small work, so that no client has all of
+    /// them with work that turns out to be slow; the rest of its work borrows the time that nobody else uses.
+    pub(super) fn worker_for(&self, waiting: &Waiting<G>, length: Job) -> Option<SizeClass> {
+        let [small, large] = self.running.map(|running| running < self.workers);
+        let small = small && waiting.quick == 0;
+        let worker = match (length, waiting.class) {
+            (Job::ResumedBatch(SizeClass::Small), _) => small.then_some(SizeClass::Small),
+            (Job::ResumedBatch(SizeClass::Large), _) => large.then_some(SizeClass::Large),
+            (_, SizeClass::Small) if small => Some(SizeClass::Small),
+            (_, SizeClass::Small) if waiting.quick == 0 || self.running() >= self.workers => None,
+            (_, SizeClass::Small | SizeClass::Large) => large.then_some(SizeClass::Large),
+        };
+        worker.filter(|_| self.has_place(waiting, length))
     }
 
-    /// Whether a waiting flow has a better claim than `claim` to a worker that is given up now.
-    pub(super) fn has_better(&mut self, pace: SizeClass, claim: (usize, Duration)) -> bool {
-        self.running[pace as usize] -= 1;
-        let mut waiting = self.flows.values().filter(|w| self.is_next(w));
-        let has_better = waiting.any(|w| (w.running, w.used) < claim);
-        self.running[pace as usize] += 1;
+    /// The claim of the first request of a flow, where it may have a worker.
+    fn claim(&self, waiting: &Waiting<G>) -> Option<Claim> {
+        let (length, _) = waiting.requests.front()?;
+        let worker = self.worker_for(waiting, *length)?;
+        Some((worker != waiting.class, waiting.running, waiting.used))
+    }
+
+    /// Whether a waiting flow has a better claim than this one to the worker that it has had for this time.
+    pub(super) fn has_better(&mut self, flow: Flow, class: SizeClass, time: Duration) -> bool {
+        let Some(own) = self.flows.get(&flow) else {
+            return false;
+        };
+        let claim = (class != own.class, own.running - 1, own.used + time);
+        self.running[class as usize] -= 1;
+        let others = self.flows.iter().filter(|(other, _)| **other != flow);
+        let mut claims = others.filter_map(|(_, waiting)| self.claim(waiting));
+        let has_better = claims.any(|other| other < claim);
+        self.running[class as usize] += 1;
         has_better
     }
 
     pub(super) fn next(&mut self) -> Option<(Flow, Job, SizeClass, G)> {
-        let waiting = self.flows.iter().filter(|(_, w)| self.is_next(w));
-        let flow = *waiting.min_by_key(|(_, w)| (w.running, w.used, w.since))?.0;
+        let claims = self.flows.iter().filter_map(|(flow, waiting)| {
+            let claim = self.claim(waiting)?;
+            Some(((claim, waiting.since), *flow))
+        });
+        let (_, flow) = claims.min_by_key(|(claim, _)| *claim)?;
+        let waiting = &self.flows[&flow];
+        let worker = self.worker_for(waiting, waiting.requests.front()?.0)?;
         let waiting = self.flows.get_mut(&flow)?;
         let (length, give) = waiting.requests.pop_front()?;
         self.firsts += 1;
         waiting.since = self.firsts;
-        let pace = self.serve(flow, length);
-        Some((flow, length, pace, give))
+        self.serve(flow, length, worker);
+        Some((flow, length, worker, give))
     }
 
     /// Takes a worker for a flow.
-    pub(super) fn serve(&mut self, flow: Flow, length: Job) -> SizeClass {
-        self.long += usize::from(length == Job::Batch);
+    pub(super) fn serve(&mut self, flow: Flow, length: Job, worker: SizeClass) {
+        let begins = usize::from(length == Job::Batch);
+        self.begun += begins;
+        self.running[worker as usize] += 1;
         let waiting = self.flows.entry(flow).or_default();
-        let pace = waiting.pace();
+        waiting.begun += begins;
         waiting.running += 1;
-        self.running[pace as usize] += 1;
-        let now = &mut self.now[pace as usize];
+        waiting.quick += usize::from(worker == SizeClass::Small);
+        let now = &mut self.now[waiting.class as usize];
         *now = waiting.used.max(*now);
-        pace
     }
 
-    /// Takes the worker back that a flow had for this time.
-    pub(super) fn release(&mut self, flow: Flow, pace: SizeClass, time: Duration) {
-        self.running[pace as usize] -= 1;
+    /// Takes the worker back that a flow had.
+    pub(super) fn release(&mut self, flow: Flow, worker: SizeClass, held: Held) {
+        let ends = usize::from(held.ends);
+        self.begun -= ends;
+        self.running[worker as usize] -= 1;
         let waiting = self.flows.entry(flow).or_default();
+        waiting.begun -= ends;
         waiting.running -= 1;
-        waiting.used += time;
-        if !time.is_zero() {
-            let before = waiting.pace();
-            let slowest = time.max(waiting.slowest.mul_f64(FADING));
-            let after = SizeClass::of(slowest);
-            // Flows of another pace have other times.
-            let start = (after != before).then(|| self.now[after as usize]);
-            let waiting = self.flows.entry(flow).or_default();
-            waiting.slowest = slowest;
-            waiting.used = start.unwrap_or(waiting.used);
-        }
+        waiting.quick -= usize::from(worker == SizeClass::Small);
+        waiting.used += held.time;
+        self.note(flow, held.longest);
     }
 
     pub(super) fn forget_idle_flows(&mut self) {
-        if self.flows.len() > MAX_IDLE_LANES {
-            let now = self.now;
-            let owes = |w: &Waiting<G>| w.used > now[w.pace() as usize];
-            self.flows
-                .retain(|_, w| w.running > 0 || !w.requests.is_empty() || owes(w));
+        if self.flows.len() > MAX_IDLE_FLOWS {
+            let (now, at) = (self.now, self.time());
+            self.flows.retain(|_, waiting| {
+                let owes = waiting.used > now[waiting.class as usize];
+                let is_slow = waiting.longest.at(at) > SLOW;
+                waiting.running > 0 || !waiting.requests.is_empty() || owes || is_slow
+            });
         }
     }
 }
 
-impl<G> Waiting<G> {
-    fn pace(&self) -> SizeClass {
-        SizeClass::of(self.slowest)
-    }
+/// How a flow had a worker.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Held {
+    /// Processor time of its work.
+    pub(super) time: Duration,
+    /// The longest part of it in which it gave nobody else a turn.
+    pub(super) longest: Duration,
+    /// Whether work on several frames has ended.
+    pub(super) ends: bool,
 }
 
 impl<G> Default for Waiting<G> {
@@ -212,9 +293,12 @@ impl<G> Default for Waiting<G> {
         Self {
             used: Duration::ZERO,
             running: 0,
+            quick: 0,
+            begun: 0,
             requests: VecDeque::new(),
             since: 0,
-            slowest: Duration::ZERO,
+            class: SizeClass::Small,
+            longest: Faded::default(),
         }
     }
 }
@@ -223,35 +307,108 @@ impl<G> Default for Waiting<G> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_lane_is_slow_after_slow_work_and_quick_again_after_much_quick_work() {
-        let mut flows = Flows::<()>::new(1);
-        let mut work = |millis| {
-            let pace = flows.serve(Flow(1), Job::Single);
-            flows.release(Flow(1), pace, Duration::from_millis(millis));
-            pace
+    /// A flow has a worker for single work of this time.
+    fn work<G>(flows: &mut Flows<G>, flow: u64, millis: u64) -> SizeClass {
+        let flow = Flow(flow);
+        let waiting = flows.enter(flow, Duration::ZERO);
+        let class = waiting.class;
+        flows.serve(flow, Job::Single, class);
+        let time = Duration::from_millis(millis);
+        let held = Held {
+            time,
+            longest: time,
+            ends: false,
         };
-        assert_eq!(work(50), SizeClass::Small);
-        // Some quick work hides nothing.
-        assert!((0..10).all(|_| work(1) == SizeClass::Large));
-        assert!((0..20).any(|_| work(1) == SizeClass::Small));
+        flows.release(flow, class, held);
+        class
+    }
+
+    #[test]
+    fn slow_work_is_remembered_in_time_and_no_number_of_quick_works_hides_it() {
+        let mut flows = Flows::<()>::new(1);
+        assert_eq!(work(&mut flows, 1, 1_000), SizeClass::Small);
+        // Forty works of a fifth of a millisecond once made the flow quick again.
+        assert!((0..1_000).all(|_| work(&mut flows, 1, 0) == SizeClass::Large));
+        flows.passed += 5 * HALF_LIFE;
+        assert_eq!(work(&mut flows, 1, 0), SizeClass::Large);
+        flows.passed += 2 * HALF_LIFE;
+        assert_eq!(work(&mut flows, 1, 0), SizeClass::Small);
+    }
+
+    #[test]
+    fn a_flow_whose_work_is_announced_as_slow_has_no_quick_worker() {
+        let mut flows = Flows::<()>::new(2);
+        let expected = Duration::from_millis(100);
+        flows.enter(Flow(1), expected);
+        let worker = flows.worker_for(&flows.flows[&Flow(1)], Job::Single);
+        assert_eq!(worker, Some(SizeClass::Large));
+    }
+
+    #[test]
+    fn a_flow_has_one_quick_worker_and_borrows_others_while_nobody_wants_them() {
+        let mut flows = Flows::<u64>::new(3);
+        let mut workers = Vec::new();
+        for _ in 0..4 {
+            flows.enter(Flow(1), Duration::ZERO);
+            let worker = flows.worker_for(&flows.flows[&Flow(1)], Job::Single);
+            worker
+                .iter()
+                .for_each(|worker| flows.serve(Flow(1), Job::Single, *worker));
+            workers.push(worker);
+        }
+        let (quick, borrowed) = (Some(SizeClass::Small), Some(SizeClass::Large));
+        assert_eq!(workers, [quick, borrowed, borrowed, None]);
+        // Another one has a quick worker at once.
+        flows.enter(Flow(2), Duration::ZERO);
+        let worker = flows.worker_for(&flows.flows[&Flow(2)], Job::Single);
+        assert_eq!(worker, quick);
+        flows.serve(Flow(2), Job::Single, SizeClass::Small);
+        // What was borrowed is given back to work that belongs there first.
+        ask(&mut flows, 1);
+        flows.enter(Flow(3), Duration::from_secs(1));
+        ask(&mut flows, 3);
+        flows.release(Flow(1), SizeClass::Large, Held::default());
+        assert_eq!(flows.next().map(|(flow, ..)| flow), Some(Flow(3)));
+    }
+
+    #[test]
+    fn a_flow_without_a_begun_batch_begins_one_beside_those_of_another() {
+        let mut flows = Flows::<u64>::new(2);
+        let begin = |flows: &mut Flows<u64>, flow| {
+            flows.enter(Flow(flow), Duration::ZERO);
+            flows.has_place(&flows.flows[&Flow(flow)], Job::Batch)
+        };
+        for _ in 0..2 {
+            assert!(begin(&mut flows, 1));
+            // Its worker is given up between two frames.
+            flows.serve(Flow(1), Job::Batch, SizeClass::Large);
+            flows.release(Flow(1), SizeClass::Large, Held::default());
+        }
+        assert!(!begin(&mut flows, 1), "its places are as many as workers");
+        assert!(begin(&mut flows, 2), "another has one of its own");
     }
 
     /// A request of `flow`, which waits.
     fn ask(flows: &mut Flows<u64>, flow: u64) {
-        let waiting = flows.enter(Flow(flow));
+        let waiting = flows.enter(Flow(flow), Duration::ZERO);
         waiting.requests.push_back((Job::Single, flow));
     }
 
     /// The flow that is served next. Its work takes a millisecond.
     fn served(flows: &mut Flows<u64>) -> u64 {
-        let (flow, _, pace, request) = flows.next().expect("a request waits");
-        flows.release(flow, pace, Duration::from_millis(1));
+        let (flow, _, class, request) = flows.next().expect("a request waits");
+        let time = Duration::from_millis(1);
+        let held = Held {
+            time,
+            longest: time,
+            ends: false,
+        };
+        flows.release(flow, class, held);
         request
     }
 
     #[test]
-    fn a_lane_with_one_request_is_not_overtaken_by_those_that_come_after_it() {
+    fn a_flow_with_one_request_is_not_overtaken_by_those_that_come_after_it() {
         for first in 0..20 {
             let mut flows = Flows::new(1);
             ask(&mut flows, first);

@@ -7,7 +7,8 @@
 //! ([`work_limit`] stops it between two frames). Work whose client has gone keeps its permits until it has ended.
 
 pub(crate) mod admission;
-pub(crate) mod byte_budget;
+pub(crate) mod budget;
+pub(crate) mod charged_bytes;
 mod cpu_time;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;

@@ -4,7 +4,13 @@ use super::flows::{Flow, Job};
 use super::work_limit::CpuSpent;
 use std::any::Any;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::sync::OwnedSemaphorePermit;
+
+/// Least processor time of decoding a picture, for each of its pixels and for each byte of its file. Most pictures take a
+/// few times as much: those that are surely slow are known before they begin.
+const NANOS_PER_PIXEL: u64 = 4;
+const NANOS_PER_BYTE: u64 = 8;
 
 /// What a request holds until its work has ended: its share of memory, its place in a quota.
 pub type Reservation = Box<dyn Any + Send + Sync>;
@@ -22,6 +28,7 @@ pub struct QueuePermit {
 pub struct Ticket {
     flow: Flow,
     length: Job,
+    expected: Duration,
     cpu_share: u32,
     spent: CpuSpent,
     _held: Arc<Reservation>,
@@ -33,6 +40,7 @@ impl Ticket {
         Self {
             flow,
             length: Job::Single,
+            expected: Duration::ZERO,
             cpu_share: 1,
             spent: CpuSpent::default(),
             _held: Arc::new(held),
@@ -49,9 +57,24 @@ impl QueuePermit {
         }
     }
 
-    /// Whose turn the request's work is done in, and how much work it is.
-    pub(super) fn turn(&self) -> (Flow, Job) {
-        (self.request.flow, self.request.length)
+    /// Whose turn the request's work is done in, how much work it is, and how long its longest part takes, as far as
+    /// that is known.
+    pub(super) fn turn(&self) -> (Flow, Job, Duration) {
+        let Ticket {
+            flow,
+            length,
+            expected,
+            ..
+        } = self.request;
+        (flow, length, expected)
+    }
+
+    /// For work on frames of at most so many pixels, whose files have at most so many bytes.
+    pub fn for_size(mut self, pixels: u64, bytes: usize) -> Self {
+        let nanos = pixels.saturating_mul(NANOS_PER_PIXEL);
+        let nanos = nanos.max((bytes as u64).saturating_mul(NANOS_PER_BYTE));
+        self.request.expected = Duration::from_nanos(nanos);
+        self
     }
 
     /// Whose turn the request's work is done in.

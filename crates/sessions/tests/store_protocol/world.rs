@@ -4,7 +4,7 @@ use crate::hostile::HostileStore;
 use crate::pictures::{FIRST, params, picture};
 use bagtrack_sessions::{
     ActError, Admission, Boxes, Clock, CreationKey, Estimates, Flow, FrameBatch, FramesError,
-    IdempotencyStore, Lease, MacKeys, OpenRequest, OpenStreams, Owner, QuotaExhausted, Registry,
+    IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Owner, Registry,
     ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
     Start, StreamPlace, TrackingMetrics,
 };
@@ -61,11 +61,11 @@ pub enum Answer {
 struct NoQuota;
 
 impl SessionQuota for NoQuota {
-    fn check(&self) -> Result<(), QuotaExhausted> {
+    fn check(&self) -> Result<(), OpenError> {
         Ok(())
     }
 
-    fn reserve(&self, _targets: usize) -> Result<Reservation, QuotaExhausted> {
+    fn reserve(&self, _targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {
         Ok(Box::new(()))
     }
 }

@@ -44,7 +44,8 @@ pub fn area_average_simd<S: Simd>(
     out: &mut Vec<u8>,
 ) {
     let is_whole = source.0.is_multiple_of(target.0);
-    let columns = cells(source.0, target.0);
+    let boundaries = boundaries(source.0, target.0);
+    let mut integrals = Integrals::default();
     let width = source.0 as usize;
     out.reserve_exact(target.0 as usize * target.1 as usize);
     // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
@@ -70,51 +71,100 @@ pub fn area_average_simd<S: Simd>(
             3 if is_whole => average_whole::<3>(&sums, source.1, out),
             4 if is_whole => average_whole::<4>(&sums, source.1, out),
             6 if is_whole => average_whole::<6>(&sums, source.1, out),
-            _ => average_row(&sums, &columns, source, target.0, out),
+            _ => integrals.average_row(&sums, &boundaries, source, out),
         }
     }
 }
 
-/// Appends the averages of one row of target pixels, from the sums of its source columns.
-#[inline(always)]
-fn average_row(sums: &[u32], cells: &[Cell], source: (u32, u32), target: u32, out: &mut Vec<u8>) {
-    let full = u64::from(source.0) * u64::from(source.1);
-    let inverse = 1.0 / full as f64;
-    out.extend(cells.iter().map(|cell| {
-        let whole = sums[cell.begin..cell.end].iter();
-        let whole: u64 = whole.map(|&sum| u64::from(sum)).sum();
-        let mut total = whole * u64::from(target);
-        total +=
-            u64::from(sums[cell.begin - usize::from(cell.before > 0)]) * u64::from(cell.before);
-        if cell.after > 0 {
-            total += u64::from(sums[cell.end]) * u64::from(cell.after);
-        }
-        quotient(total + full / 2, full, inverse) as u8
-    }));
+/// Where each target pixel begins, and where the last one ends: a source column, and how much of it lies before, in
+/// units of `1 / T`.
+fn boundaries(source: u32, target: u32) -> Vec<(u32, u32)> {
+    let (source, target) = (u64::from(source), u64::from(target));
+    (0..=target)
+        .map(|index| index * source)
+        .map(|at| ((at / target) as u32, (at % target) as u32))
+        .collect()
 }
 
-/// As [`average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
+/// Sums of a row from its beginning.
+#[derive(Default)]
+struct Integrals {
+    /// Up to each source column, and of that column.
+    of_columns: Vec<[u64; 2]>,
+    /// Up to each boundary of a target pixel, in units of `1 / T`.
+    of_boundaries: Vec<u64>,
+}
+
+impl Integrals {
+    /// Appends the averages of one row of target pixels, from the sums of its source columns. The loops have no
+    /// branches: how many columns a target pixel covers changes from one to the next.
+    #[inline(always)]
+    fn average_row(
+        &mut self,
+        sums: &[u32],
+        boundaries: &[(u32, u32)],
+        source: (u32, u32),
+        out: &mut Vec<u8>,
+    ) {
+        let target = boundaries.len() as u64 - 1;
+        let mut integral = 0;
+        self.of_columns.clear();
+        self.of_columns.extend(sums.iter().map(|&sum| {
+            let before = integral;
+            integral += u64::from(sum);
+            [before, u64::from(sum)]
+        }));
+        self.of_columns.push([integral, 0]);
+        self.of_boundaries.clear();
+        self.of_boundaries
+            .extend(boundaries.iter().map(|&(column, part)| {
+                let [before, sum] = self.of_columns[column as usize];
+                before * target + sum * u64::from(part)
+            }));
+        let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
+        let begins = self.of_boundaries.iter();
+        let cells = begins.zip(&self.of_boundaries[1..]);
+        out.extend(cells.map(|(begin, end)| divisor.rounded(end - begin)));
+    }
+}
+
+/// As [`Integrals::average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
 #[inline(always)]
 fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
-    let full = WIDTH as u32 * height;
-    let inverse = 1.0 / f64::from(full);
+    let divisor = Divisor::new(WIDTH as u64 * u64::from(height));
     let cells = sums.as_chunks::<WIDTH>().0;
-    out.extend(cells.iter().map(|cell| {
-        let value = cell.iter().sum::<u32>() + full / 2;
-        let near = (f64::from(value) * inverse) as i32 as u32;
-        let near = near - u32::from(near * full > value);
-        (near + u32::from((near + 1) * full <= value)) as u8
-    }));
+    out.extend(
+        cells
+            .iter()
+            .map(|cell| divisor.rounded(u64::from(cell.iter().sum::<u32>()))),
+    );
 }
 
-/// `value / divisor`, where `inverse` is 1 / `divisor` and the quotient is small. An integer division would take longer
-/// than everything else that is done for a target pixel.
-#[inline(always)]
-fn quotient(value: u64, divisor: u64, inverse: f64) -> u32 {
-    let near = (value as f64 * inverse) as u32;
-    // The product is off by far less than one, so the quotient is this or a neighbour.
-    let near = near - u32::from(u64::from(near) * divisor > value);
-    near + u32::from((u64::from(near) + 1) * divisor <= value)
+/// A divisor of many values that are at most 255 times as large. An integer division would take longer than everything
+/// else that is done for a target pixel, and one in floating point is not vectorised.
+struct Divisor {
+    divisor: u64,
+    /// 2^48 / `divisor`, rounded down: the product with a value stays below 2^56.
+    inverse: u64,
+}
+
+impl Divisor {
+    #[inline(always)]
+    fn new(divisor: u64) -> Self {
+        Self {
+            divisor,
+            inverse: (1 << 48) / divisor,
+        }
+    }
+
+    /// The nearest whole number to the quotient, the larger of two.
+    #[inline(always)]
+    fn rounded(&self, value: u64) -> u8 {
+        let value = value + self.divisor / 2;
+        // Off by less than one, as long as the divisor is below 2^40.
+        let near = (value * self.inverse) >> 48;
+        (near + u64::from((near + 1) * self.divisor <= value)) as u8
+    }
 }
 
 #[cfg(test)]

@@ -1,28 +1,28 @@
 //! All routes, and the layers that every request passes through.
 
-use crate::http::auth::layer::{authenticate, authenticate_metrics};
-use crate::http::auth::origin::check_origin;
-use crate::http::metrics::layer::count_request;
+use crate::http::extract::instance::{Instance, REQUEST_ID, remove_unusable_id};
 use crate::http::middleware::answer_problems::{answer_problems, panic_response};
-use crate::http::middleware::base_path::{client_path, mount};
+use crate::http::middleware::authenticate::{authenticate, authenticate_metrics};
+use crate::http::middleware::base_path::mount;
+use crate::http::middleware::check_origin::check_origin;
 use crate::http::middleware::client_identity::identify;
 use crate::http::middleware::cors::cors;
+use crate::http::middleware::count_requests::count_request;
 use crate::http::middleware::draining::mark_draining;
 use crate::http::middleware::lingering_close::drain_refused;
-use crate::http::middleware::request_id::{REQUEST_ID, remove_unusable_id};
 use crate::http::middleware::request_log::log_request;
 use crate::http::middleware::security_headers::secure;
 use crate::http::middleware::single_host::one_host;
-use crate::http::openapi::routes;
 use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
 #[cfg(feature = "tls")]
 use crate::http::resources::https_only::to_https;
+use crate::http::resources::routes;
 use crate::http::state::AppState;
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, Request};
+use axum::extract::DefaultBodyLimit;
 use axum::http::header::CACHE_CONTROL;
 use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware;
@@ -38,7 +38,7 @@ pub fn router(state: AppState, extra: Router) -> Router {
     let routes = routes(&state)
         .with_state(state.clone())
         .merge(extra)
-        .fallback(async |request: Request| Problem::no_route(&client_path(&request)))
+        .fallback(async |instance: Instance| Problem::no_route(&instance.path))
         .method_not_allowed_fallback(async || Problem::method_not_allowed());
     mount(&state.config.base_path, with_layers(routes, &state))
 }
@@ -84,7 +84,10 @@ fn routes(state: &AppState) -> Router<AppState> {
     let with_metrics_key = middleware::from_fn_with_state(state.clone(), authenticate_metrics);
     let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
-    let document = docs::document(&state.config.base_path);
+    let document = docs::document(match state.config.base_path.as_str() {
+        "" => routes::document(),
+        path => routes::document_at(path),
+    });
     let (sessions, _) = routes::sessions().split_for_parts();
     let (metrics, _) = routes::metrics().split_for_parts();
     let (version, _) = routes::version().split_for_parts();

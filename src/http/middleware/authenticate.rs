@@ -3,8 +3,8 @@
 //! A page cannot set that header where it opens a stream. There a session token may stand among the protocols that it
 //! offers (`Sec-WebSocket-Protocol`). An API key may not: it has no business in a page.
 
-use super::caller::Caller;
-use super::token;
+use crate::http::auth::caller::Caller;
+use crate::http::auth::token;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;

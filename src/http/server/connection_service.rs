@@ -1,12 +1,12 @@
 //! What a connection goes through from when it is accepted to its end.
 
-use super::connection_hold::ConnectionHold;
-use super::connection_io::ConnectionIo;
-use super::handshake::{Begun, Security, Transport};
 use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
+use crate::http::net::connection_hold::ConnectionHold;
+use crate::http::net::connection_io::ConnectionIo;
+use crate::http::net::handshake::{Begun, Security, Transport};
 use crate::http::quotas::client::Peer;
 #[cfg(feature = "tls")]
-use crate::http::router::https_only;
+use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};

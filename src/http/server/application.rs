@@ -4,23 +4,23 @@
 //! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a
 //! bounded time to end.
 
-#[cfg(feature = "tls")]
-use super::certificate::{Certificate, CertificateError};
-use super::connection_hold::ConnectionHold;
 use super::connection_service::ConnectionService;
-use super::connections::{Connections, NoRoom};
-use super::handshake::Security;
 use super::refusal;
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::service::Config;
+use crate::http::config::settings::ConfigError;
 use crate::http::config::store;
-use crate::http::config::validation::ConfigError;
 use crate::http::middleware::forwarded::is_trusted;
+#[cfg(feature = "tls")]
+use crate::http::net::certificate::{Certificate, CertificateError};
+use crate::http::net::connection_hold::ConnectionHold;
+use crate::http::net::connections::{Connections, NoRoom};
+use crate::http::net::handshake::Security;
 use crate::http::problems::problem::Problem;
 #[cfg(fuzzing)]
 use crate::http::quotas::client::Peer;
-use crate::http::router::router;
+use crate::http::server::router::router;
 use crate::http::state::AppState;
 #[cfg(fuzzing)]
 use axum::Extension;

@@ -1,22 +1,26 @@
-//! A request to open a session, as it is read.
+//! `POST /sessions` and `PUT /sessions/{id}`: a first frame and a box, or a snapshot, open a session.
 
 use crate::http::auth::caller::Caller;
-use crate::http::extract::admit::admit;
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{ExactInput, ExactText, FrameCount, Seed, Settings};
-use crate::http::extract::switch::Switch;
+use crate::http::extract::settings::Switch;
+use crate::http::extract::settings::{FrameCount, Seed, Settings};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
+use crate::http::extract::uploaded::admit;
 use crate::http::openapi::params_schema::ParametersText;
+use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
+use crate::http::openapi::{example_frames, param_limits};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::{Account, ClientSessions};
-use crate::http::respond::target_box::{BoxInput, BoxText, TargetBox};
-use crate::http::respond::target_boxes::{BoxesInput, BoxesText, TargetBoxes, boxes_of};
+use crate::http::respond::created_session::{CreatedSession, created};
+use crate::http::respond::target_box::{BoxText, TargetBox};
+use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
 use crate::http::state::AppState;
-use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
+use axum::response::Response;
 use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde::Deserialize;
 use serde_json::json;
@@ -27,26 +31,23 @@ use uuid::Uuid;
 const DIGEST_FORMAT: u8 = 1;
 
 /// The settings of a new session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams, utoipa::ToSchema)]
+#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct CreateSettings {
     /// The target's box: `x,y,width,height`, or a JSON object with these names. In the query or in the
     /// body; that of the body counts.
     #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    #[schema(value_type = BoxInput, inline, required = false)]
     pub r#box: Option<TargetBox>,
     /// In place of `box`, the boxes of several targets, at most 16: `x,y,width,height;x,y,width,height`, or a JSON
     /// array of boxes. Then answers have an array `targets`, in this order.
-    #[param(value_type = BoxesText, inline, required = false)]
-    #[schema(value_type = BoxesInput, inline, required = false)]
+    #[param(value_type = TargetBoxes, inline, required = false)]
     pub boxes: Option<TargetBoxes>,
     /// `robust` (the default) or `paper`.
     #[param(nullable = false)]
     pub preset: Option<PresetName>,
     /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = ExactText, inline, required = false)]
-    #[schema(value_type = ExactInput, inline, required = false)]
+    #[param(value_type = Seed, inline, required = false)]
     pub seed: Option<Seed>,
     /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
     /// together; see the call.
@@ -55,7 +56,6 @@ pub struct CreateSettings {
     pub params: Option<ParamOverrides>,
     /// Whether the answer names the tracker's parameters.
     #[param(value_type = bool, required = false, default = false)]
-    #[schema(value_type = bool, required = false, default = false)]
     #[serde(default)]
     pub verbose: Switch,
 }
@@ -63,6 +63,71 @@ pub struct CreateSettings {
 impl Settings for CreateSettings {
     const FRAMES: FrameCount = FrameCount::One;
     const SCHEMA_PREFIX: &'static str = "Create";
+}
+
+type CreateForm = FormBody<CreateSettings>;
+type CreateJson = JsonBody<CreateSettings>;
+
+/// Open a session
+#[utoipa::path(
+    post, path = "/sessions", tag = "sessions", operation_id = "createSession",
+    description = param_limits::create_description(),
+    params(
+        CreateSettings,
+        (
+            "Idempotency-Key" = Option<String>, Header, nullable = false, min_length = 1, max_length = 255,
+            pattern = "^[!-~]+$",
+            description = "A text of your own, a new one for each session: the same request with the same key gets \
+                the same answer as long as the session lives, and opens no second one."
+        )
+    ),
+    request_body(
+        description = "The first frame as a raw body (JPEG, PNG or WebP), as a form, or as JSON with base64; or a snapshot.",
+        content(
+            (BinaryBody = "application/octet-stream"),
+            (CreateForm = "multipart/form-data"),
+            (
+                CreateJson = "application/json",
+                example = json!({
+                    "frame": example_frames::first(),
+                    "box": {"x": 10, "y": 20, "width": 30, "height": 40},
+                    "seed": 7
+                })
+            ),
+            (BinaryBody = "application/vnd.bagtrack.snapshot"),
+        )
+    ),
+    responses(
+        (
+            status = 201, description = "The session is open", body = CreatedSession,
+            headers(
+                ("Location" = String, description = "The session's path"),
+                ("Replayed" = bool, description = "`true` where this answer was given before")
+            )
+        )
+    )
+)]
+pub async fn create(
+    State(state): State<AppState>,
+    request: CreateRequest,
+) -> Result<Response, Problem> {
+    let is_verbose = request.is_verbose();
+    let opened = state.service.open(request.into_act()?).await?;
+    Ok(created(&opened, is_verbose))
+}
+
+/// Open a session under an id of your own
+///
+/// Takes what `POST /sessions` takes. Make a random UUID, a new one for each session. The same request gets the same
+/// answer as long as the session lives, so it can be sent again; another request for the same id answers
+/// `session-exists`. Every request for the session has the id in its path, this one too, so a load balancer can route
+/// by a hash of the path.
+#[utoipa::path(
+    put, path = "/sessions/{id}", tag = "sessions", operation_id = "putSession",
+    params(("id" = Uuid, Path, description = "The id that the session gets: a UUID"), CreateSettings),
+)]
+pub async fn put(state: State<AppState>, request: CreateRequest) -> Result<Response, Problem> {
+    create(state, request).await
 }
 
 /// A request to open a session, with its place in the queue.

@@ -1,18 +1,11 @@
 //! The routes that are in the OpenAPI document, and what the document says of the service as a whole.
 
+use super::{
+    bag_picture, correction, frames, health, metrics, open, session, snapshot, token, track,
+    version,
+};
+use crate::http::openapi::document;
 use crate::http::problems::document::ProblemDocument;
-use crate::http::resources::bag_picture;
-use crate::http::resources::correction;
-use crate::http::resources::create;
-use crate::http::resources::create_named;
-use crate::http::resources::frames;
-use crate::http::resources::health;
-use crate::http::resources::metrics;
-use crate::http::resources::session;
-use crate::http::resources::snapshot;
-use crate::http::resources::token;
-use crate::http::resources::track;
-use crate::http::resources::version;
 use crate::http::state::AppState;
 use crate::http::stream::handshake;
 use utoipa::OpenApi;
@@ -63,8 +56,8 @@ impl utoipa::Modify for Bearer {
 /// The routes of sessions, with what the document says about them.
 pub fn sessions() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
-        .routes(routes!(create::create))
-        .routes(routes!(session::get, session::delete, create_named::put))
+        .routes(routes!(open::create))
+        .routes(routes!(session::get, session::delete, open::put))
         .routes(routes!(frames::post))
         .routes(routes!(correction::put))
         .routes(routes!(snapshot::get))
@@ -91,12 +84,17 @@ pub fn probes() -> OpenApiRouter<AppState> {
         .routes(routes!(health::ready))
 }
 
-/// What the handlers say; the document has more.
-pub fn handlers() -> utoipa::openapi::OpenApi {
-    OpenApiRouter::with_openapi(Api::openapi())
+/// The OpenAPI document as JSON, of a service at the root of its host.
+pub fn document() -> String {
+    document_at("/")
+}
+
+/// The OpenAPI document of a service at this path.
+pub fn document_at(base_path: &str) -> String {
+    let handlers = OpenApiRouter::with_openapi(Api::openapi())
         .merge(sessions())
         .merge(version())
         .merge(metrics())
-        .merge(probes())
-        .into_openapi()
+        .merge(probes());
+    document::document(&handlers.into_openapi(), base_path)
 }

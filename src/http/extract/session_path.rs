@@ -35,7 +35,11 @@ impl SessionPath {
     /// The caller's live session of this id. Text that is not an id is the id of no session.
     pub async fn find(&self, state: &AppState) -> Result<Arc<Session>, Problem> {
         let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
-        Ok(state.service.find(self.id()?, owner, flow).await?)
+        let session = state.service.find(self.id()?, owner, flow).await?;
+        match self.caller.may_use(session.name()) {
+            true => Ok(session),
+            false => Err(Problem::session_not_found()),
+        }
     }
 
     /// The same, with its last answer up to the store's.
@@ -48,13 +52,14 @@ impl SessionPath {
 
     /// Ends the session.
     pub async fn end(&self, state: &AppState) -> Result<(), Problem> {
+        self.find(state).await?;
         let (owner, flow) = (self.caller.owner(), state.flow(&self.client));
         Ok(state.service.end(self.id()?, owner, flow).await?)
     }
 
     fn id(&self) -> Result<Uuid, Problem> {
         let id = self.id.parse().ok();
-        let id = id.filter(|id| self.caller.may_use(*id));
+        let id = id.filter(|id| self.caller.may_ask_for(*id));
         id.ok_or_else(Problem::session_not_found)
     }
 }

@@ -1,15 +1,19 @@
 //! What all handlers share.
+//!
+//! In: the settings, the keys, the clock and the store. Out: an [`AppState`], whose clones are the same.
+
+mod saturation;
 
 use crate::http::auth::access::Access;
 use crate::http::config::service::Config;
 use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
-use crate::http::resources::saturation::Saturation;
 use bagtrack_sessions::{
-    Admission, ByteBudget, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
+    Admission, ByteBudget, ByteCharge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
     ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
+use saturation::Saturation;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -63,6 +67,7 @@ impl AppState {
         store: Option<Arc<dyn SessionStore>>,
     ) -> io::Result<Self> {
         let metrics = Metrics::new();
+        let clients = Clients::new(&config, store.is_some());
         let service = SessionService::new(ServiceParts {
             settings: settings(&config),
             registry: registry(&config, &clock, store.is_some()),
@@ -77,8 +82,8 @@ impl AppState {
         });
         Ok(Self(Arc::new(Shared {
             service,
-            uploads: ByteBudget::new(config.max_upload_bytes),
-            clients: Clients::new(&config),
+            uploads: clients.all().upload_bytes.clone(),
+            clients,
             access,
             metrics,
             // A client has one at a time, and no client all of them.
@@ -100,9 +105,60 @@ impl AppState {
         self.clock.wall(self.clock.now())
     }
 
+    /// Memory for a client's upload or answer: none so far.
+    pub fn charge(&self, client: &Client) -> ByteCharge {
+        ByteCharge::new(&self.uploads, self.clients.account(client).bytes())
+    }
+
     /// In whose turn the work of a client is done.
     pub fn flow(&self, client: &Client) -> Flow {
         self.clients.account(client).flow()
+    }
+
+    /// Sets the metrics that are values of a moment.
+    pub fn measure(&self) {
+        let (config, admission) = (&self.config, &self.service.admission);
+        let queued = config.queue.saturating_sub(admission.queue_places());
+        let workers = config.worker_count();
+        let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
+        let is_draining = usize::from(self.is_draining());
+        for (name, description, value) in [
+            ("bagtrack_sessions", "Sessions in memory.", sessions),
+            (
+                "bagtrack_sessions_max",
+                "Most sessions there may be.",
+                config.max_sessions,
+            ),
+            (
+                "bagtrack_requests_inside",
+                "Requests with a place in the queue.",
+                queued,
+            ),
+            (
+                "bagtrack_workers_busy",
+                "Workers at work.",
+                busy.min(workers),
+            ),
+            ("bagtrack_workers", "Workers.", workers),
+            (
+                "bagtrack_draining",
+                "1 while the service is about to end.",
+                is_draining,
+            ),
+        ] {
+            self.metrics.set(name, description, value as f64);
+        }
+        if let Some(memory) = memory_stats::memory_stats() {
+            let (name, bytes) = ("process_resident_memory_bytes", memory.physical_mem as f64);
+            self.metrics
+                .set(name, "Resident memory of the process.", bytes);
+        }
+        if let Some(store) = &self.service.store {
+            let (name, is_up) = ("bagtrack_store_up", f64::from(u8::from(store.is_ready())));
+            self.metrics
+                .set(name, "1 while the store answers and takes writes.", is_up);
+            self.metrics.store_failures(store.failures());
+        }
     }
 
     /// When the session expires, in RFC 3339.

@@ -3,7 +3,7 @@
 //! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
 //! origin is checked, too. So is the [host](super::hosts).
 
-use super::hosts::AllowedHosts;
+use crate::http::auth::hosts::AllowedHosts;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;

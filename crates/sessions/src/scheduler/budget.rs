@@ -1,0 +1,226 @@
+//! What clients may hold together of something, and each client of it: bytes, places.
+//!
+//! A client may hold no more than is free (a dynamic threshold: Choudhury, Hahne 1998), and no more than its own maximum.
+//! So each further client finds half of what those before it left, and no number of greedy ones takes all. The networks
+//! that a client is in may hold no more than is free either, so that many addresses of one network are no many shares.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Something of which so many may be held at the same time. Clones are the same budget.
+#[derive(Debug, Clone)]
+pub struct Budget(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    most: usize,
+    held: AtomicUsize,
+    /// Those of the networks that a client is in.
+    networks: Vec<Budget>,
+}
+
+/// Which budget has too little left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Full {
+    /// That of all clients: it is used up, or this client holds as much as is free.
+    #[error("the bytes of all uploads together are used up")]
+    All,
+    /// The client's own.
+    #[error("the client's bytes are used up")]
+    Client,
+}
+
+impl Budget {
+    /// So many.
+    pub fn new(most: usize) -> Self {
+        Self::of_client(most, Vec::new())
+    }
+
+    /// That of a client in these networks.
+    pub fn of_client(most: usize, networks: Vec<Self>) -> Self {
+        Self(Arc::new(Inner {
+            most,
+            held: AtomicUsize::new(0),
+            networks,
+        }))
+    }
+
+    /// How many are left.
+    pub fn left(&self) -> usize {
+        self.0.most.saturating_sub(self.held())
+    }
+
+    /// How many are held.
+    pub fn held(&self) -> usize {
+        self.0.held.load(Ordering::Acquire)
+    }
+
+    /// Takes so many until the returned value is dropped; none if there are too few left.
+    pub(crate) fn hold(&self, count: usize) -> Option<Charge> {
+        let mut charge = Charge::new(self, &Self::new(usize::MAX));
+        charge.grow(count).ok()?;
+        Some(charge)
+    }
+
+    /// Takes so many, where no more than `limit` are held then.
+    fn take(&self, count: usize, limit: usize) -> bool {
+        let limit = limit.min(self.0.most);
+        let more = |held: usize| held.checked_add(count).filter(|held| *held <= limit);
+        let held = &self.0.held;
+        count == 0
+            || held
+                .fetch_update(Ordering::AcqRel, Ordering::Acquire, more)
+                .is_ok()
+    }
+
+    fn give_back(&self, count: usize) {
+        self.0.held.fetch_sub(count, Ordering::AcqRel);
+    }
+}
+
+/// What a client holds, of its own budget and of that of all clients. Given back when this is dropped.
+#[derive(Debug)]
+pub struct Charge {
+    all: Budget,
+    client: Budget,
+    count: usize,
+}
+
+impl Charge {
+    /// Nothing yet, of the budgets of all clients and of this one.
+    pub fn new(all: &Budget, client: &Budget) -> Self {
+        Self {
+            all: all.clone(),
+            client: client.clone(),
+            count: 0,
+        }
+    }
+
+    /// Takes so many more.
+    ///
+    /// # Errors
+    /// One of the budgets has too few left. Nothing was taken.
+    pub fn grow(&mut self, count: usize) -> Result<(), Full> {
+        let (client, free) = (&self.client.0, self.all.left());
+        if count > client.most.saturating_sub(self.client.held()) {
+            return Err(Full::Client);
+        }
+        // Whoever is alone may have what is left over.
+        let is_alone = self.all.held() <= self.client.held();
+        let limit = if is_alone { usize::MAX } else { free };
+        // A network has at least what one client may have.
+        let networks = client.networks.iter();
+        let levels = networks.map(|network| (network, free.max(client.most)));
+        let levels = levels.chain([(&self.client, limit), (&self.all, usize::MAX)]);
+        let mut taken: Vec<&Budget> = Vec::new();
+        for (budget, limit) in levels {
+            if !budget.take(count, limit) {
+                taken.iter().for_each(|taken| taken.give_back(count));
+                return Err(Full::All);
+            }
+            taken.push(budget);
+        }
+        self.count += count;
+        Ok(())
+    }
+
+    /// Gives some back, down to so many.
+    pub fn shrink(&mut self, count: usize) {
+        let less = self.count.saturating_sub(count);
+        self.count -= less;
+        let networks = self.client.0.networks.iter();
+        let budgets = networks.chain([&self.client, &self.all]);
+        budgets.for_each(|budget| budget.give_back(less));
+    }
+}
+
+impl Drop for Charge {
+    fn drop(&mut self) {
+        self.shrink(0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_charge_grows_until_a_budget_is_used_up_and_gives_all_back() {
+        let (all, client) = (Budget::new(4096), Budget::new(3000));
+        let mut charge = Charge::new(&all, &client);
+        charge.grow(10).unwrap();
+        charge.grow(2000).unwrap();
+        assert_eq!((all.left(), client.left()), (2086, 990));
+        assert_eq!(charge.grow(2000), Err(Full::Client));
+        let other = Budget::new(9000);
+        let mut second = Charge::new(&all, &other);
+        assert_eq!(second.grow(2087), Err(Full::All));
+        assert_eq!(other.left(), 9000, "nothing was charged");
+        second.grow(2086).unwrap();
+        second.shrink(1000);
+        assert_eq!((all.left(), other.left()), (1086, 8000));
+        drop((charge, second));
+        assert_eq!((all.left(), client.left()), (4096, 3000));
+    }
+
+    #[test]
+    fn greedy_clients_leave_half_of_what_is_free_to_the_next() {
+        let all = Budget::new(512);
+        let greedy = || {
+            let client = Budget::new(128);
+            let mut charge = Charge::new(&all, &client);
+            while charge.grow(1).is_ok() {}
+            charge
+        };
+        let charges: Vec<Charge> = (0..6).map(|_| greedy()).collect();
+        let held: Vec<usize> = charges.iter().map(|charge| charge.count).collect();
+        assert_eq!(held, [128, 128, 128, 64, 32, 16]);
+        drop(charges);
+        assert_eq!(all.left(), 512);
+    }
+
+    #[test]
+    fn the_clients_of_one_network_hold_no_more_than_is_free_together() {
+        let (all, network) = (Budget::new(512), Budget::new(usize::MAX));
+        let clients: Vec<Budget> = (0..16)
+            .map(|_| Budget::of_client(128, vec![network.clone()]))
+            .collect();
+        let mut charges: Vec<Charge> = Vec::new();
+        for client in &clients {
+            let mut charge = Charge::new(&all, client);
+            while charge.grow(1).is_ok() {}
+            charges.push(charge);
+        }
+        assert!(network.held() <= 256, "{network:?}");
+        let mut other = Charge::new(&all, &Budget::new(128));
+        assert_eq!(other.grow(128), Ok(()));
+    }
+
+    proptest! {
+        #[test]
+        fn no_sequence_of_charges_goes_over_a_budget_or_keeps_anything(
+            steps in prop::collection::vec((0..5_usize, 0..3_usize, 0..300_usize), 0..200)
+        ) {
+            let (all, network) = (Budget::new(1000), Budget::new(usize::MAX));
+            let clients: Vec<Budget> = (0..5)
+                .map(|_| Budget::of_client(250, vec![network.clone()]))
+                .collect();
+            let mut charges: Vec<Charge> = clients.iter().map(|client| Charge::new(&all, client)).collect();
+            for (who, what, count) in steps {
+                match what {
+                    0 => drop(charges[who].grow(count)),
+                    1 => charges[who].shrink(count),
+                    _ => charges[who] = Charge::new(&all, &clients[who]),
+                }
+                let held: usize = charges.iter().map(|charge| charge.count).sum();
+                prop_assert_eq!(all.held(), held);
+                prop_assert_eq!(network.held(), held);
+                prop_assert!(held <= 1000);
+                prop_assert!(clients.iter().all(|client| client.held() <= 250));
+            }
+            drop(charges);
+            prop_assert_eq!(all.held(), 0);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The system's limits of memory against what the service says that it takes at most.
+
+use std::fs;
+use std::path::Path;
+
+/// Where Linux tells of control groups.
+const GROUPS: &str = "/sys/fs/cgroup";
+
+/// Says that the service may be ended for want of memory, where a limit lies below its own bound of so many bytes. Then
+/// all sessions would be lost.
+pub fn check(bound: u64) {
+    for (name, limit) in [
+        ("address space (ulimit -v)", address_space()),
+        ("the control group", control_group()),
+    ] {
+        if let Some(limit) = limit.filter(|limit| *limit < bound) {
+            tracing::warn!(
+                limit = limit >> 20,
+                bound = bound >> 20,
+                "the limit of {name} is below what the service may take, in MiB: it may be ended, with all sessions; \
+                 lower --max-upload-bytes, --max-sessions, --max-frame-memory or --workers"
+            );
+        }
+    }
+}
+
+#[cfg(unix)]
+fn address_space() -> Option<u64> {
+    use rustix::process::{Resource, getrlimit};
+    getrlimit(Resource::As).current
+}
+
+#[cfg(not(unix))]
+fn address_space() -> Option<u64> {
+    None
+}
+
+/// The least limit of the process's control groups and of those above them.
+fn control_group() -> Option<u64> {
+    let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
+    let limits = groups.lines().filter_map(|line| {
+        let (_, rest) = line.split_once(':')?;
+        let (controllers, path) = rest.split_once(':')?;
+        let (root, file) = match controllers {
+            "" => (GROUPS.to_owned(), "memory.max"),
+            _ if controllers.split(',').any(|name| name == "memory") => {
+                (format!("{GROUPS}/memory"), "memory.limit_in_bytes")
+            }
+            _ => return None,
+        };
+        let group = Path::new(&root).join(path.trim_start_matches('/'));
+        // In a container the path may be that outside of it.
+        let groups = group
+            .ancestors()
+            .take_while(|group| group.starts_with(&root));
+        let limits = groups.filter_map(|group| {
+            let text = fs::read_to_string(group.join(file)).ok()?;
+            text.trim().parse::<u64>().ok()
+        });
+        limits.min()
+    });
+    limits.min()
+}

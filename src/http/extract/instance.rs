@@ -1,0 +1,86 @@
+//! What names a request to its client: the path, as the client knows it, and the id.
+//!
+//! The id is the client's `x-request-id` where it can be used, so that a trace can be followed through several services,
+//! else a new one.
+
+use crate::http::problems::document::ProblemDocument;
+use crate::http::problems::kind::Kind;
+use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
+use axum::extract::{FromRequestParts, Request};
+use axum::http::header::HeaderName;
+use axum::http::request::Parts;
+use axum::http::{Extensions, Uri};
+use std::convert::Infallible;
+use tower_http::request_id::RequestId;
+
+/// The header of request ids.
+pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+const MAX_ID_BYTES: usize = 64;
+
+/// The path of a request with the base path, where a layer has taken that off.
+#[derive(Debug, Clone)]
+pub struct ClientPath(pub String);
+
+/// The path and the id of a request that has passed the layers.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// The path, as the client knows it.
+    pub path: String,
+    /// The id.
+    pub request_id: String,
+}
+
+impl Instance {
+    /// Of this request.
+    pub fn of(request: &Request) -> Self {
+        Self::from_head(request.extensions(), request.uri())
+    }
+
+    fn from_head(extensions: &Extensions, uri: &Uri) -> Self {
+        let known = extensions.get::<ClientPath>();
+        let id = extensions.get::<RequestId>();
+        let id = id.and_then(|id| id.header_value().to_str().ok());
+        Self {
+            path: known.map_or_else(|| uri.path().to_owned(), |path| path.0.clone()),
+            request_id: id.unwrap_or_default().to_owned(),
+        }
+    }
+
+    /// The document of a problem with the request, which is counted, and written to the log with its cause.
+    pub fn report(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
+        state.metrics.problem(problem.kind());
+        let (kind, cause) = (problem.kind().slug(), problem.cause());
+        let cause = cause.as_deref().unwrap_or("none");
+        match problem.kind() {
+            Kind::Internal => tracing::error!(kind, cause, "problem"),
+            _ => tracing::info!(kind, cause, "problem"),
+        }
+        let (path, id) = (self.path.clone(), self.request_id.clone());
+        ProblemDocument::new(problem, state.config.base_path.as_str(), path, id)
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Instance {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Infallible> {
+        Ok(Self::from_head(&parts.extensions, &parts.uri))
+    }
+}
+
+/// Middleware that removes an id that is too long or has other characters than ids need: ids are logged and sent back.
+pub async fn remove_unusable_id(mut request: Request) -> Request {
+    let is_usable = |id: &[u8]| {
+        let is_allowed = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_.:".contains(byte);
+        (1..=MAX_ID_BYTES).contains(&id.len()) && id.iter().all(is_allowed)
+    };
+    let headers = request.headers_mut();
+    if headers
+        .get(REQUEST_ID)
+        .is_some_and(|id| !is_usable(id.as_bytes()))
+    {
+        headers.remove(REQUEST_ID);
+    }
+    request
+}

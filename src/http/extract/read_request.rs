@@ -1,0 +1,45 @@
+//! A request to look at a session's state, on a worker.
+
+use super::session_path::SessionPath;
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::state::AppState;
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use bagtrack_sessions::{ByteCharge, QueuePermit, SessionPermit};
+
+/// A request to look at a session's state, with its permits.
+#[derive(Debug)]
+pub struct ReadRequest<Q> {
+    /// The settings, read first.
+    pub query: Q,
+    /// The permit of the session.
+    pub permit: SessionPermit,
+    /// The place in the queue.
+    pub queue: QueuePermit,
+    /// Pays for the answer; nothing so far.
+    pub charge: ByteCharge,
+}
+
+impl<Q: FromRequestParts<AppState, Rejection = Problem> + Send> FromRequestParts<AppState>
+    for ReadRequest<Q>
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, Problem> {
+        let query = Q::from_request_parts(parts, state).await?;
+        let path = SessionPath::from_request_parts(parts, state).await?;
+        let session = path.find(state).await?;
+        let admission = &state.service.admission;
+        admission.check_place()?;
+        let client = Client::of(parts);
+        let request = state.clients.account(&client).request()?;
+        let queue = admission.enter(request.flow(), Box::new(request))?;
+        Ok(Self {
+            query,
+            permit: session.read_permit()?,
+            queue,
+            charge: state.charge(&client),
+        })
+    }
+}

@@ -1,0 +1,157 @@
+//! The frames of a post that are answered by lines, or of a video.
+//!
+//! What one request may take holds for all frames together: pixels, processor time, and the time until the last is
+//! tracked. A video has the processor time of as many requests as its frames would be posted in, and no end but that of
+//! its frames.
+
+use super::frames::FramesRequest;
+use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::{VideoPlace, count_frame};
+use crate::http::problems::problem::Problem;
+use crate::http::quotas::client::Client;
+use crate::http::respond::answer::StreamAnswer;
+use crate::http::respond::ndjson::{self, FrameSequence};
+use crate::http::state::AppState;
+use axum::body::Bytes;
+use axum::response::Response;
+use bagtrack_ingest::video::VideoFormat;
+use bagtrack_sessions::{
+    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
+    check_readable_pixels,
+};
+use std::vec::IntoIter;
+use tokio::time::{Instant, timeout_at};
+
+/// Answers the frames by lines.
+///
+/// # Errors
+/// Their pixels are more than those of one request may; or the problem of the first frame.
+pub async fn respond(state: AppState, mut request: FramesRequest) -> Result<Response, Problem> {
+    let deadline = Instant::now() + state.config.work_timeout;
+    let limits = state.service.request_limits();
+    let files = std::mem::take(&mut request.upload.files);
+    let check = move |_: &mut WorkMeter| {
+        check_readable_pixels(&files, &limits)?;
+        Ok(files)
+    };
+    let checked = state
+        .service
+        .run::<_, Problem, _>(request.queue.clone(), check);
+    let source = FrameSource::Files(checked.await?.into_iter(), deadline);
+    respond_to(state, request, source).await
+}
+
+/// Answers the pictures of the only file by lines.
+///
+/// # Errors
+/// There is no place for it, or no program; or the problem of the first picture.
+pub async fn respond_to_video(
+    state: AppState,
+    mut request: FramesRequest,
+    format: VideoFormat,
+) -> Result<Response, Problem> {
+    let video = request.upload.files.swap_remove(0);
+    let place;
+    (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place)?);
+    respond_to(state, request, source).await
+}
+
+async fn respond_to(
+    state: AppState,
+    request: FramesRequest,
+    source: FrameSource,
+) -> Result<Response, Problem> {
+    let session = request.permit.session().clone();
+    let number = request.number();
+    if number.is_some() {
+        // What is compared with the number must be the newest.
+        let flow = request.queue.flow();
+        state.service.refresh(&session, None, flow).await?;
+    }
+    let frames = SessionFrames {
+        state: state.clone(),
+        queue: request.queue.for_frames(session.target_count()),
+        permit: request.permit,
+        client: request.client,
+        source,
+        number,
+    };
+    ndjson::respond(state, request.instance, frames).await
+}
+
+/// Where frames come from.
+#[derive(Debug)]
+enum FrameSource {
+    /// Files of the request, and when the last has to be tracked.
+    Files(IntoIter<Bytes>, Instant),
+    /// A video.
+    Video(VideoFrames),
+}
+
+/// Frames of a session that are tracked one after the other.
+#[derive(Debug)]
+struct SessionFrames {
+    state: AppState,
+    permit: SessionPermit,
+    queue: QueuePermit,
+    client: Client,
+    source: FrameSource,
+    /// The number of the next frame, where it is known.
+    number: Option<u64>,
+}
+
+impl FrameSequence for SessionFrames {
+    type Answer = StreamAnswer;
+
+    async fn next(&mut self) -> Option<Result<StreamAnswer, Problem>> {
+        let file = match &mut self.source {
+            FrameSource::Files(files, deadline) => {
+                let (file, deadline) = (files.next()?, *deadline);
+                let tracked = timeout_at(deadline, self.answer(file)).await;
+                return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
+            }
+            FrameSource::Video(video) => video.next().await?,
+        };
+        Some(match file {
+            Ok(file) => self.answer(file).await,
+            Err(problem) => Err(problem),
+        })
+    }
+}
+
+impl SessionFrames {
+    async fn answer(&mut self, file: Bytes) -> Result<StreamAnswer, Problem> {
+        if let Some(number) = self.number
+            && number <= self.permit.session().latest_frame()
+        {
+            return self.stored_answer(number, &file).await;
+        }
+        if matches!(self.source, FrameSource::Video(_)) {
+            count_frame(&self.state, &self.client).await?;
+        }
+        let mut next = FrameBatch::posted(self.number, vec![file], None);
+        // So that the request can be sent again when its line breaks.
+        next.min_answers = self.state.config.max_frames;
+        let (service, queue) = (&self.state.service, self.queue.clone());
+        let tracked = service.advance(self.permit.share(), queue, next).await?;
+        let estimates = &tracked.estimates[0];
+        // No other request may come between two frames of this one.
+        self.number = Some(estimates.first().frame + 1);
+        let is_draining = self.state.is_draining();
+        let answer = StreamAnswer::new(estimates, 0, tracked.replayed, is_draining);
+        Ok(answer.with_checkpoint(tracked.checkpoint))
+    }
+
+    /// The answer to a frame that was answered before.
+    async fn stored_answer(&mut self, number: u64, file: &Bytes) -> Result<StreamAnswer, Problem> {
+        let print = Fingerprint::of(file);
+        let read = move |state: &SessionState| Ok(state.stored_answer(number, print)?);
+        let (service, permit) = (&self.state.service, self.permit.share());
+        let read = service.read::<_, Problem, _>(permit, self.queue.clone(), read);
+        let estimates = read.await?;
+        self.number = Some(number + 1);
+        let answer = StreamAnswer::new(&estimates, 0, true, self.state.is_draining());
+        Ok(answer.with_checkpoint(self.permit.session().checkpoint()))
+    }
+}
