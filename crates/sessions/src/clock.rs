@@ -18,7 +18,7 @@ pub fn now() -> Instant {
 
 /// The time of day.
 #[allow(clippy::disallowed_methods)]
-fn wall_now() -> SystemTime {
+pub(crate) fn wall_now() -> SystemTime {
     SystemTime::now()
 }
 

@@ -59,7 +59,7 @@ pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
-pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
+pub use scheduler::admission::{Admission, QueueFull, WorkPanicked, threads_of};
 pub use scheduler::budget::{Budget, Charge, Full as BytesFull};
 pub use scheduler::charged_bytes::ChargedBytes;
 pub use scheduler::fair_queue::WorkerSlot;
@@ -78,6 +78,7 @@ pub use store::{
     SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
     reconcile,
 };
+pub use store::{Counted, StoreShare};
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,

@@ -42,6 +42,11 @@ impl LeastRate {
         }
     }
 
+    /// None of the time is used up.
+    pub fn reset(&mut self) {
+        (self.left, self.since) = (self.most, None);
+    }
+
     /// So many bytes went over.
     pub fn moved(&mut self, bytes: usize) {
         self.pause();

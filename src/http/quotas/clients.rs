@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BytesFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
-    SessionQuota, TooManySessions,
+    SessionQuota, StoreShare, TooManySessions,
 };
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
@@ -79,6 +79,7 @@ pub struct Clients {
 /// What one client has in use.
 #[derive(Debug)]
 pub struct Account {
+    client: Client,
     flow: Flow,
     quotas: Quotas,
     all: Holdings,
@@ -138,12 +139,19 @@ impl Clients {
             return account.clone();
         }
         if accounts.len() >= MAX_IDLE_ACCOUNTS {
-            accounts.retain(|_, account| Arc::strong_count(account) > 1);
+            accounts
+                .retain(|_, account| Arc::strong_count(account) > 1 || !account.held.is_empty());
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
         let networks = client.networks().map(|network| self.network(network));
         let networks: Vec<Arc<Holdings>> = networks.collect();
-        let account = Arc::new(Account::new(flow, self.quotas, self.all.clone(), networks));
+        let account = Arc::new(Account::new(
+            client.clone(),
+            flow,
+            self.quotas,
+            self.all.clone(),
+            networks,
+        ));
         accounts.insert(client.clone(), account.clone());
         account
     }
@@ -199,7 +207,13 @@ impl Clients {
 }
 
 impl Account {
-    fn new(flow: Flow, quotas: Quotas, all: Holdings, networks: Vec<Arc<Holdings>>) -> Self {
+    fn new(
+        client: Client,
+        flow: Flow,
+        quotas: Quotas,
+        all: Holdings,
+        networks: Vec<Arc<Holdings>>,
+    ) -> Self {
         let held = quotas.holdings(&networks);
         let frames = quotas.frames.map(|(rate, burst)| {
             let quota = Quota::per_second(rate).allow_burst(burst);
@@ -207,6 +221,7 @@ impl Account {
         });
         let permits = |count: usize| Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)));
         Self {
+            client,
             flow,
             quotas,
             all,
@@ -295,6 +310,15 @@ impl SessionQuota for ClientSessions {
                 .0
                 .refusal(BytesFull::Client, "sessions", self.0.quotas.sessions)),
             _ => Ok(()),
+        }
+    }
+
+    fn store_share(&self) -> StoreShare {
+        let Account { quotas, client, .. } = &*self.0;
+        StoreShare {
+            client: client.to_string(),
+            max_places: quotas.sessions,
+            max_bytes: quotas.session_bytes,
         }
     }
 

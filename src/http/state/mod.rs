@@ -87,7 +87,7 @@ impl AppState {
             access,
             metrics,
             // A client has one at a time, and no client all of them.
-            videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
+            videos: Arc::new(Semaphore::new(config.video_places())),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
             clock,
@@ -122,6 +122,9 @@ impl AppState {
         let workers = config.worker_count();
         let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
         let is_draining = usize::from(self.is_draining());
+        let videos = config
+            .video_places()
+            .saturating_sub(self.videos.available_permits());
         for (name, description, value) in [
             ("bagtrack_sessions", "Sessions in memory.", sessions),
             (
@@ -141,6 +144,12 @@ impl AppState {
             ),
             ("bagtrack_workers", "Workers.", workers),
             (
+                "bagtrack_upload_bytes",
+                "Bytes of bodies that have come, and of answers that are not taken.",
+                self.uploads.held(),
+            ),
+            ("bagtrack_videos", "Videos that are decoded.", videos),
+            (
                 "bagtrack_draining",
                 "1 while the service is about to end.",
                 is_draining,
@@ -157,6 +166,9 @@ impl AppState {
             let (name, is_up) = ("bagtrack_store_up", f64::from(u8::from(store.is_ready())));
             self.metrics
                 .set(name, "1 while the store answers and takes writes.", is_up);
+            let (name, is_full) = ("bagtrack_store_full", f64::from(u8::from(store.is_full())));
+            let description = "1 after the store took no new session for want of room.";
+            self.metrics.set(name, description, is_full);
             self.metrics.store_failures(store.failures());
         }
     }

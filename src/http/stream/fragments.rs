@@ -63,6 +63,8 @@ struct Frame {
 pub struct Rates {
     /// Least bytes a second.
     pub bytes: LeastRate,
+    /// The time of a message, which no bytes pay back.
+    pub message: LeastRate,
     /// Most frames a second, of all streams of the client.
     pub messages: Arc<MessageRate>,
 }
@@ -84,6 +86,8 @@ pub struct Fragments<S> {
     messages: Arc<MessageRate>,
     retry: Pin<Box<Sleep>>,
     rate: LeastRate,
+    /// The whole time of a message.
+    deadline: LeastRate,
     /// Whether a message has begun.
     is_within: bool,
     is_heard: bool,
@@ -105,6 +109,7 @@ impl<S> Fragments<S> {
             messages: rates.messages,
             retry: Box::pin(sleep_until(clock::now())),
             rate: rates.bytes,
+            deadline: rates.message,
             is_within: false,
             is_heard: false,
         }
@@ -123,6 +128,7 @@ impl<S> Fragments<S> {
 
     /// Nothing is read for a while, which is not the client's fault.
     pub fn pause(&mut self) {
+        self.deadline.pause();
         self.rate.pause();
     }
 
@@ -139,7 +145,7 @@ impl<S> Fragments<S> {
         let Err(early) = self.messages.check() else {
             return Poll::Ready(());
         };
-        self.rate.pause();
+        self.pause();
         let wait = early.wait_time_from(DefaultClock::default().now());
         self.retry
             .as_mut()
@@ -185,6 +191,9 @@ impl<S> Fragments<S> {
         self.head.extend(frame.mask.into_iter().flatten());
         self.fragment_left = length;
         if is_data {
+            if !self.is_within {
+                self.deadline.reset();
+            }
             self.is_within = !is_last || frame.first & FINAL == 0;
         }
         // What follows goes on with the message.
@@ -227,13 +236,17 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
             Poll::Ready(read) => {
                 read?;
                 self.rate.moved(buffer.filled().len());
+                self.deadline.pause();
                 self.input.extend_from_slice(buffer.filled());
                 self.is_heard |= !buffer.filled().is_empty();
                 Poll::Ready(Ok(!buffer.filled().is_empty()))
             }
             Poll::Pending if self.is_message_begun() => {
-                ready!(self.rate.poll_late(cx));
-                Poll::Ready(Err(io::Error::other(MessageTooSlow)))
+                let is_late = self.rate.poll_late(cx).is_ready();
+                match self.deadline.poll_late(cx).is_ready() || is_late {
+                    true => Poll::Ready(Err(io::Error::other(MessageTooSlow))),
+                    false => Poll::Pending,
+                }
             }
             Poll::Pending => Poll::Pending,
         }

@@ -144,6 +144,7 @@ fn rates(state: &AppState, account: &Account) -> Rates {
     let config = &state.config;
     Rates {
         bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+        message: LeastRate::new(config.body_timeout, u32::MAX),
         messages: account.messages(),
     }
 }

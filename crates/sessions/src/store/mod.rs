@@ -29,4 +29,6 @@ mod session_store;
 pub use self::redis::{AddressError, RedisStore, StoreAddress};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
-pub use session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+pub use session_store::{
+    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
+};
