@@ -243,13 +243,17 @@ impl ConfigError {
     }
 }
 
-/// Makes a struct of settings from a table with a row for each: its text, `name: type = default`, and its range.
+/// Makes a struct of settings from a table with a row for each: its text, `name: type = default`, and its range. What is
+/// set `by_code` has no flag; what is `flattened` is a table of its own.
 macro_rules! settings {
     (
         $(#[$of_struct:meta])*
         pub struct $struct:ident {
             $($(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr $(, $range:expr)? $(, as $shown:literal)?;)*
         }
+        $(by_code {
+            $($(#[doc = $code_doc:literal])* $code:ident: $code_type:ty;)*
+        })?
         $(flattened {
             $($(#[doc = $part_doc:literal])* $(#[cfg($part_cfg:meta)])? $part:ident: $part_type:ty;)*
         })?
@@ -258,6 +262,7 @@ macro_rules! settings {
         #[derive(Debug, Clone)]
         pub struct $struct {
             $($(#[doc = $doc])* pub $name: $type,)*
+            $($($(#[doc = $code_doc])* pub $code: $code_type,)*)?
             $($($(#[doc = $part_doc])* $(#[cfg($part_cfg)])? pub $part: $part_type,)*)?
         }
 
@@ -266,6 +271,7 @@ macro_rules! settings {
             fn default() -> Self {
                 Self {
                     $($name: $default,)*
+                    $($($code: Default::default(),)*)?
                     $($($(#[cfg($part_cfg)])? $part: <$part_type>::default(),)*)?
                 }
             }
@@ -300,6 +306,7 @@ macro_rules! settings {
                 use $crate::http::config::settings::Setting;
                 Ok(Self {
                     $($name: Setting::take(matches, stringify!($name)),)*
+                    $($($code: Default::default(),)*)?
                     $($($(#[cfg($part_cfg)])? $part: <$part_type>::from_arg_matches_mut(matches)?,)*)?
                 })
             }

@@ -49,8 +49,8 @@ pub struct Upload<S> {
 
 impl<S: Settings> Upload<S> {
     /// Reads the body, then takes a place in the queue; `texts` are the settings of the query, where the body has none of
-    /// their names. JSON is parsed on a worker. The place holds `permit` until the request's work has
-    /// ended, and the files their memory.
+    /// their names. JSON is parsed on a worker. The place holds `permit` until the request's work has ended, and the files
+    /// their memory.
     ///
     /// # Errors
     /// The body cannot be read, it has too few or too many frames, a setting is wrong, the queue is full, or the client
@@ -61,39 +61,17 @@ impl<S: Settings> Upload<S> {
         texts: Texts,
         request: Request,
     ) -> Result<(Self, QueuePermit), Problem> {
-        let max_bytes = state.config.max_body_bytes;
-        let new_charge = || Charge::new(&state.uploads, permit.bytes());
-        let mut charge = new_charge();
         let max_files = match S::FRAMES {
             FrameCount::One => 1,
             FrameCount::Several => state.config.max_frames,
         };
         let media_type = media_type(&request);
-        let mut fields = Fields {
-            files: Vec::new(),
-            snapshot: None,
-            texts: Texts::default(),
-        };
-        let mut json = None;
-        if media_type == "multipart/form-data" {
-            // The parser keeps bytes that it has not given out yet; they are charged beside the files.
-            let arriving = Some(new_charge());
-            let request = request.map(|body| paced(body, &state.config, arriving));
-            multipart::read::<S>(request, max_bytes, max_files, &mut fields, &mut charge).await?;
-        } else {
-            let body = request.into_body();
-            let bytes = body::read(body, &state.config, &mut charge).await?;
-            // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
-            let is_labelled = media_type == "application/json";
-            if let Some(text) = json::text_of(&bytes, is_labelled) {
-                charge.grow(json::DECODED_PER_BYTE * text.len())?;
-                json = Some(bytes.slice_ref(text));
-            } else if media_type == FORM_URLENCODED && is_stripped(&bytes) {
-                return Err(Problem::new(Kind::FrameDamaged, STRIPPED));
-            } else if !bytes.is_empty() {
-                fields.files.push(bytes);
-            }
-        }
+        let body = Arrived::read::<S>(state, &permit, request, &media_type, max_files);
+        let Arrived {
+            mut fields,
+            json,
+            charge,
+        } = body.await?;
         let (flow, permit) = (permit.flow(), Arc::new(permit));
         let held = Box::new(permit.clone());
         let queue = state.service.admission.enter(flow, held)?;
@@ -134,8 +112,55 @@ impl<S: Settings> Upload<S> {
     }
 }
 
+/// A body that has arrived.
+struct Arrived {
+    fields: Fields,
+    /// Its text, where it is JSON, which is still to be parsed.
+    json: Option<Bytes>,
+    /// Pays for all of it.
+    charge: Charge,
+}
+
+impl Arrived {
+    async fn read<S: Settings>(
+        state: &AppState,
+        permit: &RequestPermit,
+        request: Request,
+        media_type: &str,
+        max_files: usize,
+    ) -> Result<Self, Problem> {
+        let new_charge = || Charge::new(&state.uploads, permit.bytes());
+        let (mut charge, mut fields, mut json) = (new_charge(), Fields::default(), None);
+        if media_type == "multipart/form-data" {
+            // The parser keeps bytes that it has not given out yet; they are charged beside the files.
+            let arriving = Some(new_charge());
+            let request = request.map(|body| paced(body, &state.config, arriving));
+            let max_bytes = state.config.max_body_bytes;
+            multipart::read::<S>(request, max_bytes, max_files, &mut fields, &mut charge).await?;
+        } else {
+            let body = request.into_body();
+            let bytes = body::read(body, &state.config, &mut charge).await?;
+            // Labels are often wrong: those of curl's -d, and of generated clients that send a file.
+            let is_labelled = media_type == "application/json";
+            if let Some(text) = json::text_of(&bytes, is_labelled) {
+                charge.grow(json::DECODED_PER_BYTE * text.len())?;
+                json = Some(bytes.slice_ref(text));
+            } else if media_type == FORM_URLENCODED && is_stripped(&bytes) {
+                return Err(Problem::new(Kind::FrameDamaged, STRIPPED));
+            } else if !bytes.is_empty() {
+                fields.files.push(bytes);
+            }
+        }
+        Ok(Self {
+            fields,
+            json,
+            charge,
+        })
+    }
+}
+
 /// The files of a body, and the texts of its settings.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Fields {
     /// The files, in order.
     pub(super) files: Vec<Bytes>,

@@ -9,5 +9,4 @@
 //! What can go wrong: nobody asks for `/metrics`, and measurements pile up. So the sweeper sums them up from time to
 //! time ([`Metrics::upkeep`](registry::Metrics::upkeep)).
 
-mod maker;
 pub mod registry;

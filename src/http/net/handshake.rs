@@ -1,7 +1,7 @@
 //! From an accepted connection to one over which HTTP is spoken: with TLS, its handshake.
 //!
 //! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It is served, too: by
-//! [routes](crate::http::resources::https_only) that tell it the right address.
+//! [routes](crate::http::server::router::https_only) that tell it the right address.
 
 use std::io;
 use tokio::net::TcpStream;

@@ -8,8 +8,6 @@ pub mod correction;
 mod frame_lines;
 pub mod frames;
 pub mod health;
-#[cfg(feature = "tls")]
-pub mod https_only;
 pub mod metrics;
 pub mod open;
 pub mod routes;

@@ -17,15 +17,19 @@ use crate::http::page::docs;
 use crate::http::page::sample_clips;
 use crate::http::page::static_files;
 use crate::http::problems::problem::Problem;
-#[cfg(feature = "tls")]
-use crate::http::resources::https_only::to_https;
 use crate::http::resources::routes;
 use crate::http::state::AppState;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
+#[cfg(feature = "tls")]
+use axum::extract::Request;
 use axum::http::header::CACHE_CONTROL;
 use axum::http::{HeaderMap, HeaderValue};
+#[cfg(feature = "tls")]
+use axum::http::{Method, header::HOST};
 use axum::middleware;
+#[cfg(feature = "tls")]
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
@@ -112,4 +116,22 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route_layer(from_origin)
         .merge(metrics.route_layer(with_metrics_key))
         .merge(probes)
+}
+
+/// Sends those who read to the same path over TLS. Others have sent what they want done, perhaps with their key, over a
+/// line that anybody can read: they are told so, and nothing is done.
+#[cfg(feature = "tls")]
+async fn to_https(request: Request) -> Response {
+    let host = request.headers().get(HOST);
+    let host = host.and_then(|host| host.to_str().ok());
+    let path = request.uri().path_and_query();
+    let path = path.map_or("/", |path| path.as_str());
+    match (request.method(), host) {
+        // It may be another service that listens here tomorrow: a browser is not to remember this.
+        (&Method::GET | &Method::HEAD, Some(host)) if !host.is_empty() => {
+            Redirect::temporary(&format!("https://{host}{path}")).into_response()
+        }
+        _ => Problem::malformed("The service speaks TLS: its address begins with https.")
+            .into_response(),
+    }
 }

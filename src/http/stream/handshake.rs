@@ -7,15 +7,17 @@ use super::upgrade::Upgrade;
 use super::waiting::Waiting;
 use crate::http::auth::caller::Caller;
 use crate::http::extract::instance::Instance;
+use crate::http::extract::query::QuerySettings;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::extract::settings::Switch;
 use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::net::least_rate::LeastRate;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
+use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
-use axum::extract::{FromRequestParts, Query, Request, State};
-use axum::http::Uri;
+use axum::extract::{FromRequestParts, State};
+use axum::http::request::Parts;
 use axum::response::Response;
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
 use serde::Deserialize;
@@ -67,58 +69,84 @@ pub struct StreamSettings {
     ),
     responses((status = 101, description = "The stream is open"))
 )]
-pub async fn open(State(state): State<AppState>, request: Request) -> Result<Response, Problem> {
-    let instance = Instance::of(&request);
-    let (mut parts, _) = request.into_parts();
-    let settings = settings(&parts.uri)?;
-    let path = SessionPath::from_request_parts(&mut parts, &state).await?;
-    let session = path.find(&state).await?;
-    let upgrade = Upgrade::of(&mut parts).await?;
-    let connection = parts.extensions.get::<ConnectionHold>().cloned();
-    let connection = connection.ok_or_else(|| {
-        let error = io::Error::other("the service does not know the connection of a request");
-        Problem::internal(Arc::new(error))
-    })?;
-    let caller = Caller::from_request_parts(&mut parts, &state).await?;
-    let client = Client::of(&parts);
-    let account = state.clients.account(&client);
+pub async fn open(
+    State(state): State<AppState>,
+    request: StreamRequest,
+) -> Result<Response, Problem> {
+    let (session, settings) = (&request.session, request.settings);
+    let account = state.clients.account(&request.client);
     let permit = account.stream()?;
     // The stream before this one tracks no further frame.
     let place = Arc::new(state.service.streams.take(session.id()));
-    let stand = stand(&state, &session, account.flow(), &place, settings.from).await?;
-    let newest_wins = settings.drop.0;
-    let max_bytes = max_message_bytes(&state, &session);
+    let stand = stand(&state, session, account.flow(), &place, settings.from).await?;
+    let (max_bytes, rates) = (max_message_bytes(&state, session), rates(&state, &account));
     let budgets = [state.uploads.clone(), account.bytes().clone()];
-    let config = &state.config;
-    let rates = Rates {
-        bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
-        message: LeastRate::new(config.body_timeout, u32::MAX),
-        messages: account.messages(),
-    };
     let stream = SessionStream {
+        connection: request.connection,
+        permit,
+        stand,
+        instance: request.instance,
         work: Arc::new(FrameWork {
-            state,
-            caller,
+            caller: request.caller,
             account,
             session: session.id(),
             place,
-            waiting: Mutex::new(Waiting::new(newest_wins)),
-            newest_wins,
+            waiting: Mutex::new(Waiting::new(settings.drop.0)),
+            newest_wins: settings.drop.0,
+            state,
         }),
-        connection,
-        permit,
-        stand,
-        instance,
     };
     let span = tracing::Span::current();
     let serve = move |socket| stream.run(socket).instrument(span);
-    Ok(upgrade.answer(max_bytes, budgets, rates, serve))
+    Ok(request.upgrade.answer(max_bytes, budgets, rates, serve))
 }
 
-fn settings(uri: &Uri) -> Result<StreamSettings, Problem> {
-    let Query(settings) = Query::try_from_uri(uri)
-        .map_err(|error| Problem::malformed(format!("The query cannot be read: {error}.")))?;
-    Ok(settings)
+/// A request to open a stream.
+pub struct StreamRequest {
+    instance: Instance,
+    settings: StreamSettings,
+    session: Arc<Session>,
+    upgrade: Upgrade,
+    /// The connection that it takes over.
+    connection: ConnectionHold,
+    caller: Caller,
+    client: Client,
+}
+
+impl FromRequestParts<AppState> for StreamRequest {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, Problem> {
+        let Ok(instance) = Instance::from_request_parts(parts, state).await;
+        let QuerySettings(settings) = QuerySettings::from_request_parts(parts, state).await?;
+        let path = SessionPath::from_request_parts(parts, state).await?;
+        let session = path.find(state).await?;
+        let upgrade = Upgrade::of(parts).await?;
+        let connection = parts.extensions.get::<ConnectionHold>().cloned();
+        let connection = connection.ok_or_else(|| {
+            let error = io::Error::other("the service does not know the connection of a request");
+            Problem::internal(Arc::new(error))
+        })?;
+        Ok(Self {
+            instance,
+            settings,
+            session,
+            upgrade,
+            connection,
+            caller: Caller::from_request_parts(parts, state).await?,
+            client: Client::of(parts),
+        })
+    }
+}
+
+/// How slowly a client may send.
+fn rates(state: &AppState, account: &Account) -> Rates {
+    let config = &state.config;
+    Rates {
+        bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+        message: LeastRate::new(config.body_timeout, u32::MAX),
+        messages: account.messages(),
+    }
 }
 
 /// Most bytes of a message: of one frame.

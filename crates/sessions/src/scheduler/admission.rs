@@ -185,6 +185,21 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_free_place_goes_to_the_request_that_waited_longest() {
+        let admission = Admission::new(1, 1).unwrap();
+        let taken = enter(&admission).unwrap();
+        let mut first = Box::pin(admission.enter_in_order(Flow(0), Box::new(())));
+        let mut second = Box::pin(admission.enter_in_order(Flow(1), Box::new(())));
+        assert!(futures_util::poll!(&mut first).is_pending());
+        assert!(futures_util::poll!(&mut second).is_pending());
+        drop(taken);
+        assert_eq!(enter(&admission).unwrap_err(), QueueFull, "others wait");
+        assert!(futures_util::poll!(&mut second).is_pending());
+        drop(first.await);
+        assert_eq!(second.await.flow(), Flow(1));
+    }
+
+    #[tokio::test]
     async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
         let admission = Admission::new(1, 1).unwrap();
         let (started_tx, started) = mpsc::channel();
