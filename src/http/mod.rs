@@ -20,6 +20,8 @@
 //! # }
 //! ```
 
+#![warn(clippy::disallowed_methods)]
+
 mod auth;
 mod config;
 mod extract;

@@ -7,11 +7,11 @@ use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
+use bagtrack_sessions::clock::timeout;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 use tokio::sync::mpsc;
-use tokio::time::timeout;
 
 /// Decoded pictures that wait to be tracked.
 const MAX_WAITING: usize = 2;

@@ -8,6 +8,7 @@ use super::holdings::Holdings;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BytesFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
     SessionQuota, StoreShare, TooManySessions,
@@ -21,7 +22,6 @@ use std::collections::HashMap;
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// The header with what is left of a client's quotas.
@@ -91,6 +91,8 @@ pub struct Account {
     videos: Arc<Semaphore>,
     messages: Arc<MessageRate>,
     frames: Option<FrameRate>,
+    /// Whose frame is counted next, where several wait for it.
+    next_frame: tokio::sync::Mutex<()>,
     /// Frames that were left at some moment.
     frames_left: Mutex<(u32, Instant)>,
 }
@@ -232,9 +234,10 @@ impl Account {
                 Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
             )),
             frames,
+            next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((
                 quotas.frames.map_or(0, |(_, burst)| burst.get()),
-                Instant::now(),
+                clock::now(),
             )),
         }
     }
@@ -255,6 +258,15 @@ impl Account {
             account: self.clone(),
             _permit: permit.map_err(refused)?,
         })
+    }
+
+    /// The same, but waits for a place, in order of arrival.
+    pub async fn request_in_order(self: &Arc<Self>) -> RequestPermit {
+        let permit = self.requests.clone().acquire_owned().await;
+        RequestPermit {
+            account: self.clone(),
+            _permit: permit.expect("the places are never closed"),
+        }
     }
 
     /// Takes a place for a stream.
@@ -362,7 +374,7 @@ impl Account {
             .frames_left
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        *noted = (left, Instant::now());
+        *noted = (left, clock::now());
     }
 
     /// Frames that are left now: those that were, and those that have come back since.
@@ -375,6 +387,26 @@ impl Account {
         let back = at.elapsed().as_secs_f64() * f64::from(rate.get());
         // The cast stops at the greatest value.
         left.saturating_add(back as u32).min(burst.get())
+    }
+
+    /// Waits until one frame more may be counted, in order of arrival.
+    ///
+    /// # Errors
+    /// None may until `deadline`.
+    pub async fn count_frame_in_order(&self, deadline: Instant) -> Result<(), Problem> {
+        let turn = timeout_at(deadline, self.next_frame.lock()).await;
+        loop {
+            let problem = match self.count_frames(1) {
+                Ok(()) => return Ok(()),
+                Err(problem) => problem,
+            };
+            let wait = problem.wait().unwrap_or_default();
+            let again = clock::now() + wait;
+            if turn.is_err() || again > deadline {
+                return Err(problem);
+            }
+            sleep_until(again).await;
+        }
     }
 
     /// Counts frames of the client.

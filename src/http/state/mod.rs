@@ -10,7 +10,7 @@ use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
 use bagtrack_sessions::{
-    Admission, ByteBudget, ByteCharge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
+    Admission, Budget, Charge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
     ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
 use saturation::Saturation;
@@ -32,7 +32,7 @@ pub struct Shared {
     /// The one door to sessions.
     pub service: SessionService,
     /// The memory of all uploads together.
-    pub uploads: ByteBudget,
+    pub uploads: Budget,
     /// What each client has in use.
     pub clients: Clients,
     /// Keys and secrets.
@@ -106,8 +106,8 @@ impl AppState {
     }
 
     /// Memory for a client's upload or answer: none so far.
-    pub fn charge(&self, client: &Client) -> ByteCharge {
-        ByteCharge::new(&self.uploads, self.clients.account(client).bytes())
+    pub fn charge(&self, client: &Client) -> Charge {
+        Charge::new(&self.uploads, self.clients.account(client).bytes())
     }
 
     /// In whose turn the work of a client is done.

@@ -10,7 +10,8 @@
 use crate::http::net::least_rate::LeastRate;
 use crate::http::quotas::clients::MessageRate;
 use arrayvec::ArrayVec;
-use bagtrack_sessions::{ByteBudget, ByteCharge, BytesFull};
+use bagtrack_sessions::clock::{self, Sleep, sleep_until};
+use bagtrack_sessions::{Budget, BytesFull, Charge};
 use bytes::{Buf, BytesMut};
 use governor::clock::{Clock, DefaultClock};
 use std::future::poll_fn;
@@ -21,7 +22,6 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::coop::poll_proceed;
-use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
 const FRAGMENT: usize = 16 << 10;
@@ -79,9 +79,9 @@ pub struct Fragments<S> {
     /// The head of the next fragment, and the bytes of it that follow.
     head: ArrayVec<u8, 8>,
     fragment_left: usize,
-    budgets: [ByteBudget; 2],
+    budgets: [Budget; 2],
     /// The memory of the message that arrives.
-    charge: ByteCharge,
+    charge: Charge,
     /// How many frames the client may send.
     messages: Arc<MessageRate>,
     retry: Pin<Box<Sleep>>,
@@ -96,8 +96,8 @@ pub struct Fragments<S> {
 impl<S> Fragments<S> {
     /// For a connection from which `read` was read already. Messages are charged to the budgets of all clients and of
     /// this one, and come at these rates.
-    pub fn new(stream: S, read: &[u8], budgets: [ByteBudget; 2], rates: Rates) -> Self {
-        let charge = ByteCharge::new(&budgets[0], &budgets[1]);
+    pub fn new(stream: S, read: &[u8], budgets: [Budget; 2], rates: Rates) -> Self {
+        let charge = Charge::new(&budgets[0], &budgets[1]);
         Self {
             stream,
             input: BytesMut::from(read),
@@ -107,7 +107,7 @@ impl<S> Fragments<S> {
             budgets,
             charge,
             messages: rates.messages,
-            retry: Box::pin(sleep_until(Instant::now())),
+            retry: Box::pin(sleep_until(clock::now())),
             rate: rates.bytes,
             deadline: rates.message,
             is_within: false,
@@ -116,8 +116,8 @@ impl<S> Fragments<S> {
     }
 
     /// The charge of the message that has just been read.
-    pub fn take_charge(&mut self) -> ByteCharge {
-        let next = ByteCharge::new(&self.budgets[0], &self.budgets[1]);
+    pub fn take_charge(&mut self) -> Charge {
+        let next = Charge::new(&self.budgets[0], &self.budgets[1]);
         std::mem::replace(&mut self.charge, next)
     }
 
@@ -149,7 +149,7 @@ impl<S> Fragments<S> {
         let wait = early.wait_time_from(DefaultClock::default().now());
         self.retry
             .as_mut()
-            .reset(Instant::now() + wait.max(LEAST_WAIT));
+            .reset(clock::now() + wait.max(LEAST_WAIT));
         let _ = self.retry.as_mut().poll(cx);
         Poll::Pending
     }
@@ -272,7 +272,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
         if self.rate.poll_late(cx).is_ready() {
             return Poll::Ready(io::Error::other(full));
         }
-        self.retry.as_mut().reset(Instant::now() + RETRY);
+        self.retry.as_mut().reset(clock::now() + RETRY);
         let _ = self.retry.as_mut().poll(cx);
         Poll::Pending
     }

@@ -6,8 +6,7 @@ use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
 use crate::streams::StreamPlace;
 use crate::{
-    ByteCharge, Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError,
-    WorkMeter,
+    Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError, WorkMeter,
 };
 use bagtrack_ingest::{Inspected, Limits};
 use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
@@ -29,8 +28,6 @@ pub struct FrameBatch {
     pub with_diagnostics: bool,
     /// The stream that they came over. It tells their order, and tracks none after a newer one has taken its place.
     pub stream: Option<Arc<StreamPlace>>,
-    /// The memory of the files, where the place in the queue does not hold it.
-    pub charge: Option<Arc<ByteCharge>>,
 }
 
 /// The box of a target, given by the user.

@@ -4,6 +4,7 @@ use super::error::{OpenError, QuotaExhausted};
 use super::idempotency::CreationKey;
 use super::service::SessionService;
 use super::start::Start;
+use crate::clock::timeout;
 use crate::store::{Counted, Outcome, Record, SessionName, StoreShare, Version};
 use crate::{
     ActError, NewSession, Owner, QueuePermit, Reservation, Session, SessionState, Stopped,
@@ -11,7 +12,6 @@ use crate::{
 };
 use std::fmt::Debug;
 use std::sync::Arc;
-use tokio::time::timeout;
 use uuid::Uuid;
 
 /// How many sessions a client may have.

@@ -7,12 +7,12 @@ use super::super::session_store::{
 use super::address::StoreAddress;
 use super::connection::{Call, Connection};
 use super::scripts::Scripts;
+use crate::clock::{sleep, wall_now};
 use crate::owner::Owner;
 use redis::{FromRedisValue, Script, ScriptInvocation};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::{Duration, SystemTime};
-use tokio::time::sleep;
 use uuid::Uuid;
 
 /// How long an idempotency key names its session.
@@ -292,7 +292,7 @@ impl SessionStore for RedisStore {
 
 /// Milliseconds since 1970.
 fn now() -> u64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    let since = wall_now().duration_since(SystemTime::UNIX_EPOCH);
     milliseconds(since.unwrap_or_default())
 }
 
