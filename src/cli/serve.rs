@@ -58,6 +58,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         work = mib(bound.work),
         sessions = mib(bound.sessions),
         connections = mib(bound.connections),
+        store = mib(bound.store),
         "resident memory stays below {} MiB",
         mib(bound.total())
     );

@@ -22,6 +22,9 @@ pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 #[cfg(feature = "tls")]
 const TLS_CONNECTION: u64 = MAX_UNSENT_BYTES as u64 + (64 << 10) + (32 << 10);
 
+/// What a store in a folder keeps: what is on its way to tables, and blocks that were read.
+const FILE_STORE: u64 = 128 << 20;
+
 /// Bytes that the parts of the service take at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBound {
@@ -33,6 +36,8 @@ pub struct MemoryBound {
     pub sessions: u64,
     /// Buffers of connections.
     pub connections: u64,
+    /// The store in a folder, where there is one.
+    pub store: u64,
 }
 
 impl MemoryBound {
@@ -53,12 +58,17 @@ impl MemoryBound {
                 * (2 * (worker + WORKER) + 3 * (images + count(MAX_LIST_BYTES))),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * connection(config),
+            store: if config.store.is_in_folder() {
+                FILE_STORE
+            } else {
+                0
+            },
         }
     }
 
     /// All parts together, with the program itself.
     pub fn total(&self) -> u64 {
-        PROGRAM + self.uploads + self.work + self.sessions + self.connections
+        PROGRAM + self.uploads + self.work + self.sessions + self.connections + self.store
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
-use super::address::StoreAddress;
+use super::address::RedisAddress;
 use super::connection::{Call, Connection};
 use super::scripts::Scripts;
 use crate::owner::Owner;
@@ -81,7 +81,7 @@ impl RedisStore {
     /// # Errors
     /// The address cannot be used.
     pub async fn connect(
-        address: StoreAddress,
+        address: RedisAddress,
         prefix: &str,
         timeout: Duration,
     ) -> Result<Self, StoreUnavailable> {
