@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 seconds=${1:?how many seconds for each target}
 shift
 targets=("$@")
-[ "${#targets[@]}" -gt 0 ] || targets=(decode multipart json snapshot session)
+[ "${#targets[@]}" -gt 0 ] || targets=(decode shares multipart json snapshot session)
 
 # The threads of the service live as long as the process, and what they keep is no leak. The soak looks for leaks.
 export ASAN_OPTIONS=detect_leaks=0

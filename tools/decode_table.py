@@ -3,11 +3,12 @@
 
     tools/decode_table.py [VIDEO_FRAME.jpg]
 
-Needs cargo and python3 with cv2 (opencv-python), and for the feature `turbo` a C compiler, cmake and nasm. The frame, or else a drawn one, is scaled to four sizes and written
-as JPEG of quality 85, 4:2:0. bagtrack decodes each, in colour and strictly, to the working image of a target that has a
+Needs cargo and python3 with cv2 (opencv-python), and for the feature `turbo` a C compiler, cmake and nasm. The frame,
+or else a drawn one, is scaled to four sizes and written as JPEG of quality 85, 4:2:0. bagtrack decodes each, in colour and strictly, to the working image of a target that has a
 sixth of the frame's width and height, and of one of 24 x 24 pixels, without and with the feature `turbo`. OpenCV decodes
-it in colour with the greatest reduction (2, 4 or 8) that leaves at least that size, and area-averages the rest. Printed: medians in milliseconds, one thread; each file is decoded by all in turn,
-several times over, and a ratio is the median of those of the turns.
+it in colour with the greatest reduction (2, 4 or 8) that leaves at least that size, and area-averages the rest. Printed:
+medians of processor time in milliseconds, one thread; each file is decoded by all in turn, several times over, and a
+ratio is the median of those of the turns.
 """
 
 import json
@@ -51,11 +52,11 @@ def opencv_ms(data, width, working):
     factor = max(f for f in REDUCED if f == 1 or width / f >= working[0])
     times = []
     for _ in range(ROUNDS):
-        start = time.perf_counter()
+        start = time.thread_time()
         decoded = cv2.imdecode(data, REDUCED[factor])
         if decoded.shape[1] > working[0]:
             cv2.resize(decoded, working, interpolation=cv2.INTER_AREA)
-        times.append(time.perf_counter() - start)
+        times.append(time.thread_time() - start)
     return statistics.median(times) * 1e3, factor
 
 

@@ -2,15 +2,18 @@
 
 import { BoxDrawing } from "./box.js";
 import { Camera, openCamera } from "./camera.js";
-import { Chart, showVotes } from "./chart.js";
+import { showVotes } from "./chart.js";
 import { SampleClip } from "./clip.js";
 import { openFile } from "./file.js";
 import { Client, LocalClient, Problem } from "./js/bagtrack.js";
+import { ObjectList } from "./list.js";
+import { MOST_OBJECTS } from "./objects.js";
 import { words } from "./problems.js";
 import { encodes, extension, makeVideo } from "./recording.js";
 import { Run } from "./run.js";
-import { asCsv, asJson, save } from "./save.js";
+import { FORMATS, save } from "./save.js";
 import { Stage } from "./stage.js";
+import { Timeline } from "./timeline.js";
 
 /**
  * @template {HTMLElement} T
@@ -21,7 +24,7 @@ const get = (id) => /** @type {T} */ (document.getElementById(id));
 
 const picture = /** @type {HTMLCanvasElement} */ (get("picture"));
 const stage = new Stage(picture);
-const chart = new Chart(/** @type {HTMLCanvasElement} */ (get("chart")));
+const timeline = new Timeline(/** @type {HTMLCanvasElement} */ (get("timeline")), seek);
 const see = /** @type {HTMLInputElement} */ (get("see"));
 /** What fails for longer is said. */
 const client = new Client(new URL(".", location.href), { patience: 1500 });
@@ -31,6 +34,7 @@ const here = /** @type {HTMLInputElement} */ (get("here"));
 const DRAW = "Draw a box around what to follow.";
 const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
 const FOLLOWING = "Following. Draw again to correct the box.";
+const ADD = "Draw a box around the object to add.";
 /** A status that held for fewer frames is not said. */
 const SAID_AFTER = 5;
 
@@ -38,6 +42,12 @@ const SAID_AFTER = 5;
 let run;
 /** Whether the first box has been drawn. */
 let isFollowing = false;
+/** Whether the next box is that of a new object. */
+let isAdding = false;
+/** @type {import("./source.js").Picture | undefined} An earlier frame that is shown. */
+let viewed;
+/** Counts the frames that are to be shown: one that is overtaken by another is dropped. */
+let view = 0;
 /** @type {Promise<import("./source.js").Picture> | undefined} What the camera saw as the drawing began. */
 let frozen;
 /** Whether there are results that were not saved. */
@@ -80,6 +90,8 @@ async function choose(open) {
   isFollowing = false;
   frozen = undefined;
   drawing.arm(false);
+  add(false);
+  leave();
   say("Opening…");
   try {
     const source = await open();
@@ -90,7 +102,7 @@ async function choose(open) {
     run.sees = see.checked;
     isUnsaved = false;
     for (const id of ["stage", "keys", "controls"]) get(id).hidden = false;
-    for (const id of ["figures", "curve", "results", "seen"]) get(id).hidden = true;
+    for (const id of ["figures", "curve", "objects", "results", "seen"]) get(id).hidden = true;
     stage.draw(undefined);
     stage.show(first.image);
     preview();
@@ -108,7 +120,7 @@ function preview() {
 
 const drawing = new BoxDrawing(picture, {
   start() {
-    if (!run || run.isOver) return false;
+    if (!run || run.isOver || run.isRedoing) return false;
     if (isFollowing) run.pause(true);
     else if (run.source.isLive) freeze(run);
     return true;
@@ -123,9 +135,14 @@ const drawing = new BoxDrawing(picture, {
     stage.draw(undefined);
     if (!run) return;
     if (!isFollowing) return void follow(run, box);
-    run.correct(box);
+    const object = isAdding ? undefined : run.chosen;
+    const isNew = !object;
+    add(false);
+    const { frame } = viewed ?? run.picture;
+    if (viewed || run.isResting) return void redo(run, object, frame, box);
+    run.draw(box, object);
     run.pause(isPaused);
-    say("The box is corrected.");
+    say(isNew ? "Following another object." : "The box is corrected.");
   },
   tap() {
     if (run && !run.isOver) say(`${TAP}${isFollowing ? "Then draw the box anew." : DRAW}`);
@@ -151,8 +168,8 @@ async function follow(own, box) {
   isFollowing = true;
   lastStatus = saidStatus = "tracking";
   setPaused(false);
-  for (const id of ["figures", "curve", "results"]) get(id).hidden = false;
-  for (const id of ["pause", "stop"]) /** @type {HTMLButtonElement} */ (get(id)).disabled = false;
+  for (const id of ["figures", "curve", "objects", "results"]) get(id).hidden = false;
+  for (const id of ["pause", "stop", "back", "forward"]) /** @type {HTMLButtonElement} */ (get(id)).disabled = false;
   stage.copyPatch(/** @type {HTMLCanvasElement} */ (get("first-patch")), box);
   again = () => follow(own, box);
   try {
@@ -165,30 +182,119 @@ async function follow(own, box) {
   }
 }
 
+/** Shows a frame with the objects in it.
+ * @param {Run} own
+ * @param {import("./source.js").Picture} shown
+ * @param {number[][]} [particles] */
+function show(own, shown, particles) {
+  stage.show(shown.image, own.shownIn(shown.frame, shown.image), particles);
+  timeline.show([...(own.chosen?.rows.values() ?? [])], own.lastFrame, shown.frame);
+  list.show(own.objects, own.chosen);
+}
+
 /** @type {import("./run.js").Told["answer"]} */
 function answered(shown, answer) {
   if (!run) return;
-  stage.show(shown.image, answer);
-  chart.show(run.rows);
+  // Who looks at an earlier frame goes on doing so.
+  if (!viewed) show(run, shown, answer?.particles);
   const set = (/** @type {string} */ id, /** @type {string} */ text) => (get(id).textContent = text);
-  set("status", answer.status);
-  get("status").className = answer.status;
-  set("score", answer.score.toFixed(2));
-  set("frames", String(run.rows.length));
+  set("frames", String(run.tracked));
   set("rate", run.rate.toFixed(0));
   set("trip", `${run.trip.toFixed(0)} ms`);
   set("skipped", String(run.skipped));
+  isUnsaved = run.frames.size > 1;
+  if (!answer) return;
+  set("status", answer.status);
+  get("status").className = answer.status;
+  set("score", answer.score.toFixed(2));
   if (answer.votes) {
     get("seen").hidden = false;
     showBag(run);
     showVotes(/** @type {HTMLCanvasElement} */ (get("votes")), answer.votes);
     if (answer.status !== "lost") stage.copyPatch(/** @type {HTMLCanvasElement} */ (get("patch")), answer.box);
   }
-  isUnsaved = run.rows.length > 1;
   held = answer.status === lastStatus ? held + 1 : 1;
   lastStatus = answer.status;
   if (answer.status !== saidStatus && (held >= SAID_AFTER || answer.status === "lost")) sayStatus(answer.status);
 }
+
+/** Shows a frame that was tracked, and pauses.
+ * @param {number} frame */
+async function seek(frame) {
+  const own = run;
+  if (!own || !isFollowing || own.isRedoing || frame === (viewed ?? own.picture).frame) return;
+  const wanted = (view += 1);
+  setPaused(true);
+  own.pause(true);
+  const numbers = [...own.frames.keys()];
+  const nearest = numbers.reduce((one, other) => (Math.abs(other - frame) < Math.abs(one - frame) ? other : one));
+  if (nearest === own.lastFrame) {
+    leave();
+    return repaint();
+  }
+  const picture = await own.kept(nearest);
+  if (!picture || wanted !== view || own !== run) return;
+  viewed = picture;
+  show(own, picture);
+}
+
+/** Shows the last frame again. */
+function leave() {
+  view += 1;
+  viewed = undefined;
+}
+
+/** Follows an object anew from an earlier frame on.
+ * @param {Run} own
+ * @param {import("./objects.js").FollowedObject | undefined} object
+ * @param {number} frame
+ * @param {import("./js/bagtrack.js").Box} box */
+async function redo(own, object, frame, box) {
+  isUnsaved = true;
+  try {
+    await own.redo(object, frame, box, (done) => say(`Following anew: frame ${done} of ${own.lastFrame}.`));
+    if (own !== run) return;
+    say(`Followed anew from frame ${frame}.`);
+    if (viewed) show(own, viewed);
+    else stage.show(own.picture.image, own.shownIn(own.lastFrame, own.picture.image));
+    list.show(own.objects, own.chosen);
+  } catch (error) {
+    if (own === run) say(words(error, hasKey), true);
+  }
+}
+
+/** Makes the next box that of a new object, or not.
+ * @param {boolean} isOn */
+function add(isOn) {
+  isAdding = isOn;
+  get("add").setAttribute("aria-pressed", String(isOn));
+}
+
+/** Shows again what is shown, after a change. */
+function repaint() {
+  if (run && isFollowing) show(run, viewed ?? run.picture);
+}
+
+const list = new ObjectList(get("list"), {
+  choose(object) {
+    if (run) run.chosen = object;
+    repaint();
+  },
+  remove(object) {
+    run?.remove(object);
+    isUnsaved = true;
+    repaint();
+  },
+  doubt(object) {
+    if (!run) return;
+    run.chosen = object;
+    const frame = object.nextDoubtful((viewed ?? run.picture).frame);
+    if (frame === undefined) say(`${object.name} is tracked in all frames.`);
+    else seek(frame);
+    repaint();
+  },
+  change: repaint,
+});
 
 /** @param {"tracking" | "uncertain" | "lost"} status */
 function sayStatus(status) {
@@ -208,7 +314,7 @@ async function showBag(own) {
   if (now - bagShownAt < 2000) return;
   bagShownAt = now;
   // The session may end meanwhile; then the last picture stays.
-  const blob = await own.session?.bag().catch(() => undefined);
+  const blob = await own.chosen?.follower.bag().catch(() => undefined);
   const shown = /** @type {HTMLImageElement} */ (get("bag"));
   if (!blob) return;
   if (shown.src) URL.revokeObjectURL(shown.src);
@@ -228,7 +334,7 @@ function anew() {
 
 function ended() {
   say("The video has ended. Save the results, or choose another one.");
-  run?.stop();
+  run?.rest();
   finished();
 }
 
@@ -272,10 +378,36 @@ addEventListener("beforeunload", (event) => {
 get("draw").addEventListener("click", () => drawing.arm(!drawing.isArmed));
 get("pause").addEventListener("click", () => {
   setPaused(!isPaused);
+  if (!isPaused) leave();
+  repaint();
   run?.pause(isPaused);
 });
+get("add").addEventListener("click", () => {
+  if (!run || run.isOver) return;
+  if (run.objects.length >= MOST_OBJECTS) return say(`No more than ${MOST_OBJECTS} objects are followed.`);
+  add(!isAdding);
+  if (isAdding) drawing.arm(true);
+  say(isAdding ? ADD : FOLLOWING);
+});
+/** Goes to the frame before or after the one that is shown.
+ * @param {number} by */
+function step(by) {
+  if (run) timeline.go((viewed ?? run.picture).frame + by);
+}
+get("back").addEventListener("click", () => step(-1));
+get("forward").addEventListener("click", () => step(1));
+addEventListener("keydown", (event) => {
+  const { target, key } = event;
+  const isTaken = target instanceof HTMLElement && target.closest("input, button, a, #picture, summary");
+  if (!isFollowing || isTaken || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (key === " ") {
+    event.preventDefault();
+    get("pause").click();
+  } else if (key === "d") step(-1);
+  else if (key === "f") step(1);
+});
 get("stop").addEventListener("click", () => {
-  run?.stop();
+  run?.rest();
   finished();
   say("Stopped. Save the results, or choose another video.");
 });
@@ -294,17 +426,18 @@ get("key-form").addEventListener("submit", (event) => {
 
 /**
  * @param {(own: Run) => Blob | Promise<Blob>} make
- * @param {string} kind
+ * @param {string} ending
  */
-async function saveAs(make, kind) {
+async function saveAs(make, ending) {
   const own = run;
-  if (!own || own.rows.length === 0) return;
-  save(await make(own), own, kind);
+  if (!own || own.objects.length === 0) return;
+  save(await make(own), own, ending);
   isUnsaved = false;
 }
 
-get("save-csv").addEventListener("click", () => saveAs(asCsv, "csv"));
-get("save-json").addEventListener("click", () => saveAs(asJson, "json"));
+for (const [format, { make, ending }] of Object.entries(FORMATS)) {
+  get(`save-${format}`).addEventListener("click", () => saveAs(make, ending));
+}
 get("save-video").addEventListener("click", async () => {
   const button = /** @type {HTMLButtonElement} */ (get("save-video"));
   const label = button.textContent;
@@ -314,7 +447,7 @@ get("save-video").addEventListener("click", async () => {
   };
   try {
     await saveAs((own) => makeVideo(own, tell), extension);
-    const [kept, of] = [run?.frames.size ?? 0, run?.rows.length ?? 0];
+    const [kept, of] = [run?.frames.size ?? 0, run?.tracked ?? 0];
     if (kept < of) say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
   } catch (error) {
     say(words(error, hasKey), true);

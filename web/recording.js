@@ -25,24 +25,22 @@ export const encodes = typeof VideoEncoder !== "undefined";
 export const extension = encodes ? "webm" : "mkv";
 
 /**
- * Draws the rows' boxes into their frames.
+ * Draws the objects' boxes into their frames.
  * @param {import("./run.js").Run} run
  * @param {(canvas: HTMLCanvasElement, time: number, index: number) => Promise<void>} write
  * @param {(done: number, of: number) => void} tell
  */
-async function draw({ rows, frames, source }, write, tell) {
+async function draw(run, write, tell) {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d");
-  const drawn = rows.filter(({ frame }) => frames.has(frame));
-  for (const [index, { frame, time, box, status }] of drawn.entries()) {
-    const image = await createImageBitmap(/** @type {Blob} */ (frames.get(frame)));
+  const drawn = [...run.frames].sort(([one], [other]) => one - other);
+  for (const [index, [frame, { blob, time }]] of drawn.entries()) {
+    const image = await createImageBitmap(blob);
     if (index === 0) [canvas.width, canvas.height] = [image.width, image.height].map((side) => side - (side % 2));
     context?.drawImage(image, 0, 0);
-    const [across, down] = [image.width / source.size.width, image.height / source.size.height];
-    const shown = { x: box.x * across, y: box.y * down, width: box.width * across, height: box.height * down };
-    if (context) paintBox(context, shown, status, status === "lost");
+    for (const object of run.shownIn(frame, image)) if (context) paintBox(context, object);
     image.close();
-    await write(canvas, Math.round((time - drawn[0].time) * 1000), index);
+    await write(canvas, Math.round((time - drawn[0][1].time) * 1000), index);
     tell(index + 1, drawn.length);
   }
   return canvas;

@@ -1,43 +1,36 @@
-// One run: a source of frames, its session, and what the service answers.
+// One run: a source of frames, the objects that are followed through them, and the answers.
 
-import { LocalClient, LocalStream, Problem } from "./js/bagtrack.js";
+import { LocalFollower, ServiceFollower, WINDOW } from "./follower.js";
+import { LocalClient } from "./js/bagtrack.js";
+import { FollowedObject } from "./objects.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
  * @typedef {import("./source.js").Picture} Picture
  * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
+ * @typedef {import("./objects.js").Row} Row
  *
- * @typedef {object} Row What is known of one tracked frame.
- * @property {number} frame Its number in the video.
- * @property {number} time Seconds from the beginning of the video.
- * @property {Box} box In the video's own pixels.
- * @property {number} score
- * @property {"tracking" | "uncertain" | "lost"} status
- * @property {boolean} corrected Whether the box was drawn.
- *
- * @typedef {object} Sent A frame without an answer.
- * @property {Picture} picture
- * @property {{box?: Box, see?: boolean}} header
- * @property {number} at When it was sent, in milliseconds.
+ * @typedef {object} Drawn A box that was drawn, until the frames on their way are answered.
+ * @property {Box} box
+ * @property {FollowedObject | undefined} object The one that it corrects; nothing for a new one.
  *
  * @typedef {object} Told
- * @property {(picture: Picture, answer: Answer) => void} answer
+ * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
+ *   chosen object.
  * @property {(error: unknown) => void} fail
  * @property {(isUp: boolean) => void} line
- * @property {() => void} anew The service had lost the session: another one goes on from the last box.
+ * @property {() => void} anew The service had lost a session: another one goes on from the last box.
  * @property {() => void} end The source has no more frames, and all are answered.
  */
 
-/** Frames on their way at a time. */
-const WINDOW = 8;
 /** Answers that the rate is taken over. */
 const RATE_OVER = 30;
-/** Most bytes of frames that are kept for the video with the boxes. */
+/** Most bytes of frames that are kept. */
 const MOST_KEPT = 512 << 20;
 
 export class Run {
   /**
-   * @param {import("./js/bagtrack.js").Client | import("./js/bagtrack.js").LocalClient} client Where it is tracked.
+   * @param {import("./js/bagtrack.js").Client | LocalClient} client Where it is tracked.
    * @param {import("./source.js").Source} source
    * @param {Picture} picture The first one.
    * @param {Told} told
@@ -48,13 +41,17 @@ export class Run {
     this.told = told;
     /** The picture that was answered last. */
     this.picture = picture;
-    /** @type {Box | undefined} The box in it, in its pixels. */
-    this.box = undefined;
-    /** @type {Row[]} */
-    this.rows = [];
-    /** @type {Map<number, Blob>} The frames of the last rows, by their numbers. */
+    /** @type {FollowedObject[]} */
+    this.objects = [];
+    /** @type {FollowedObject | undefined} The chosen one. */
+    this.chosen = undefined;
+    /** How many there were. */
+    this.count = 0;
+    /** @type {Map<number, {blob: Blob, time: number}>} The last frames, by their numbers in the video. */
     this.frames = new Map();
     this.bytes = 0;
+    /** How many frames were tracked. */
+    this.tracked = 1;
     /** @type {number[]} */
     this.answeredAt = [];
     this.passedOver = 0;
@@ -62,17 +59,14 @@ export class Run {
     this.sees = false;
     this.isPaused = false;
     this.isOver = false;
+    this.isResting = false;
     this.hasAll = false;
-    /** @type {Sent[]} Oldest first. */
+    /** @type {{picture: Picture, at: number}[]} Frames without an answer, oldest first. */
     this.underWay = [];
-    /** @type {import("./js/bagtrack.js").Session | import("./js/bagtrack.js").LocalSession | undefined} */
-    this.session = undefined;
-    /** Whether the session has answered. */
-    this.hasAnswered = false;
-    /** @type {Box | undefined} A box that was drawn, until the frames on their way are answered. */
+    /** @type {Drawn | undefined} */
     this.drawn = undefined;
-    /** @type {import("./js/bagtrack.js").FrameStream | LocalStream | undefined} */
-    this.stream = undefined;
+    /** Whether earlier frames are tracked anew. */
+    this.isRedoing = false;
   }
 
   /** Frames that were not tracked. */
@@ -80,12 +74,16 @@ export class Run {
     return this.passedOver + this.source.skipped;
   }
 
-  /** Opens the session with the box in the first frame, and begins.
+  /** The last frame that was tracked. */
+  get lastFrame() {
+    return this.picture.frame;
+  }
+
+  /** Begins with the box in the first frame.
    * @param {Box} box */
   async begin(box) {
-    const session = await this.open(box);
-    if (!session) return;
-    this.note({ frame: 0, box: session.box, score: 1, status: "tracking" }, this.picture, true);
+    await this.add(box);
+    if (this.isOver) return;
     const started = this.source.start(
       (picture) => this.deliver(picture),
       () => {
@@ -96,58 +94,71 @@ export class Run {
     started.catch((error) => this.fail(error));
   }
 
-  /** Opens a session with the box in the picture that was answered last.
+  /** Follows another object, from the picture that was answered last.
    * @param {Box} box */
-  async open(box) {
-    // In the page the frame is tracked as it is shown, with the service as it is uploaded.
-    const { client, picture } = this;
-    const isHere = client instanceof LocalClient;
-    const session = await (isHere ? client.open(picture.image, box) : client.open(picture.blob, box));
-    this.session = session;
-    this.hasAnswered = false;
-    if (this.isOver) {
-      this.endSession();
-      return undefined;
-    }
-    const onLine = (/** @type {boolean} */ isUp) => this.told.line(isUp);
-    const stream = session.stream({ live: this.source.isLive, window: WINDOW, patience: Infinity, onLine });
-    this.stream = stream;
-    stream.ended.then((problem) => problem && this.stream === stream && this.fail(problem));
-    return session;
+  async add(box) {
+    const object = this.newObject();
+    const answer = await object.follower.open(this.picture, box);
+    if (this.isOver) return object.follower.end();
+    this.take(object);
+    this.keep(this.picture);
+    this.note(object, answer, this.picture, true);
+    this.told.answer(this.picture, answer);
+  }
+
+  newObject() {
+    return new FollowedObject(this.count, this.follower());
+  }
+
+  /** @param {FollowedObject} object */
+  take(object) {
+    this.count += 1;
+    this.objects.push(object);
+    this.chosen = object;
+  }
+
+  /** @param {FollowedObject} object */
+  remove(object) {
+    object.follower.end();
+    this.objects = this.objects.filter((other) => other !== object);
+    if (this.chosen === object) this.chosen = this.objects[0];
+  }
+
+  /** @returns {import("./follower.js").Follower} */
+  follower() {
+    const { client } = this;
+    if (client instanceof LocalClient) return new LocalFollower(client);
+    return new ServiceFollower(client, this.source.isLive, {
+      line: (isUp) => this.told.line(isUp),
+      anew: () => this.told.anew(),
+      fail: (error) => this.fail(error),
+    });
   }
 
   /** @param {Picture} picture */
   deliver(picture) {
-    const isFull = this.isPaused || this.drawn || this.underWay.length >= WINDOW;
-    if (isFull && this.source.isLive) return this.skip(picture);
-    this.send(picture, { see: this.sees });
+    if (this.isFull && this.source.isLive) return this.skip(picture);
+    this.send(picture);
     this.throttle();
   }
 
-  /**
-   * @param {Picture} picture
-   * @param {{box?: Box, see?: boolean}} header
-   */
-  send(picture, header) {
-    const sent = { picture, header, at: performance.now() };
-    this.underWay.push(sent);
-    this.transmit(sent);
+  get isFull() {
+    return this.isPaused || this.isRedoing || this.drawn !== undefined || this.underWay.length >= WINDOW;
   }
 
-  /** @param {Sent} sent */
-  async transmit(sent) {
-    const { stream } = this;
-    if (!stream) return;
+  /** @param {Picture} picture */
+  async send(picture) {
+    const sent = { picture, at: performance.now() };
+    this.underWay.push(sent);
+    const objects = [...this.objects];
+    const see = (/** @type {FollowedObject} */ object) => this.sees && object === this.chosen;
     try {
-      const { image, blob } = sent.picture;
-      const isHere = stream instanceof LocalStream;
-      const answer = await (isHere ? stream.track(image, sent.header) : stream.track(blob, sent.header));
-      if (this.stream !== stream) return;
+      const answers = await Promise.all(objects.map((it) => it.follower.track(picture, { see: see(it) })));
       this.underWay = this.underWay.filter((other) => other !== sent);
-      if (answer) this.answered(answer, sent);
-      else this.skip(sent.picture);
-    } catch (problem) {
-      if (this.stream === stream) this.fail(problem);
+      if (objects.length > 0 && answers.every((answer) => !answer)) this.skip(picture);
+      else this.answered(objects, answers, sent);
+    } catch (error) {
+      this.fail(error);
     }
   }
 
@@ -158,66 +169,84 @@ export class Run {
   }
 
   throttle() {
-    this.source.hold(this.isPaused || this.drawn !== undefined || this.underWay.length >= WINDOW);
+    this.source.hold(this.isFull);
   }
 
   /**
-   * @param {Answer} answer
-   * @param {Sent} sent
+   * @param {FollowedObject[]} objects
+   * @param {(Answer | undefined)[]} answers
+   * @param {{picture: Picture, at: number}} sent
    */
-  answered(answer, { picture, header, at }) {
+  answered(objects, answers, { picture, at }) {
+    if (this.isOver) return;
     const now = performance.now();
     this.trip = now - at;
     this.answeredAt = [...this.answeredAt, now].slice(-RATE_OVER);
+    const before = this.picture.image;
     this.picture = picture;
-    this.hasAnswered = true;
-    this.note(answer, picture, header.box !== undefined);
+    this.tracked += 1;
+    this.keep(picture);
+    objects.forEach((object, index) => {
+      const answer = answers[index];
+      if (answer && this.objects.includes(object)) this.note(object, answer, picture, false);
+    });
+    this.told.answer(picture, this.chosen && answers[objects.indexOf(this.chosen)]);
+    // It is not shown any more.
+    if (before !== picture.image && "close" in before) before.close();
     this.sendDrawn();
     this.checkEnd();
   }
 
   /**
+   * @param {FollowedObject} object
    * @param {Answer} answer
    * @param {Picture} picture
    * @param {boolean} corrected
    */
-  note({ box, score, status, ...rest }, picture, corrected) {
-    this.box = box;
+  note(object, { box, score, status }, picture, corrected) {
     const { frame, time } = picture;
-    // A corrected frame was answered before.
-    if (this.rows.at(-1)?.frame === frame) this.rows.pop();
-    this.rows.push({ frame, time: Number(time.toFixed(3)), box: this.inOwnPixels(box), score, status, corrected });
-    this.keep(frame, picture.blob);
-    this.told.answer(picture, { box, score, status, ...rest });
+    object.note({ frame, time: Number(time.toFixed(3)), box: this.inOwnPixels(box, picture), score, status, corrected });
   }
 
   /** A box of the uploaded frame in the video's own pixels.
-   * @param {Box} box */
-  inOwnPixels(box) {
-    const { image } = this.picture;
-    const { width, height } = this.source.size;
-    if (image.width === width && image.height === height) return box;
-    const [across, down] = [width / image.width, height / image.height];
-    const rounded = (/** @type {number} */ value) => Number(value.toFixed(2));
-    return {
-      x: rounded(box.x * across),
-      y: rounded(box.y * down),
-      width: rounded(box.width * across),
-      height: rounded(box.height * down),
-    };
+   * @param {Box} box
+   * @param {Picture} picture */
+  inOwnPixels(box, { image }) {
+    return scaled(box, this.source.size, image);
   }
 
-  /** Keeps a frame for the video with the boxes. The oldest ones go where there are too many.
-   * @param {number} frame
-   * @param {Blob} blob */
-  keep(frame, blob) {
-    this.bytes += blob.size - (this.frames.get(frame)?.size ?? 0);
-    this.frames.set(frame, blob);
-    for (const [oldest, { size }] of this.frames) {
+  /** Keeps a frame. The oldest ones go where there are too many.
+   * @param {Picture} picture */
+  keep({ frame, blob, time }) {
+    this.bytes += blob.size - (this.frames.get(frame)?.blob.size ?? 0);
+    this.frames.set(frame, { blob, time });
+    for (const [oldest, kept] of this.frames) {
       if (this.bytes <= MOST_KEPT) break;
       this.frames.delete(oldest);
-      this.bytes -= size;
+      this.bytes -= kept.blob.size;
     }
+  }
+
+  /** A frame that is kept.
+   * @param {number} frame
+   * @returns {Promise<Picture | undefined>} */
+  async kept(frame) {
+    const kept = this.frames.get(frame);
+    return kept && { ...kept, frame, image: await createImageBitmap(kept.blob) };
+  }
+
+  /** What is shown of the objects in a frame.
+   * @param {number} frame
+   * @param {{width: number, height: number}} image
+   * @returns {import("./stage.js").Shown[]} */
+  shownIn(frame, image) {
+    const isNamed = this.objects.length > 1;
+    return this.objects.flatMap(({ rows, name, color, isShown }) => {
+      const row = rows.get(frame);
+      if (!row || !isShown) return [];
+      const box = scaled(row.box, image, this.source.size);
+      return [{ box, color, name: isNamed ? name : "", isLost: row.status === "lost" }];
+    });
   }
 
   /** Frames a second, of the last answers. */
@@ -233,58 +262,105 @@ export class Run {
     this.throttle();
   }
 
-  /** The user drew another box in the picture that is shown: it is sent once more, with the box.
-   * @param {Box} box */
-  correct(box) {
-    this.drawn = box;
+  /** The user drew a box in the picture that is shown: for an object, or for a new one.
+   * @param {Box} box
+   * @param {FollowedObject | undefined} object */
+  draw(box, object) {
+    this.drawn = { box, object };
     this.sendDrawn();
   }
 
-  sendDrawn() {
-    const { drawn: box, picture } = this;
-    if (box && this.underWay.length === 0) {
-      this.drawn = undefined;
-      this.send(picture, { box });
+  async sendDrawn() {
+    const { drawn, picture } = this;
+    if (!drawn || this.underWay.length > 0) return this.throttle();
+    const { box, object } = drawn;
+    const sent = { picture, at: performance.now() };
+    this.underWay.push(sent);
+    this.drawn = undefined;
+    try {
+      if (!object) await this.add(box);
+      const answer = await object?.follower.track(picture, { box });
+      if (object && answer) {
+        this.note(object, answer, picture, true);
+        this.told.answer(picture, answer);
+      }
+    } catch (error) {
+      this.fail(error);
     }
+    this.underWay = this.underWay.filter((other) => other !== sent);
     this.throttle();
+    this.checkEnd();
+  }
+
+  /**
+   * Follows an object anew, from a box in an earlier frame up to the last one.
+   * @param {FollowedObject | undefined} known Nothing for a new one.
+   * @param {number} frame
+   * @param {Box} box
+   * @param {(frame: number) => void} tell Is told of each frame.
+   */
+  async redo(known, frame, box, tell) {
+    this.isRedoing = true;
+    this.throttle();
+    const object = known ?? this.newObject();
+    try {
+      while (this.underWay.length > 0) await new Promise(requestAnimationFrame);
+      const from = await object.goBackBefore(frame, this.follower());
+      object.forgetFrom(frame);
+      for (const number of [...this.frames.keys()].sort((a, b) => a - b)) {
+        if (this.isOver || number < (from === undefined ? frame : from + 1)) continue;
+        const picture = /** @type {Picture} */ (await this.kept(number));
+        const isDrawn = number === frame;
+        const isFirst = isDrawn && from === undefined;
+        const { follower } = object;
+        const answer = await (isFirst ? follower.open(picture, box) : follower.track(picture, isDrawn ? { box } : {}));
+        if (!this.objects.includes(object)) this.take(object);
+        if (answer && number >= frame) this.note(object, answer, picture, isDrawn);
+        else if (answer) object.frames.push(number);
+        if ("close" in picture.image) picture.image.close();
+        tell(number);
+      }
+      if (this.isResting) object.follower.end();
+    } finally {
+      this.isRedoing = false;
+      this.throttle();
+    }
+    this.checkEnd();
   }
 
   checkEnd() {
-    if (this.hasAll && this.underWay.length === 0 && !this.drawn) this.told.end();
+    const isBusy = this.underWay.length > 0 || this.drawn || this.isRedoing;
+    if (this.hasAll && !isBusy && !this.isResting) this.told.end();
   }
 
   /** @param {unknown} error */
   fail(error) {
     if (this.isOver) return;
-    // Such as a service with other keys after its restart, which does not take the session's snapshot.
-    if (error instanceof Problem && error.isGone && this.hasAnswered) return void this.goOn();
     this.stop();
     this.told.fail(error);
   }
 
-  /** Goes on in another session, from the last picture and its box. */
-  async goOn() {
-    this.stream = undefined;
-    this.hasAnswered = false;
-    try {
-      if (!this.box || !(await this.open(this.box))) return;
-      this.told.anew();
-      this.underWay.forEach((sent) => this.transmit(sent));
-    } catch (error) {
-      this.fail(error);
-    }
-  }
-
   stop() {
-    if (this.isOver) return;
     this.isOver = true;
-    this.source.stop();
-    this.stream?.close();
-    this.endSession();
+    this.rest();
   }
 
-  endSession() {
-    // One that cannot be ended expires.
-    this.session?.end().catch(() => undefined);
+  /** Takes no more frames. Those that are kept can be tracked anew. */
+  rest() {
+    this.isResting = true;
+    this.source.stop();
+    this.objects.forEach(({ follower }) => follower.end());
   }
+}
+
+/** A box in pixels of another size of the same picture.
+ * @param {Box} box
+ * @param {{width: number, height: number}} to
+ * @param {{width: number, height: number}} from */
+export function scaled(box, to, from) {
+  if (to.width === from.width && to.height === from.height) return box;
+  const [across, down] = [to.width / from.width, to.height / from.height];
+  const rounded = (/** @type {number} */ value) => Number(value.toFixed(2));
+  const [x, y] = [rounded(box.x * across), rounded(box.y * down)];
+  return { x, y, width: rounded(box.width * across), height: rounded(box.height * down) };
 }

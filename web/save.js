@@ -1,6 +1,9 @@
-// Saving results.
+// Saving results: one function a format. Boxes are in the video's own pixels, and in all formats but MOT count from 0.
+
+import { zip } from "./zip.js";
 
 /** @typedef {import("./run.js").Run} Run */
+/** @typedef {import("./objects.js").Row} Row */
 
 /** What is said of a video. In a CSV it stands in every row, so that spreadsheets and programs read the table as it is.
  * @param {Run} run */
@@ -9,10 +12,13 @@ function about({ source }) {
   return { video: source.name, video_width: source.size.width, video_height: source.size.height, frame_rate: rate };
 }
 
-/** @param {Run} run */
-function flat({ rows }) {
-  return rows.map(({ frame, time, box: { x, y, width, height }, score, status }) => {
-    return { frame, time, x, y, width, height, score, status };
+/** The rows of all objects, frame by frame. `target` counts objects from 0, as `bagtrack track` does.
+ * @param {Run} run */
+function flat({ objects }) {
+  const rows = objects.flatMap(({ name, number, rows }) => [...rows.values()].map((row) => ({ name, number, row })));
+  rows.sort((a, b) => a.row.frame - b.row.frame || a.number - b.number);
+  return rows.map(({ name, number, row: { frame, time, box: { x, y, width, height }, score, status } }) => {
+    return { frame, time, target: number, name, x, y, width, height, score, status };
   });
 }
 
@@ -23,35 +29,143 @@ function field(value = "") {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/**
- * @param {Run} run
- * @returns {Blob}
- */
-export function asCsv(run) {
+/** @param {unknown} document */
+const json = (document) => new Blob([`${JSON.stringify(document, undefined, 1)}\n`], { type: "application/json" });
+
+/** @param {Run} run */
+function csv(run) {
   const rows = flat(run).map((row) => ({ ...row, ...about(run) }));
   const lines = [Object.keys(rows[0]), ...rows.map(Object.values)].map((values) => values.map(field).join(","));
   return new Blob([`${lines.join("\n")}\n`], { type: "text/csv" });
 }
 
-/**
- * @param {Run} run
- * @returns {Blob}
- */
-export function asJson(run) {
+/** @param {Run} run */
+function plain(run) {
   const { video, ...size } = about(run);
-  const document = { video, ...size, skipped: run.skipped, boxes: flat(run) };
-  return new Blob([`${JSON.stringify(document, undefined, 1)}\n`], { type: "application/json" });
+  return json({ video, ...size, skipped: run.skipped, boxes: flat(run) });
 }
+
+/** The MOTChallenge: frames, objects and pixels count from 1; the last three are a place in the world.
+ * @param {Run} run */
+function mot(run) {
+  const lines = flat(run).map(({ frame, target, x, y, width, height, score }) => {
+    const box = [x + 1, y + 1, width, height].map((value) => value.toFixed(3));
+    return [frame + 1, target + 1, ...box, score.toFixed(4), -1, -1, -1].join(",");
+  });
+  return new Blob([`${lines.join("\n")}\n`], { type: "text/plain" });
+}
+
+/** The part of a box that is in the video; nothing where there is none, or where the object is lost.
+ * @param {Run} run
+ * @param {ReturnType<typeof flat>[number]} row */
+function inside({ source: { size } }, { x, y, width, height, status }) {
+  const [left, top] = [Math.max(x, 0), Math.max(y, 0)];
+  const [right, bottom] = [Math.min(x + width, size.width), Math.min(y + height, size.height)];
+  if (status === "lost" || right <= left || bottom <= top) return undefined;
+  return { left, top, width: right - left, height: bottom - top };
+}
+
+/** The numbers of the frames that were tracked.
+ * @param {Run} run */
+const tracked = (run) => [...new Set(flat(run).map(({ frame }) => frame))];
+
+/** @param {number} frame */
+const imageName = (frame) => `frame_${String(frame).padStart(6, "0")}`;
+
+/** COCO, with the `track_id` and `video_id` of its kin for videos. Lost objects are left out.
+ * @param {Run} run */
+function coco(run) {
+  const { video, video_width: width, video_height: height } = about(run);
+  const images = tracked(run).map((frame) => {
+    return { id: frame + 1, file_name: `${imageName(frame)}.jpg`, width, height, video_id: 1, frame_id: frame };
+  });
+  const annotations = flat(run).flatMap((row) => {
+    const box = inside(run, row);
+    if (!box) return [];
+    const bbox = [box.left, box.top, box.width, box.height].map((value) => Number(value.toFixed(2)));
+    const ids = { image_id: row.frame + 1, category_id: row.target + 1, track_id: row.target + 1, video_id: 1 };
+    return [{ ...ids, bbox, area: bbox[2] * bbox[3], iscrowd: 0, segmentation: [], score: row.score }];
+  });
+  const categories = run.objects.map(({ number, name }) => ({ id: number + 1, name, supercategory: "" }));
+  const numbered = annotations.map((annotation, at) => ({ id: at + 1, ...annotation }));
+  const info = { description: `bagtrack: ${video}` };
+  return json({ info, licenses: [], videos: [{ id: 1, name: video }], images, annotations: numbered, categories });
+}
+
+/** YOLO: a text for each frame, with the centre and the size of each box as shares of the picture. Lost ones are left out.
+ * @param {Run} run */
+function yolo(run) {
+  const { width, height } = run.source.size;
+  const classes = run.objects.map(({ number }) => number);
+  /** @type {Map<number, string[]>} */
+  const lines = new Map(tracked(run).map((frame) => [frame, []]));
+  for (const row of flat(run)) {
+    const box = inside(run, row);
+    if (!box) continue;
+    const center = [(box.left + box.width / 2) / width, (box.top + box.height / 2) / height];
+    const values = [...center, box.width / width, box.height / height].map((value) => value.toFixed(6));
+    lines.get(row.frame)?.push([classes.indexOf(row.target), ...values].join(" "));
+  }
+  const names = run.objects.map(({ name }, at) => `  ${at}: ${JSON.stringify(name)}\n`).join("");
+  const texts = [...lines].map(([frame, text]) => ({
+    name: `labels/train/${imageName(frame)}.txt`,
+    text: text.map((line) => `${line}\n`).join(""),
+  }));
+  return zip([{ name: "data.yaml", text: `path: .\ntrain: images/train\nnames:\n${names}` }, ...texts]);
+}
+
+/** @param {string} text */
+const escaped = (text) => text.replace(/[<>&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+
+/** CVAT for video 1.1: a track for each object, outside where it is lost.
+ * @param {Run} run */
+function cvat(run) {
+  const { video, video_width: width, video_height: height } = about(run);
+  const rows = flat(run);
+  const size = Math.max(...rows.map(({ frame }) => frame)) + 1;
+  const labels = run.objects.map(({ name }) => `<label><name>${escaped(name)}</name><attributes></attributes></label>`);
+  const tracks = run.objects.map(({ number, name, rows: own }) => {
+    const boxes = [...own.values()].map(({ frame, box, status }) => {
+      const corners = { xtl: box.x, ytl: box.y, xbr: box.x + box.width, ybr: box.y + box.height };
+      const sides = Object.entries(corners).map(([side, value]) => `${side}="${value.toFixed(2)}"`).join(" ");
+      const flags = `outside="${status === "lost" ? 1 : 0}" occluded="0" keyframe="1"`;
+      // CVAT draws what lies between key frames, so each frame is one.
+      return `<box frame="${frame}" ${flags} ${sides} z_order="0"></box>`;
+    });
+    return `<track id="${number}" label="${escaped(name)}" source="semi-auto">\n${boxes.join("\n")}\n</track>`;
+  });
+  const task = `<task><name>${escaped(video)}</name><size>${size}</size><mode>interpolation</mode><start_frame>0</start_frame>
+<stop_frame>${size - 1}</stop_frame><labels>${labels.join("")}</labels>
+<original_size><width>${width}</width><height>${height}</height></original_size></task>`;
+  const document = `<?xml version="1.0" encoding="utf-8"?>
+<annotations>
+<version>1.1</version>
+<meta>${task}</meta>
+${tracks.join("\n")}
+</annotations>
+`;
+  return new Blob([document], { type: "application/xml" });
+}
+
+/** @type {Record<string, {make: (run: Run) => Blob, ending: string}>} */
+export const FORMATS = {
+  csv: { make: csv, ending: "csv" },
+  json: { make: plain, ending: "json" },
+  mot: { make: mot, ending: "mot.txt" },
+  coco: { make: coco, ending: "coco.json" },
+  yolo: { make: yolo, ending: "yolo.zip" },
+  cvat: { make: cvat, ending: "cvat.xml" },
+};
 
 /**
  * @param {Blob} blob
  * @param {Run} run
- * @param {string} extension
+ * @param {string} ending
  */
-export function save(blob, run, extension) {
+export function save(blob, run, ending) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
-  link.download = `${run.source.name.replace(/\.[^.]*$/, "")}-boxes.${extension}`;
+  link.download = `${run.source.name.replace(/\.[^.]*$/, "")}-boxes.${ending}`;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -2,8 +2,16 @@
 
 /** @typedef {import("./js/bagtrack.js").Box} Box */
 
-/** @type {Record<string, string>} Visible on any picture, together with the dark line around them. */
-const COLORS = { tracking: "#3ddc97", uncertain: "#ffc24b", lost: "#ff6b5e", drawn: "#ffffff" };
+/**
+ * @typedef {object} Shown An object in the picture.
+ * @property {Box} box In pixels of the picture.
+ * @property {string} color
+ * @property {string} name Empty where there is one object alone.
+ * @property {boolean} isLost
+ */
+
+/** Of a box that is being drawn. */
+const DRAWN = "#ffffff";
 
 export class Stage {
   /** @param {HTMLCanvasElement} canvas */
@@ -12,21 +20,24 @@ export class Stage {
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     /** @type {ImageBitmap | HTMLCanvasElement | undefined} The picture that is shown. */
     this.image = undefined;
-    /** @type {import("./js/bagtrack.js").StreamAnswer | undefined} */
-    this.answer = undefined;
+    /** @type {Shown[]} */
+    this.objects = [];
+    /** @type {number[][]} */
+    this.particles = [];
     /** @type {Box | undefined} The box that is being drawn. */
     this.drawn = undefined;
   }
 
   /**
    * @param {ImageBitmap | HTMLCanvasElement} image
-   * @param {import("./js/bagtrack.js").StreamAnswer} [answer]
+   * @param {Shown[]} [objects]
+   * @param {number[][]} [particles] Likeliest first.
    */
-  show(image, answer) {
+  show(image, objects = [], particles = []) {
     const { canvas } = this;
-    if (this.image && this.image !== image && "close" in this.image) this.image.close();
     this.image = image;
-    this.answer = answer;
+    this.objects = objects;
+    this.particles = particles;
     if (canvas.width !== image.width || canvas.height !== image.height) {
       [canvas.width, canvas.height] = [image.width, image.height];
       canvas.style.setProperty("--aspect", String(image.width / image.height));
@@ -44,11 +55,11 @@ export class Stage {
     if (!this.image) return;
     this.context.drawImage(this.image, 0, 0);
     if (this.drawn) {
-      paintBox(this.context, this.drawn, "drawn", true);
-    } else if (this.answer) {
-      this.dots(this.answer.particles ?? []);
-      paintBox(this.context, this.answer.box, this.answer.status, this.answer.status === "lost");
+      paintBox(this.context, { box: this.drawn, color: DRAWN, name: "", isLost: true });
+      return;
     }
+    this.dots(this.particles);
+    for (const object of this.objects) paintBox(this.context, object);
   }
 
   /** @param {number[][]} particles Likeliest first. */
@@ -79,19 +90,24 @@ export class Stage {
   }
 }
 
-/**
+/** Paints the box of an object, dashed where it is lost.
  * @param {CanvasRenderingContext2D} context
- * @param {Box} box
- * @param {string} color
- * @param {boolean} isDashed
- */
-export function paintBox(context, { x, y, width, height }, color, isDashed) {
+ * @param {Shown} object */
+export function paintBox(context, { box: { x, y, width, height }, color, name, isLost }) {
   const unit = context.canvas.width / 320;
-  context.setLineDash(isDashed ? [5 * unit, 3 * unit] : []);
-  for (const [line, style] of /** @type {const} */ ([[2.75, "#000000aa"], [1.25, COLORS[color]]])) {
+  context.setLineDash(isLost ? [5 * unit, 3 * unit] : []);
+  for (const [line, style] of /** @type {const} */ ([[2.75, "#000000aa"], [1.25, color]])) {
     context.lineWidth = line * unit;
     context.strokeStyle = style;
     context.strokeRect(x, y, width, height);
   }
   context.setLineDash([]);
+  if (!name) return;
+  context.font = `600 ${9 * unit}px system-ui, sans-serif`;
+  const [left, base] = [x, Math.max(y - 3 * unit, 9 * unit)];
+  context.lineWidth = 2 * unit;
+  context.strokeStyle = "#000000aa";
+  context.strokeText(name, left, base);
+  context.fillStyle = color;
+  context.fillText(name, left, base);
 }

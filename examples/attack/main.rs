@@ -22,9 +22,9 @@ mod idle_streams;
 mod json_copies;
 mod large_frame;
 mod large_length;
-mod mix;
 mod never_readers;
 mod odd_heads;
+mod random_clients;
 mod raw;
 mod repeated_creation;
 mod session_hoard;
@@ -63,19 +63,22 @@ pub struct Options {
     /// Each attack for some seconds, with shorter time limits of the server.
     #[arg(long)]
     short: bool,
-    /// Only the attacks whose names contain this; `mix` is left out unless it is named.
+    /// Only the attacks whose names contain this.
     #[arg(long)]
     only: Option<String>,
-    /// Seconds of the mix.
-    #[arg(long, default_value_t = 600)]
+    /// Seconds of the random clients.
+    #[arg(long, default_value_t = 120)]
     seconds: u64,
+    /// What the random clients do.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Attack this server instead of one of its own.
     #[arg(long)]
     url: Option<String>,
     /// The server's binary; otherwise `bagtrack` beside this program's folder.
     #[arg(long)]
     server: Option<PathBuf>,
-    /// The mix's attackers alone, against `--url`, without good clients.
+    /// The random clients alone, against `--url`, without good clients.
     #[arg(long, requires = "url")]
     attackers_only: bool,
 }
@@ -105,7 +108,7 @@ async fn main() -> ExitCode {
             let name = stringify!($name);
             let wanted = match &options.only {
                 Some(only) => name.contains(only.as_str()),
-                None => name != "mix",
+                None => true,
             };
             if wanted {
                 let begun = Instant::now();
@@ -137,7 +140,7 @@ async fn main() -> ExitCode {
         large_frame,
         stalled_log,
         repeated_creation,
-        mix
+        random_clients
     );
     match failed {
         0 => ExitCode::SUCCESS,
@@ -146,8 +149,8 @@ async fn main() -> ExitCode {
 }
 
 async fn attackers_only(options: &Options) -> Outcome<()> {
-    let target = Target::start(options, mix::SETTINGS).await?;
-    mix::attackers(&target, options).await
+    let target = Target::start(options, random_clients::SETTINGS).await?;
+    random_clients::attackers(&target, options).await
 }
 
 fn report(name: &str, begun: Instant, verdict: Outcome<Verdict>) -> u32 {

@@ -94,6 +94,18 @@ impl Target {
         })
     }
 
+    /// The same server, which somebody else ends.
+    pub fn same(&self) -> Self {
+        Self {
+            url: self.url.clone(),
+            address: self.address,
+            http: self.http.clone(),
+            child: None,
+            bound: self.bound,
+            log_is_stalled: self.log_is_stalled.clone(),
+        }
+    }
+
     /// A request of the client at this address.
     pub fn post(&self, client: &str, path: &str) -> RequestBuilder {
         let request = self.http.post(format!("{}{path}", self.url));

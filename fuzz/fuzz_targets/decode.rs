@@ -1,7 +1,7 @@
 //! Image files: what is taken has the size that its header says, and keeps the limits.
 #![no_main]
 
-use bagtrack_ingest::{decode_to, recycle, size, Limits};
+use bagtrack_ingest::{decode_to, inspect, recycle, Limits};
 use bagtrack_tracker::FrameFormat;
 use libfuzzer_sys::fuzz_target;
 use std::cell::Cell;
@@ -29,7 +29,7 @@ fuzz_target!(|data: &[u8]| {
     if let Ok(frame) = decode_to(data, &limits, &format) {
         let (width, height) = stored.get();
         assert_eq!(
-            size(data, &limits),
+            inspect(data, &limits).map(|file| file.size()),
             Ok((width, height)),
             "the header says otherwise"
         );

@@ -8,6 +8,7 @@ mod address;
 #[cfg(feature = "tls")]
 mod any_certificate;
 mod completions;
+mod confined;
 mod evaluate;
 #[cfg(feature = "otel")]
 mod export;
@@ -58,6 +59,9 @@ enum Command {
     Sample(sample::Args),
     /// Ask a running service whether it is healthy.
     Health(health::Args),
+    /// Give up rights and become another program.
+    #[command(hide = true, name = confined::NAME, disable_help_flag = true)]
+    Confined(confined::Args),
     /// Print what completes commands and flags in a shell.
     Completions(completions::Args),
 }
@@ -85,6 +89,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Eval(args) => evaluate::run(args).map(done),
         Command::Sample(args) => sample::run(args).map(done),
         Command::Health(args) => health::run(args).map(done),
+        Command::Confined(args) => confined::run(args),
         Command::Completions(args) => completions::run(args, command()).map(done),
     };
     result.unwrap_or_else(|error| {

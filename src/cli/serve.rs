@@ -4,6 +4,7 @@
 //! signal ended it at once.
 
 use super::address::Addresses;
+use super::confined;
 use super::log::{Log, LogFormat};
 use super::memory_limit;
 use super::open_files;
@@ -40,6 +41,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 
 async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
+    confine_decoders(&mut config);
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let base_path = config.base_path.clone();
@@ -59,6 +61,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         sessions = mib(bound.sessions),
         connections = mib(bound.connections),
         store = mib(bound.store),
+        videos = mib(bound.videos),
         "resident memory stays below {} MiB",
         mib(bound.total())
     );
@@ -80,6 +83,21 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     match ended {
         true => Ok(()),
         false => Err("requests were cut off".into()),
+    }
+}
+
+/// Has ffmpeg started by this program, which gives up its rights before.
+fn confine_decoders(config: &mut Config) {
+    match std::env::current_exe() {
+        Ok(program) => {
+            config.limits.ffmpeg_launcher.0 = vec![program.into(), confined::NAME.into()]
+        }
+        Err(error) => tracing::warn!(%error, "ffmpeg has the rights of the service"),
+    }
+    if !confined::works() {
+        tracing::warn!(
+            "Landlock or seccomp is not to be had here: ffmpeg has more rights than it needs"
+        );
     }
 }
 

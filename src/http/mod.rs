@@ -20,6 +20,8 @@
 //! # }
 //! ```
 
+#![warn(clippy::disallowed_methods)]
+
 mod auth;
 mod config;
 mod extract;
@@ -49,6 +51,8 @@ pub use config::store::StoreConfig;
 #[cfg(feature = "tls")]
 pub use config::tls::TlsConfig;
 pub use extract::uploaded::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
+#[cfg(fuzzing)]
+pub use middleware::forwarded::address as forwarded_address;
 #[cfg(feature = "tls")]
 pub use net::certificate::{Certificate, CertificateError};
 pub use problems::kind::Kind as ProblemKind;

@@ -403,3 +403,24 @@ async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer(
         sent.elapsed()
     );
 }
+
+#[tokio::test]
+async fn a_message_has_the_time_of_a_body_however_fast_its_bytes_come() {
+    let app = TestApplication::start_with(|config| config.body_timeout = Duration::from_secs(1));
+    let app = app.await;
+    let id = app.open().await;
+    let mut client = StreamClient::open(&app, &id, "").await;
+    // 200 kB, ten times as fast as the least rate: it once could last for minutes.
+    client
+        .send_raw(&[0x82, 0xFF, 0, 0, 0, 0, 0, 3, 0x0D, 0x40, 0, 0, 0, 0])
+        .await;
+    let problem = loop {
+        client.send_raw(&[0; 4_096]).await;
+        tokio::select! {
+            problem = client.message() => break problem,
+            () = tokio::time::sleep(Duration::from_millis(100)) => {}
+        }
+    };
+    assert_eq!(problem["type"], "/docs/problems#body-timeout", "{problem}");
+    assert_eq!(client.close_code().await, 4408);
+}

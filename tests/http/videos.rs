@@ -4,6 +4,7 @@ use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::lines::lines;
 use crate::pictures;
+use crate::process::Service;
 use image::ImageFormat;
 use reqwest::{Method, Response};
 use std::io::Write;
@@ -212,4 +213,109 @@ async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place
     // It was at work all the time.
     held.chunk().await.unwrap().expect("another line");
     drop(held);
+}
+
+/// The lines up to the problem that ends them, which must name this many pictures before it.
+async fn until_damage(app: &TestApplication, video: Vec<u8>) -> usize {
+    let id = app.open().await;
+    let answer = post(app, &id, "video/mp4", video).await;
+    let mut got = match answer.status().is_success() {
+        true => lines(answer).await,
+        // Where the first picture cannot be had nothing was begun.
+        false => vec![expect_problem(answer, "frame-damaged").await],
+    };
+    let last = got.pop().expect("a line");
+    assert_eq!(last["type"], "/docs/problems#frame-damaged", "{last}");
+    let detail = last["detail"].as_str().unwrap();
+    let named = format!("from its picture {} on", got.len() + 1);
+    assert!(detail.contains(&named), "{named}: {detail}");
+    for (answer, t) in got.iter().zip(1..) {
+        let x = answer["box"]["x"].as_f64().unwrap();
+        assert!(
+            (x - f64::from(20 + 2 * t)).abs() < 3.0,
+            "frame {t}: {answer}"
+        );
+    }
+    assert_eq!(app.frames_of(&id).await, 1 + got.len() as u64);
+    got.len()
+}
+
+#[tokio::test]
+async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbered() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start().await;
+    let whole = video("mkv");
+    let at = |part: f64| (whole.len() as f64 * part) as usize;
+    // Each of these once was 200 with fewer lines and no problem, or with frames of wrong numbers.
+    let mut zeros = whole.clone();
+    zeros[at(0.4)..at(0.6)].fill(0);
+    assert!(until_damage(&app, zeros).await < FRAMES as usize);
+    assert!(until_damage(&app, whole[..at(0.6)].to_vec()).await < FRAMES as usize);
+    let mut noise = video("mp4");
+    let middle = noise.len() / 3;
+    noise[middle..middle + 500]
+        .iter_mut()
+        .for_each(|byte| *byte ^= 0x5A);
+    assert!(until_damage(&app, noise).await < FRAMES as usize);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
+    use std::io::{BufRead, BufReader};
+    let program = env!("CARGO_BIN_EXE_bagtrack");
+    let mut service = Command::new(program);
+    service.args(["serve", "--listen", "127.0.0.1:0"]);
+    let mut service = service.stderr(Stdio::piped()).spawn().unwrap();
+    let mut log = BufReader::new(service.stderr.take().unwrap()).lines();
+    let is_missing = log
+        .by_ref()
+        .map(Result::unwrap)
+        .take_while(|line| !line.contains("listening on"))
+        .any(|line| line.contains("Landlock or seccomp is not to be had"));
+    service.kill().unwrap();
+    service.wait().unwrap();
+    if is_missing {
+        return eprintln!("left out: this kernel has no Landlock or no seccomp");
+    }
+    let run = |command: &[&str]| {
+        let mut confined = Command::new(program);
+        let output = confined.arg("confined").args(command).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    assert_eq!(run(&["true"]).0, Some(0));
+    let (code, said) = run(&["cat", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
+    assert!(said.contains("Operation not permitted"), "{said}");
+    assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
+}
+
+#[tokio::test]
+async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
+    if !has_ffmpeg() {
+        return;
+    }
+    for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
+        let service = Service::start(&["--ffmpeg", program]).await;
+        let create = service
+            .client
+            .post(service.url(&format!("/sessions?box={BOX}")));
+        let created = create.body(pictures::png(0)).send().await.unwrap();
+        let created = expect(created, reqwest::StatusCode::CREATED).await;
+        let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
+        // Its index is at the end, so the decoder goes back in a file of its own.
+        let post = service.client.post(service.url(&url)).body(video("mp4"));
+        let answer = post.send().await.unwrap();
+        assert_eq!(answer.status(), status);
+        if status == 200 {
+            assert_eq!(lines(answer).await.len(), FRAMES as usize);
+        }
+    }
 }

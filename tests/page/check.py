@@ -19,12 +19,13 @@ import urllib.parse
 
 import files
 import local
+import studio
 from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
 from clips import Clips
 from playwright.sync_api import sync_playwright
 from service import Line, Service
 
-MAX_BYTES = 160_000
+MAX_BYTES = 200_000
 MAX_SECONDS_TO_PICTURE = 1.0
 EXAMPLES = WEB.parent / "clients" / "js" / "examples"
 PICTURE = "document.getElementById('picture').toDataURL('image/png')"
@@ -320,6 +321,7 @@ ALL = [
     busy_service,
     *files.ALL,
     *local.ALL,
+    *studio.ALL,
 ]
 
 

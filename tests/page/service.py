@@ -82,7 +82,12 @@ class Line:
                 client, _ = self.listener.accept()
             except OSError:
                 return
-            service = socket.create_connection(("127.0.0.1", self.target))
+            try:
+                service = socket.create_connection(("127.0.0.1", self.target))
+            except OSError:
+                # The service is starting again.
+                client.close()
+                continue
             for end in (client, service):
                 end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self.open += [client, service]

@@ -11,6 +11,7 @@ mod lost_records;
 mod pair;
 mod prefix;
 mod refusing;
+mod shares;
 mod sharing;
 mod stream_client;
 mod streams;

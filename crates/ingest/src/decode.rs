@@ -1,11 +1,15 @@
-//! The steps from bytes to a frame: sniff, limit, decode strictly, luma and chroma, EXIF orientation, downscale.
+//! The steps from bytes to a frame: sniff, read the structure, limit; then decode strictly, luma and chroma, EXIF
+//! orientation, downscale.
 
 use super::catch_decoder_panic::catch_decoder_panic;
 use super::error::IngestError;
+use super::jpeg::Jpeg;
 use super::limits::Limits;
+use super::orientation;
+use super::png_chunks::Png;
+use super::raster::{self, WebPFile};
 use super::scratch::Scratch;
 use super::sniff::{self, Format};
-use super::{jpeg, raster};
 use bagtrack_tracker::{Frame, FrameFormat};
 use std::cell::RefCell;
 
@@ -13,22 +17,87 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// Width and height of an uploaded frame as it is shown. Only the file's structure is read: no pixel is decoded.
+/// An uploaded file whose structure was read: it is a JPEG, PNG or WebP, whole as far as that shows, and within the
+/// limits. No pixel was decoded.
+pub struct Inspected<'file> {
+    file: File<'file>,
+    limits: Limits,
+}
+
+enum File<'file> {
+    Jpeg(Jpeg<'file>),
+    Png(Png<'file>),
+    WebP(Box<WebPFile<'file>>),
+}
+
+/// Reads the structure of an uploaded file.
 ///
 /// # Errors
 /// See [`IngestError`]. Bytes that pass may still fail to decode.
-pub fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
+pub fn inspect<'file>(
+    bytes: &'file [u8],
+    limits: &Limits,
+) -> Result<Inspected<'file>, IngestError> {
     limits.check_bytes(bytes.len())?;
     let format = sniff::format(bytes).ok_or_else(|| unread(bytes))?;
-    catch_decoder_panic(format, || match format {
-        Format::Jpeg => jpeg::size(bytes, limits),
-        Format::Png => raster::size_of_png(bytes, limits),
-        Format::WebP => raster::size_of_webp(bytes, limits),
-    })
+    let file = catch_decoder_panic(format, || {
+        Ok(match format {
+            Format::Jpeg => File::Jpeg(Jpeg::read(bytes, limits)?),
+            Format::Png => File::Png(raster::read_png(bytes, limits)?),
+            Format::WebP => File::WebP(Box::new(WebPFile::read(bytes, limits)?)),
+        })
+    })?;
+    let limits = *limits;
+    Ok(Inspected { file, limits })
 }
 
 fn unread(bytes: &[u8]) -> IngestError {
     sniff::unread_type(bytes).map_or(IngestError::UnknownFormat, IngestError::UnreadFormat)
+}
+
+impl Inspected<'_> {
+    /// Width and height as it is shown.
+    pub fn size(&self) -> (u32, u32) {
+        match &self.file {
+            File::Jpeg(jpeg) => jpeg.size(),
+            File::Png(png) => orientation::upright(png.size, orientation::of_exif(png.exif)),
+            File::WebP(webp) => webp.size(),
+        }
+    }
+
+    /// Decodes it in the format that a session wants. A frame that is smaller than that stays as it is.
+    ///
+    /// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of them
+    /// for its next frame, at most 32 MiB.
+    ///
+    /// # Errors
+    /// See [`IngestError`].
+    pub fn decode(self, format: FrameFormat) -> Result<Frame, IngestError> {
+        let (kind, limits) = (self.file.kind(), &self.limits);
+        catch_decoder_panic(kind, || {
+            SCRATCH.with_borrow_mut(|scratch| {
+                let planes = std::mem::take(&mut scratch.planes);
+                let stored = match self.file {
+                    File::Jpeg(jpeg) => jpeg.decode(limits, format, scratch)?,
+                    File::Png(png) => raster::decode_png(&png, limits, format)?,
+                    File::WebP(webp) => webp.decode(limits, format)?,
+                };
+                let frame = stored.into_frame(format, planes);
+                scratch.trim();
+                frame.map_err(|error| kind.damaged(error.to_string()))
+            })
+        })
+    }
+}
+
+impl File<'_> {
+    fn kind(&self) -> Format {
+        match self {
+            File::Jpeg(_) => Format::Jpeg,
+            File::Png(_) => Format::Png,
+            File::WebP(_) => Format::WebP,
+        }
+    }
 }
 
 /// Decodes one uploaded frame in its own size, in colour where it has any.
@@ -36,18 +105,15 @@ fn unread(bytes: &[u8]) -> IngestError {
 /// # Errors
 /// See [`IngestError`].
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Frame, IngestError> {
-    let whole = |size| FrameFormat {
+    let file = inspect(bytes, limits)?;
+    let size = file.size();
+    file.decode(FrameFormat {
         size,
         has_color: true,
-    };
-    decode_to(bytes, limits, &whole)
+    })
 }
 
-/// Decodes one uploaded frame in the format that a session wants: `format` says it from the upload's width and height.
-/// A frame that is smaller than that stays as it is.
-///
-/// Allocates at most [`Limits::max_memory`] bytes beside the upload itself and the frame. A thread keeps some of them
-/// for its next frame, at most 32 MiB.
+/// Decodes one uploaded frame as [`Inspected::decode`] does. `format` says the format from the upload's width and height.
 ///
 /// # Errors
 /// See [`IngestError`].
@@ -56,21 +122,9 @@ pub fn decode_to(
     limits: &Limits,
     format: &dyn Fn((u32, u32)) -> FrameFormat,
 ) -> Result<Frame, IngestError> {
-    limits.check_bytes(bytes.len())?;
-    let file = sniff::format(bytes).ok_or_else(|| unread(bytes))?;
-    catch_decoder_panic(file, || {
-        SCRATCH.with_borrow_mut(|scratch| {
-            let planes = std::mem::take(&mut scratch.planes);
-            let (stored, format) = match file {
-                Format::Jpeg => jpeg::decode(bytes, limits, format, scratch)?,
-                Format::Png => raster::decode_png(bytes, limits, format)?,
-                Format::WebP => raster::decode_webp(bytes, limits, format)?,
-            };
-            let frame = stored.into_frame(format, planes);
-            scratch.trim();
-            frame.map_err(|error| file.damaged(error.to_string()))
-        })
-    })
+    let file = inspect(bytes, limits)?;
+    let format = format(file.size());
+    file.decode(format)
 }
 
 /// Keeps the memory of a frame that is no longer needed, for the next one that this thread decodes.

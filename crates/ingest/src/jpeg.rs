@@ -10,6 +10,7 @@ use super::sniff::Format;
 use super::stored_image::{Channel, StoredImage};
 use bagtrack_tracker::FrameFormat;
 use bagtrack_tracker::ycbcr::{self, Order};
+use image::metadata::Orientation;
 use std::borrow::Cow;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
@@ -17,66 +18,69 @@ use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 
-/// A JPEG's luma and chroma: at full size or, with libjpeg-turbo, reduced.
-pub(super) fn decode<'scratch>(
-    bytes: &[u8],
-    limits: &Limits,
-    format: &dyn Fn((u32, u32)) -> FrameFormat,
-    scratch: &'scratch mut Scratch,
-) -> Result<(StoredImage<'scratch>, FrameFormat), IngestError> {
-    let markers = read_markers(bytes, limits)?;
-    let source = (markers.width, markers.height);
-    let orientation = orientation::of_exif(markers.exif(bytes));
-    let format = format(orientation::upright(source, orientation));
-    let format = FrameFormat {
-        has_color: format.has_color && markers.has_usual_chroma(),
-        ..format
-    };
-    // Before it is turned upright, as the decoder sees it.
-    let stored_format = FrameFormat {
-        size: orientation::upright(format.size, orientation),
-        ..format
-    };
-    #[cfg(feature = "turbo")]
-    {
-        let pixels = &mut scratch.pixels;
-        if let Some(planes) = super::turbo::decode(bytes, &markers, limits, stored_format, pixels) {
-            let stored = planes.of(&scratch.pixels, source, orientation);
-            return Ok((stored, format));
+/// A JPEG whose markers were read.
+pub(super) struct Jpeg<'file> {
+    bytes: &'file [u8],
+    markers: Markers,
+    orientation: Orientation,
+}
+
+impl<'file> Jpeg<'file> {
+    /// Reads the markers.
+    pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
+        let damaged = |reason: &str| Format::Jpeg.damaged(reason);
+        let markers = Markers::read(bytes).map_err(damaged)?;
+        // A height of 0 would be told after the first scan; no decoder here reads that.
+        if markers.width == 0 || markers.height == 0 {
+            return Err(damaged("its width or its height is 0"));
         }
+        limits.check_size(markers.width, markers.height)?;
+        if markers.is_implausibly_small() {
+            return Err(damaged("it holds less data than its size needs"));
+        }
+        let orientation = orientation::of_exif(markers.exif(bytes));
+        Ok(Self {
+            bytes,
+            markers,
+            orientation,
+        })
     }
-    let (luma, chroma) = decode_channels(bytes, &markers, limits, stored_format, scratch)?;
-    let stored = StoredImage {
-        luma,
-        chroma,
-        source,
-        orientation,
-    };
-    Ok((stored, format))
-}
 
-/// Width and height of a JPEG as it is shown.
-pub(super) fn size(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
-    let markers = read_markers(bytes, limits)?;
-    let orientation = orientation::of_exif(markers.exif(bytes));
-    Ok(orientation::upright(
-        (markers.width, markers.height),
-        orientation,
-    ))
-}
+    /// Width and height as it is shown.
+    pub(super) fn size(&self) -> (u32, u32) {
+        let stored = (self.markers.width, self.markers.height);
+        orientation::upright(stored, self.orientation)
+    }
 
-fn read_markers(bytes: &[u8], limits: &Limits) -> Result<Markers, IngestError> {
-    let damaged = |reason: &str| Format::Jpeg.damaged(reason);
-    let markers = Markers::read(bytes).map_err(damaged)?;
-    // A height of 0 would be told after the first scan; no decoder here reads that.
-    if markers.width == 0 || markers.height == 0 {
-        return Err(damaged("its width or its height is 0"));
+    /// Its luma and chroma: at full size or reduced.
+    pub(super) fn decode<'scratch>(
+        &self,
+        limits: &Limits,
+        format: FrameFormat,
+        scratch: &'scratch mut Scratch,
+    ) -> Result<StoredImage<'scratch>, IngestError> {
+        let (bytes, markers, orientation) = (self.bytes, &self.markers, self.orientation);
+        let source = (markers.width, markers.height);
+        // Before it is turned upright, as the decoder sees it.
+        let format = FrameFormat {
+            size: orientation::upright(format.size, orientation),
+            has_color: format.has_color && markers.has_usual_chroma(),
+        };
+        #[cfg(feature = "turbo")]
+        {
+            let pixels = &mut scratch.pixels;
+            if let Some(planes) = super::turbo::decode(bytes, markers, limits, format, pixels) {
+                return Ok(planes.of(&scratch.pixels, source, orientation));
+            }
+        }
+        let (luma, chroma) = decode_channels(bytes, markers, limits, format, scratch)?;
+        Ok(StoredImage {
+            luma,
+            chroma,
+            source,
+            orientation,
+        })
     }
-    limits.check_size(markers.width, markers.height)?;
-    if markers.is_implausibly_small() {
-        return Err(damaged("it holds less data than its size needs"));
-    }
-    Ok(markers)
 }
 
 /// Luma and chroma, without libjpeg-turbo. zune-jpeg reads the headers of every file, and decodes those that are not

@@ -16,8 +16,11 @@
 //! What can go wrong: the bytes are hostile. They may claim a huge size, be cut short, or cost far more to decode than
 //! to send. So the structure of the file is read, and every limit checked, before a pixel is decoded.
 //!
-//! With the feature `turbo`, libjpeg-turbo decodes the usual JPEGs, and reduces large ones as it does. It is a fast
-//! path: on any warning, and for any file that it does not take, zune-jpeg decides. So the same files are errors.
+//! [`inspect`] does that once; what it returns knows the size, and decodes without reading the structure again.
+//!
+//! zune-jpeg reads the headers of every JPEG and decides what is damaged. rusty_jpeg decodes those with one scan, as the
+//! components that are stored, and reduces large ones as it does; with the feature `turbo`, libjpeg-turbo is asked
+//! first. Both are fast paths: on any error or warning, and for any file that they do not take, zune-jpeg decides.
 //!
 //! ```
 //! use bagtrack_ingest::{decode, IngestError, Limits};
@@ -46,7 +49,7 @@ pub mod video;
 mod vp8l;
 mod webp_chunks;
 
-pub use decode::{decode, decode_to, recycle, size};
+pub use decode::{Inspected, decode, decode_to, inspect, recycle};
 pub use error::IngestError;
 pub use limits::Limits;
 pub use sniff::{type_name, unread_type};

@@ -16,12 +16,22 @@ use image::{DynamicImage, ImageDecoder, ImageError};
 use std::borrow::Cow;
 use std::io::Cursor;
 
-pub(super) fn decode_png(
-    bytes: &[u8],
+/// Walks the chunks of a PNG.
+pub(super) fn read_png<'file>(
+    bytes: &'file [u8],
     limits: &Limits,
-    format: &dyn Fn((u32, u32)) -> FrameFormat,
-) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    let png = read_png(bytes, limits)?;
+) -> Result<Png<'file>, IngestError> {
+    let png = Png::read(bytes).map_err(|reason| Format::Png.damaged(reason))?;
+    limits.check_size(png.size.0, png.size.1)?;
+    Ok(png)
+}
+
+/// The luma and chroma of a PNG.
+pub(super) fn decode_png(
+    png: &Png,
+    limits: &Limits,
+    format: FrameFormat,
+) -> Result<StoredImage<'static>, IngestError> {
     let needed = png.without_side_chunks();
     let copied = match &needed {
         Cow::Borrowed(_) => 0,
@@ -31,66 +41,70 @@ pub(super) fn decode_png(
     decoder_limits.max_alloc = Some(limits.max_memory);
     let decoder = PngDecoder::with_limits(Cursor::new(&needed[..]), decoder_limits)
         .map_err(|error| typed(Format::Png, error))?;
-    decode(decoder, Format::Png, 0, copied, limits, format)
-}
-
-pub(super) fn decode_webp(
-    bytes: &[u8],
-    limits: &Limits,
-    format: &dyn Fn((u32, u32)) -> FrameFormat,
-) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    let webp = WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
-    let decoder =
-        WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
-    limits.check_size(decoder.dimensions().0, decoder.dimensions().1)?;
-    let codes = webp.memory_of_codes(decoder.dimensions());
-    let codes = codes.ok_or_else(|| Format::WebP.damaged("its codes cannot be read"))?;
-    let per_pixel = webp.working_bytes_per_pixel();
-    decode(decoder, Format::WebP, per_pixel, codes, limits, format)
-}
-
-/// Width and height of a PNG as it is shown.
-pub(super) fn size_of_png(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
-    let png = read_png(bytes, limits)?;
+    if decoder.dimensions() != png.size {
+        return Err(Format::Png.damaged("its headers contradict each other"));
+    }
+    limits.check_memory(memory(&decoder) + copied)?;
     let orientation = orientation::of_exif(png.exif);
-    Ok(orientation::upright(png.size, orientation))
+    decode(decoder, Format::Png, orientation, format)
 }
 
-/// Width and height of a WebP as it is shown.
-pub(super) fn size_of_webp(bytes: &[u8], limits: &Limits) -> Result<(u32, u32), IngestError> {
-    WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
-    let mut decoder =
-        WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
+/// A WebP whose structure was read.
+pub(super) struct WebPFile<'file> {
+    chunks: WebP<'file>,
+    decoder: WebPDecoder<Cursor<&'file [u8]>>,
+    orientation: Orientation,
+}
+
+impl<'file> WebPFile<'file> {
+    /// Walks the chunks.
+    pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
+        let chunks = WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
+        let mut decoder =
+            WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
+        let (width, height) = decoder.dimensions();
+        limits.check_size(width, height)?;
+        let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+        Ok(Self {
+            chunks,
+            decoder,
+            orientation,
+        })
+    }
+
+    /// Width and height as it is shown.
+    pub(super) fn size(&self) -> (u32, u32) {
+        orientation::upright(self.decoder.dimensions(), self.orientation)
+    }
+
+    /// Its luma and chroma.
+    pub(super) fn decode(
+        self,
+        limits: &Limits,
+        format: FrameFormat,
+    ) -> Result<StoredImage<'static>, IngestError> {
+        let (width, height) = self.decoder.dimensions();
+        let codes = self.chunks.memory_of_codes((width, height));
+        let codes = codes.ok_or_else(|| Format::WebP.damaged("its codes cannot be read"))?;
+        let beside = self.chunks.working_bytes_per_pixel() * u64::from(width) * u64::from(height);
+        limits.check_memory(memory(&self.decoder) + beside + codes)?;
+        decode(self.decoder, Format::WebP, self.orientation, format)
+    }
+}
+
+/// Bytes of the decoded image, of its luma, and of its chroma in half of the columns and rows.
+fn memory(decoder: &impl ImageDecoder) -> u64 {
     let (width, height) = decoder.dimensions();
-    limits.check_size(width, height)?;
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    Ok(orientation::upright((width, height), orientation))
+    decoder.total_bytes() + u64::from(width) * u64::from(height) * 3 / 2
 }
 
-fn read_png<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Png<'a>, IngestError> {
-    let png = Png::read(bytes).map_err(|reason| Format::Png.damaged(reason))?;
-    limits.check_size(png.size.0, png.size.1)?;
-    Ok(png)
-}
-
-/// Decodes to luma. `beside` bytes are allocated beside what depends on the number of pixels.
 fn decode(
-    mut decoder: impl ImageDecoder,
+    decoder: impl ImageDecoder,
     file: Format,
-    working_bytes_per_pixel: u64,
-    beside: u64,
-    limits: &Limits,
-    format: &dyn Fn((u32, u32)) -> FrameFormat,
-) -> Result<(StoredImage<'static>, FrameFormat), IngestError> {
-    let (width, height) = decoder.dimensions();
-    limits.check_size(width, height)?;
-    // The decoded image, what the decoder needs beside it, the luma, and the chroma in half of the columns and rows.
-    let pixels = u64::from(width) * u64::from(height);
-    let beside = working_bytes_per_pixel * pixels + pixels * 3 / 2 + beside;
-    limits.check_memory(decoder.total_bytes() + beside)?;
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let source = (width, height);
-    let format = format(orientation::upright(source, orientation));
+    orientation: Orientation,
+    format: FrameFormat,
+) -> Result<StoredImage<'static>, IngestError> {
+    let source = decoder.dimensions();
     let image = DynamicImage::from_decoder(decoder).map_err(|error| typed(file, error))?;
     let chroma = format.has_color.then(|| chroma_of(&image)).flatten();
     let channel = |values, size| Channel {
@@ -98,13 +112,12 @@ fn decode(
         size,
     };
     let half = ycbcr::chroma_size(source);
-    let stored = StoredImage {
+    Ok(StoredImage {
         luma: channel(luma_of(image).into_raw(), source),
         chroma: chroma.map(|planes| planes.map(|plane| channel(plane, half))),
         source,
         orientation,
-    };
-    Ok((stored, format))
+    })
 }
 
 fn typed(format: Format, error: ImageError) -> IngestError {

@@ -3,6 +3,10 @@
 //! Such an image may have up to 65,536 groups of five codes. A group of some bytes can describe codes for which the
 //! decoder allocates a hundred kilobytes, and no header tells how many groups there are. So the file is read up to its
 //! last code: the small images before the pixels are walked through, and no pixel is kept.
+//!
+//! Nothing simpler bounds it. image-webp 0.2.4 allocates every group up to the largest number that stands in the small
+//! image of groups, whether a pixel uses it or not, so the number of pixels is no bound; its `set_memory_limit` is asked
+//! for metadata only. A bound by pixels that holds would be that of 65,536 groups, whatever the image.
 
 use super::prefix_codes::{Bits, Code};
 

@@ -1,8 +1,26 @@
-//! The time by which sessions expire: the monotonic clock. It can be moved forward, so tests need not wait.
+//! The one place that asks for the time, and through which everything waits.
+//!
+//! Moments, sleeping and time-outs are tokio's, whose time a test pauses and moves (`start_paused`). Sessions expire by a
+//! [`Clock`], which moves forward for itself: so a test of the whole service need not wait either.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
+pub use tokio::time::{
+    Instant, Sleep, interval, interval_at, sleep, sleep_until, timeout, timeout_at,
+};
+
+/// The moment now.
+#[allow(clippy::disallowed_methods)]
+pub fn now() -> Instant {
+    Instant::now()
+}
+
+/// The time of day.
+#[allow(clippy::disallowed_methods)]
+pub(crate) fn wall_now() -> SystemTime {
+    SystemTime::now()
+}
 
 /// A monotonic clock that can be moved forward. Clones share the time.
 #[derive(Debug, Clone)]
@@ -15,9 +33,9 @@ pub struct Clock {
 impl Default for Clock {
     fn default() -> Self {
         Self {
-            start: Instant::now(),
+            start: now(),
             advanced_ms: Arc::default(),
-            wall: SystemTime::now,
+            wall: wall_now,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! [`Registry`], found by its id.
 //!
 //! [`SessionService`] is the one door. A request for a session takes these steps: [`SessionService::find`] finds it for
-//! its owner, [`Session::enter`] takes one of its few permits, [`ByteCharge::grow`] charges the bytes of its body as they
+//! its owner, [`Session::enter`] takes one of its few permits, [`Charge::grow`] charges the bytes of its body as they
 //! arrive, [`Admission::enter`] takes a place in the queue before the workers, and [`SessionService::advance`] waits for
 //! the session in order of arrival, and works with a copy of its state on a worker thread.
 //!
@@ -18,8 +18,10 @@
 //! - A snapshot comes back damaged or forged. It carries a code under a key of the service ([`MacKeys`]), and all in it
 //!   is checked and bounded: see [`SnapshotError`].
 
+#![warn(clippy::disallowed_methods)]
+
 mod acts;
-mod clock;
+pub mod clock;
 mod compression;
 mod expired;
 mod insertion;
@@ -57,10 +59,8 @@ pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
-pub use scheduler::admission::{Admission, QueueFull, WorkPanicked};
-pub use scheduler::budget::{
-    Budget, Budget as ByteBudget, Charge, Charge as ByteCharge, Full as BytesFull,
-};
+pub use scheduler::admission::{Admission, QueueFull, WorkPanicked, threads_of};
+pub use scheduler::budget::{Budget, Charge, Full as BytesFull};
 pub use scheduler::charged_bytes::ChargedBytes;
 pub use scheduler::fair_queue::WorkerSlot;
 pub use scheduler::flows::Flow;
@@ -78,6 +78,7 @@ pub use store::{
     Local, Outcome, Record, RedisAddress, RedisAddressError, RedisStore, SessionName, SessionStore,
     Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version, reconcile,
 };
+pub use store::{Counted, StoreShare};
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,

@@ -7,11 +7,11 @@
 use super::session::Session;
 use super::state::SessionState;
 use super::store::Version;
+use crate::clock::timeout;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::{OwnedMutexGuard, OwnedSemaphorePermit};
-use tokio::time::timeout;
 
 /// How many frames a numbered one may be ahead of its turn.
 const MAX_EARLY: u64 = 16;
@@ -32,10 +32,24 @@ impl Session {
     /// # Errors
     /// All permits are taken.
     pub fn enter(self: &Arc<Self>) -> Result<SessionPermit, SessionBusy> {
-        let mut permit = self.read_permit()?;
-        permit.has_frames = true;
-        permit.overlaps = self.frame_requests.fetch_add(1, Ordering::AcqRel) > 0;
-        Ok(permit)
+        let permit = self.permits.clone().try_acquire_owned();
+        Ok(self.frames_permit(permit.map_err(|_| SessionBusy)?))
+    }
+
+    /// The same, but waits for a permit, in order of arrival. An ended session gives them, too.
+    pub async fn enter_in_order(self: &Arc<Self>) -> SessionPermit {
+        let permit = self.permits.clone().acquire_owned().await;
+        let permit = permit.expect("the permits are never closed");
+        self.frames_permit(permit)
+    }
+
+    fn frames_permit(self: &Arc<Self>, permit: OwnedSemaphorePermit) -> SessionPermit {
+        SessionPermit {
+            session: self.clone(),
+            has_frames: true,
+            overlaps: self.frame_requests.fetch_add(1, Ordering::AcqRel) > 0,
+            permit: Arc::new(permit),
+        }
     }
 
     /// Takes a permit of the session, to look at it.

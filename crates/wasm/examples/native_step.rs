@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings {
         width: 640,
         height: 480,
-        frames: 60,
+        frames: 300,
         ..Settings::default()
     };
     let clip = Clip::new(settings)?;
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let picture = clip.draw(index);
         Frame::from_rgb(picture.width(), picture.height(), &picture)
     };
-    let frames = (0..60).map(frame).collect::<Result<Vec<_>, _>>()?;
+    let frames = (0..300).map(frame).collect::<Result<Vec<_>, _>>()?;
     let mut tracker = Tracker::new(&frames[0], clip.target(0), Preset::Robust.params())?;
     let mut millis: Vec<f64> = Vec::new();
     for frame in &frames[1..] {

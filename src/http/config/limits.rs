@@ -1,8 +1,12 @@
 //! The settings that bound what one request, one connection and one client may take.
 
+use super::launcher::Launcher;
 use super::settings::{moment, positive, positive_share, settings};
 use ipnet::IpNet;
 use std::time::Duration;
+
+/// In place of the name of the program that decodes videos: there is none.
+pub const OFF: &str = "off";
 
 settings! {
     /// What one request, one connection and one client may take.
@@ -44,5 +48,9 @@ settings! {
         /// Addresses and networks, like `10.0.0.0/8`, separated by commas, whose `Forwarded` or `X-Forwarded-For` tells
         /// the client's address.
         trusted_proxies: Vec<IpNet> = Vec::new();
+    }
+    flattened {
+        /// What starts the program that decodes videos.
+        ffmpeg_launcher: Launcher;
     }
 }

@@ -1,7 +1,9 @@
 //! How much memory the service takes at most, by its settings.
 
+use super::limits::OFF;
 use super::service::Config;
-use bagtrack_sessions::MAX_LIST_BYTES;
+use bagtrack_ingest::video::MAX_DECODER_MEMORY;
+use bagtrack_sessions::{MAX_LIST_BYTES, threads_of};
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
@@ -38,13 +40,16 @@ pub struct MemoryBound {
     pub connections: u64,
     /// The store in a folder, where there is one.
     pub store: u64,
+    /// The processes that decode videos.
+    pub videos: u64,
 }
 
 impl MemoryBound {
     /// Of a service with these settings.
     pub fn of(config: &Config) -> Self {
         let count = |n: usize| n as u64;
-        let images = count(config.max_frames) * WORKING_IMAGE;
+        let workers = count(config.worker_count());
+        let threads = workers + count(threads_of(config.worker_count()));
         // A body is copied once on its way, from the connection's buffer or out of base64.
         let worker = config
             .max_frame_memory
@@ -52,10 +57,10 @@ impl MemoryBound {
             + WORKER;
         Self {
             uploads: count(config.max_upload_bytes),
-            // There are quick and slow workers, and as many threads may wait between two frames. Each has a copy of its
-            // session's targets.
-            work: count(config.worker_count())
-                * (2 * (worker + WORKER) + 3 * (images + count(MAX_LIST_BYTES))),
+            // There are quick and slow workers. Of the work on several frames some more may wait between two of them, with
+            // what its thread keeps. Each has a frame and a copy of its session's targets.
+            work: 2 * workers * (worker - WORKER)
+                + threads * (WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES)),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * connection(config),
             store: if config.store.is_in_folder() {
@@ -63,12 +68,22 @@ impl MemoryBound {
             } else {
                 0
             },
+            videos: match config.limits.ffmpeg.as_str() {
+                OFF => 0,
+                _ => count(config.video_places()) * MAX_DECODER_MEMORY,
+            },
         }
     }
 
     /// All parts together, with the program itself.
     pub fn total(&self) -> u64 {
-        PROGRAM + self.uploads + self.work + self.sessions + self.connections + self.store
+        PROGRAM
+            + self.uploads
+            + self.work
+            + self.sessions
+            + self.connections
+            + self.videos
+            + self.store
     }
 }
 

@@ -108,6 +108,11 @@ impl Config {
         self.worker_count().div_ceil(8).clamp(1, cores())
     }
 
+    /// How many videos are decoded at the same time. A client has one of these places.
+    pub fn video_places(&self) -> usize {
+        self.worker_count().clamp(2, 4)
+    }
+
     /// The limits of one frame.
     pub fn frame_limits(&self) -> bagtrack_ingest::Limits {
         bagtrack_ingest::Limits {

@@ -10,7 +10,7 @@ use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
-use bagtrack_sessions::{ByteCharge, BytesFull};
+use bagtrack_sessions::{BytesFull, Charge};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
 use tower_http::timeout::TimeoutError;
@@ -23,12 +23,12 @@ pub(super) struct Buffer<'a> {
     bytes: Vec<u8>,
     /// Most bytes that may come.
     max: usize,
-    charge: &'a mut ByteCharge,
+    charge: &'a mut Charge,
 }
 
 impl<'a> Buffer<'a> {
     /// Empty, for at most `max` bytes.
-    pub(super) fn new(max: usize, charge: &'a mut ByteCharge) -> Self {
+    pub(super) fn new(max: usize, charge: &'a mut Charge) -> Self {
         Self {
             bytes: Vec::new(),
             max,
@@ -70,7 +70,7 @@ impl<'a> Buffer<'a> {
 pub(super) async fn read(
     body: Body,
     config: &Config,
-    charge: &mut ByteCharge,
+    charge: &mut Charge,
 ) -> Result<Bytes, Problem> {
     let max_bytes = config.max_body_bytes;
     let announced = http_body::Body::size_hint(&body).upper();

@@ -12,7 +12,7 @@ use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
-use bagtrack_sessions::ByteCharge;
+use bagtrack_sessions::Charge;
 use http_body::Frame;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -90,7 +90,7 @@ pub(super) async fn read<S: Settings>(
     max_bytes: usize,
     max_files: usize,
     fields: &mut Fields,
-    charge: &mut ByteCharge,
+    charge: &mut Charge,
 ) -> Result<(), Problem> {
     let progress = Arc::new(Progress::default());
     let request = request.map(|body| {
@@ -130,7 +130,7 @@ async fn read_part(
     progress: &Progress,
     max_bytes: usize,
     enough: usize,
-    charge: &mut ByteCharge,
+    charge: &mut Charge,
 ) -> Result<Bytes, Problem> {
     let mut buffer = Buffer::new(enough, charge);
     while let Some(piece) = part

@@ -4,7 +4,7 @@
 use crate::http::config::service::Config;
 use crate::http::net::least_rate::LeastRate;
 use axum::body::{Body, Bytes};
-use bagtrack_sessions::ByteCharge;
+use bagtrack_sessions::Charge;
 use futures_util::{StreamExt, stream};
 use std::task::{Poll, ready};
 
@@ -15,7 +15,7 @@ pub(super) struct TooSlow;
 
 /// A body that fails when it is slower than these settings say. Where its reader keeps what arrives, `charge` pays for
 /// that.
-pub(super) fn paced(body: Body, config: &Config, mut charge: Option<ByteCharge>) -> Body {
+pub(super) fn paced(body: Body, config: &Config, mut charge: Option<Charge>) -> Body {
     let limits = &config.limits;
     let rate = LeastRate::new(limits.body_grace, limits.min_body_rate);
     // What comes early may be followed by a pause.

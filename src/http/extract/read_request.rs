@@ -6,7 +6,7 @@ use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
-use bagtrack_sessions::{ByteCharge, QueuePermit, SessionPermit};
+use bagtrack_sessions::{Charge, QueuePermit, SessionPermit};
 
 /// A request to look at a session's state, with its permits.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub struct ReadRequest<Q> {
     /// The place in the queue.
     pub queue: QueuePermit,
     /// Pays for the answer; nothing so far.
-    pub charge: ByteCharge,
+    pub charge: Charge,
 }
 
 impl<Q: FromRequestParts<AppState, Rejection = Problem> + Send> FromRequestParts<AppState>

@@ -16,7 +16,7 @@ use axum::extract::Request;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::request::Parts;
 use bagtrack_ingest::video::{VideoFormat, video_format};
-use bagtrack_sessions::{ByteCharge, ChargedBytes, QueuePermit, WorkMeter};
+use bagtrack_sessions::{Charge, ChargedBytes, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
 /// The media type of session snapshots.
@@ -62,7 +62,7 @@ impl<S: Settings> Upload<S> {
         request: Request,
     ) -> Result<(Self, QueuePermit), Problem> {
         let max_bytes = state.config.max_body_bytes;
-        let new_charge = || ByteCharge::new(&state.uploads, permit.bytes());
+        let new_charge = || Charge::new(&state.uploads, permit.bytes());
         let mut charge = new_charge();
         let max_files = match S::FRAMES {
             FrameCount::One => 1,

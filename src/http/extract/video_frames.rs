@@ -1,22 +1,20 @@
 //! The frames of an uploaded video, as they are decoded.
 
 use super::video_place::VideoPlace;
+use crate::http::config::limits::OFF;
 use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
+use bagtrack_sessions::clock::timeout;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 use tokio::sync::mpsc;
-use tokio::time::timeout;
 
 /// Decoded pictures that wait to be tracked.
 const MAX_WAITING: usize = 2;
-
-/// In place of the program's name: there is none.
-const OFF: &str = "off";
 
 /// The frames of a video. Its process ends when this is dropped.
 #[derive(Debug)]
@@ -51,7 +49,9 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let mut decoder = VideoDecoder::of_bytes(&config.limits.ffmpeg, video, format, limits)?;
+        let launcher = &config.limits.ffmpeg_launcher.0;
+        let mut decoder =
+            VideoDecoder::of_bytes(launcher, &config.limits.ffmpeg, video, format, limits)?;
         let stop = decoder.stop();
         let (send, pictures) = mpsc::channel(MAX_WAITING);
         let reading = move || {
@@ -112,9 +112,9 @@ impl From<VideoError> for Problem {
     fn from(error: VideoError) -> Self {
         match error {
             VideoError::NoProgram { .. } => no_decoder().caused_by(Arc::new(error)),
-            VideoError::Damaged(reason) => {
+            VideoError::Damaged { picture, reason } => {
                 let detail = format!(
-                    "The video cannot be decoded: {reason}. The frames before count. Send MP4, WebM, GIF or Motion JPEG."
+                    "The video cannot be decoded from its picture {picture} on: {reason}. The frames before count. Send MP4, WebM, GIF or Motion JPEG."
                 );
                 Self::new(Kind::FrameDamaged, detail)
             }

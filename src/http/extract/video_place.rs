@@ -3,13 +3,9 @@
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
+use bagtrack_sessions::clock::{self, timeout_at};
 use bagtrack_sessions::{QueueFull, QueuePermit};
-use std::time::Duration;
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{Instant, sleep, timeout_at};
-
-/// How long a frame of a video waits before it asks for a place in the quota again.
-const RETRY: Duration = Duration::from_millis(20);
 
 /// A place for a process that decodes a video, given back when this is dropped.
 #[derive(Debug)]
@@ -23,14 +19,9 @@ pub struct VideoPlace {
 /// # Errors
 /// It has none in the time that a request may take.
 pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Problem> {
+    let deadline = clock::now() + state.config.work_timeout;
     let account = state.clients.account(client);
-    let deadline = Instant::now() + state.config.work_timeout;
-    loop {
-        match account.count_frames(1) {
-            Err(_) if Instant::now() < deadline => sleep(RETRY).await,
-            counted => return counted,
-        }
-    }
+    account.count_frame_in_order(deadline).await
 }
 
 impl VideoPlace {
@@ -45,7 +36,7 @@ impl VideoPlace {
         queue: QueuePermit,
     ) -> Result<(Self, QueuePermit), Problem> {
         let config = &state.config;
-        let deadline = Instant::now() + config.work_timeout;
+        let deadline = clock::now() + config.work_timeout;
         let request = queue.yield_place();
         let own = state.clients.account(client).videos().acquire_owned();
         let own = timeout_at(deadline, own).await.ok().and_then(Result::ok);

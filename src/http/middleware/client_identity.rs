@@ -8,6 +8,7 @@ use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
+use bagtrack_sessions::clock::sleep;
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
 use tracing::Span;
@@ -47,7 +48,7 @@ pub async fn identify(State(state): State<AppState>, mut request: Request, next:
     let problem = response.extensions().get::<Problem>();
     if problem.is_some_and(|problem| problem.kind() == Kind::QuotaExceeded) {
         // Whoever does not wait before it asks again costs the network threads time.
-        tokio::time::sleep(REFUSAL_DELAY).await;
+        sleep(REFUSAL_DELAY).await;
     }
     if let Some(client) = client {
         state.clients.write_headers(&client, response.headers_mut());

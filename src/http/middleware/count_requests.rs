@@ -6,8 +6,8 @@ use axum::extract::{MatchedPath, Request, State};
 use axum::http::Method;
 use axum::middleware::Next;
 use axum::response::Response;
+use bagtrack_sessions::clock;
 use http_body_util::BodyExt;
-use std::time::Instant;
 
 /// The middleware. It has to see the matched route.
 pub async fn count_request(
@@ -15,7 +15,7 @@ pub async fn count_request(
     request: Request,
     next: Next,
 ) -> Response {
-    let started = Instant::now();
+    let started = clock::now();
     let method = method_label(request.method());
     let route = request.extensions().get::<MatchedPath>().cloned();
     let received = state.metrics.received_bytes.clone();

@@ -89,6 +89,19 @@ mod tests {
         address(peer.parse().unwrap(), &map, &trusted).to_string()
     }
 
+    proptest::proptest! {
+        #[test]
+        fn nothing_that_a_client_writes_before_what_the_proxy_adds_changes_whose_request_it_is(
+            before in "[ -~]{0,60}", lines in 0..3_usize
+        ) {
+            let mut headers = vec![("x-forwarded-for", before.as_str()); lines];
+            let added = format!("{before}, 198.51.100.9");
+            headers.push(("x-forwarded-for", &added));
+            proptest::prop_assert_eq!(client("10.0.0.1", &headers), "198.51.100.9");
+            proptest::prop_assert_eq!(client("192.0.2.1", &headers), "192.0.2.1");
+        }
+    }
+
     #[test]
     fn only_trusted_proxies_are_believed_and_only_what_they_added() {
         for (peer, headers, expected) in [

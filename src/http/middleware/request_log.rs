@@ -12,10 +12,10 @@ use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
+use bagtrack_sessions::clock;
 use bagtrack_sessions::short_id;
 use percent_encoding::percent_decode_str;
 use std::net::IpAddr;
-use std::time::Instant;
 use tracing::field::Empty;
 use tracing::{Instrument, Level, Span};
 use uuid::Uuid;
@@ -32,7 +32,7 @@ pub async fn log_request(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let started = Instant::now();
+    let started = clock::now();
     let is_probe = PROBES.contains(&request.uri().path());
     let address = note_address(&state, &mut request);
     let (span, context) = (

@@ -2,6 +2,7 @@
 
 use axum::body::{Body, Bytes, HttpBody};
 use axum::response::Response;
+use bagtrack_sessions::clock::{self, Instant};
 use http_body::{Frame, SizeHint};
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
@@ -9,10 +10,9 @@ use std::sync::{Arc, LazyLock};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::Notify;
-use tokio::time::Instant;
 
 /// Moments are counted from here.
-static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+static START: LazyLock<Instant> = LazyLock::new(clock::now);
 
 const IDLE: u8 = 0;
 const RECEIVING: u8 = 1;

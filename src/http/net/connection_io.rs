@@ -9,13 +9,13 @@ use super::activity::Activity;
 use super::handshake::Transport;
 use super::least_rate::LeastRate;
 use crate::http::config::limits::LimitsConfig;
+use bagtrack_sessions::clock::{self, Instant, Sleep, sleep_until};
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Time for a handler to read the body that has come.
 const READING: Duration = Duration::from_millis(500);
@@ -90,7 +90,7 @@ impl AsyncRead for ConnectionIo {
                 false => self.half_close_timeout.min(READING),
             };
             let (since, gone) = self.half_closed.get_or_insert_with(|| {
-                let now = Instant::now();
+                let now = clock::now();
                 (now, Box::pin(sleep_until(now)))
             });
             if gone.deadline() != *since + patience {

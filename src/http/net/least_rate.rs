@@ -3,10 +3,10 @@
 //! Only the time counts in which the service waits for the client. The client may use up a fixed time of it; bytes that go
 //! over pay some of it back, and where that is allowed some in advance. So a client that now and then moves a byte does not hold its connection for long.
 
+use bagtrack_sessions::clock::{self, Instant, Sleep, sleep_until};
 use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
-use tokio::time::{Instant, Sleep, sleep_until};
 
 /// How long a client may be waited for.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl LeastRate {
             left: grace,
             most: grace,
             since: None,
-            late: Box::pin(sleep_until(Instant::now())),
+            late: Box::pin(sleep_until(clock::now())),
         }
     }
 
@@ -40,6 +40,11 @@ impl LeastRate {
             most: most.max(self.most),
             ..self
         }
+    }
+
+    /// None of the time is used up.
+    pub fn reset(&mut self) {
+        (self.left, self.since) = (self.most, None);
     }
 
     /// So many bytes went over.
@@ -60,7 +65,7 @@ impl LeastRate {
     /// Waits for the client; ready when it is too slow.
     pub fn poll_late(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         if self.since.is_none() {
-            let now = Instant::now();
+            let now = clock::now();
             self.since = Some(now);
             self.late.as_mut().reset(now + self.left);
         }

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 32] = [
+const FILES: [File; 37] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("box.js", SCRIPT),
@@ -57,13 +57,18 @@ const FILES: [File; 32] = [
     file!("chart.js", SCRIPT),
     file!("clip.js", SCRIPT),
     file!("file.js", SCRIPT),
+    file!("follower.js", SCRIPT),
+    file!("list.js", SCRIPT),
     file!("matroska.js", SCRIPT),
+    file!("objects.js", SCRIPT),
     file!("problems.js", SCRIPT),
     file!("recording.js", SCRIPT),
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
     file!("source.js", SCRIPT),
     file!("stage.js", SCRIPT),
+    file!("timeline.js", SCRIPT),
+    file!("zip.js", SCRIPT),
     client_file!("js/backoff.js"),
     client_file!("js/bag.js"),
     client_file!("js/bagtrack.js"),

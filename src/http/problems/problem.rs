@@ -157,6 +157,11 @@ impl Problem {
         self
     }
 
+    /// When trying again makes sense, where it is known better than by the kind.
+    pub fn wait(&self) -> Option<Duration> {
+        self.retry_after
+    }
+
     /// Seconds after which trying again makes sense, where it does; at least 1.
     pub fn retry_seconds(&self) -> Option<u32> {
         let known = self

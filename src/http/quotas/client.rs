@@ -2,6 +2,7 @@
 
 use axum::http::request::Parts;
 use ipnet::Ipv6Net;
+use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 
@@ -51,6 +52,15 @@ impl Client {
     pub fn of(parts: &Parts) -> Self {
         let client = parts.extensions.get::<Self>().cloned();
         client.unwrap_or_else(|| Self::at(Ipv4Addr::UNSPECIFIED.into()))
+    }
+}
+
+impl fmt::Display for Client {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Key(name) => write!(formatter, "key {name}"),
+            Self::Address(address) => write!(formatter, "address {address}"),
+        }
     }
 }
 

@@ -8,9 +8,10 @@ use super::holdings::Holdings;
 use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BytesFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
-    SessionQuota, TooManySessions,
+    SessionQuota, StoreShare, TooManySessions,
 };
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
@@ -21,7 +22,6 @@ use std::collections::HashMap;
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// The header with what is left of a client's quotas.
@@ -79,6 +79,7 @@ pub struct Clients {
 /// What one client has in use.
 #[derive(Debug)]
 pub struct Account {
+    client: Client,
     flow: Flow,
     quotas: Quotas,
     all: Holdings,
@@ -90,6 +91,8 @@ pub struct Account {
     videos: Arc<Semaphore>,
     messages: Arc<MessageRate>,
     frames: Option<FrameRate>,
+    /// Whose frame is counted next, where several wait for it.
+    next_frame: tokio::sync::Mutex<()>,
     /// Frames that were left at some moment.
     frames_left: Mutex<(u32, Instant)>,
 }
@@ -136,12 +139,19 @@ impl Clients {
             return account.clone();
         }
         if accounts.len() >= MAX_IDLE_ACCOUNTS {
-            accounts.retain(|_, account| Arc::strong_count(account) > 1);
+            accounts
+                .retain(|_, account| Arc::strong_count(account) > 1 || !account.held.is_empty());
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
         let networks = client.networks().map(|network| self.network(network));
         let networks: Vec<Arc<Holdings>> = networks.collect();
-        let account = Arc::new(Account::new(flow, self.quotas, self.all.clone(), networks));
+        let account = Arc::new(Account::new(
+            client.clone(),
+            flow,
+            self.quotas,
+            self.all.clone(),
+            networks,
+        ));
         accounts.insert(client.clone(), account.clone());
         account
     }
@@ -197,7 +207,13 @@ impl Clients {
 }
 
 impl Account {
-    fn new(flow: Flow, quotas: Quotas, all: Holdings, networks: Vec<Arc<Holdings>>) -> Self {
+    fn new(
+        client: Client,
+        flow: Flow,
+        quotas: Quotas,
+        all: Holdings,
+        networks: Vec<Arc<Holdings>>,
+    ) -> Self {
         let held = quotas.holdings(&networks);
         let frames = quotas.frames.map(|(rate, burst)| {
             let quota = Quota::per_second(rate).allow_burst(burst);
@@ -205,6 +221,7 @@ impl Account {
         });
         let permits = |count: usize| Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)));
         Self {
+            client,
             flow,
             quotas,
             all,
@@ -217,9 +234,10 @@ impl Account {
                 Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
             )),
             frames,
+            next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((
                 quotas.frames.map_or(0, |(_, burst)| burst.get()),
-                Instant::now(),
+                clock::now(),
             )),
         }
     }
@@ -240,6 +258,15 @@ impl Account {
             account: self.clone(),
             _permit: permit.map_err(refused)?,
         })
+    }
+
+    /// The same, but waits for a place, in order of arrival.
+    pub async fn request_in_order(self: &Arc<Self>) -> RequestPermit {
+        let permit = self.requests.clone().acquire_owned().await;
+        RequestPermit {
+            account: self.clone(),
+            _permit: permit.expect("the places are never closed"),
+        }
     }
 
     /// Takes a place for a stream.
@@ -283,6 +310,15 @@ impl SessionQuota for ClientSessions {
                 .0
                 .refusal(BytesFull::Client, "sessions", self.0.quotas.sessions)),
             _ => Ok(()),
+        }
+    }
+
+    fn store_share(&self) -> StoreShare {
+        let Account { quotas, client, .. } = &*self.0;
+        StoreShare {
+            client: client.to_string(),
+            max_places: quotas.sessions,
+            max_bytes: quotas.session_bytes,
         }
     }
 
@@ -338,7 +374,7 @@ impl Account {
             .frames_left
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        *noted = (left, Instant::now());
+        *noted = (left, clock::now());
     }
 
     /// Frames that are left now: those that were, and those that have come back since.
@@ -351,6 +387,26 @@ impl Account {
         let back = at.elapsed().as_secs_f64() * f64::from(rate.get());
         // The cast stops at the greatest value.
         left.saturating_add(back as u32).min(burst.get())
+    }
+
+    /// Waits until one frame more may be counted, in order of arrival.
+    ///
+    /// # Errors
+    /// None may until `deadline`.
+    pub async fn count_frame_in_order(&self, deadline: Instant) -> Result<(), Problem> {
+        let turn = timeout_at(deadline, self.next_frame.lock()).await;
+        loop {
+            let problem = match self.count_frames(1) {
+                Ok(()) => return Ok(()),
+                Err(problem) => problem,
+            };
+            let wait = problem.wait().unwrap_or_default();
+            let again = clock::now() + wait;
+            if turn.is_err() || again > deadline {
+                return Err(problem);
+            }
+            sleep_until(again).await;
+        }
     }
 
     /// Counts frames of the client.

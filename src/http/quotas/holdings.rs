@@ -26,6 +26,12 @@ impl Holdings {
         }
     }
 
+    /// Whether nothing is held.
+    pub(super) fn is_empty(&self) -> bool {
+        let budgets = [&self.sessions, &self.session_bytes, &self.upload_bytes];
+        budgets.iter().all(|budget| budget.held() == 0)
+    }
+
     /// Those of a network, which has no maximum but what is free.
     pub(super) fn of_network() -> Self {
         let budget = || Budget::new(usize::MAX);

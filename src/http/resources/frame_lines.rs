@@ -15,19 +15,19 @@ use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
 use bagtrack_ingest::video::VideoFormat;
+use bagtrack_sessions::clock::{self, Instant, timeout_at};
 use bagtrack_sessions::{
     Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
     check_readable_pixels,
 };
 use std::vec::IntoIter;
-use tokio::time::{Instant, timeout_at};
 
 /// Answers the frames by lines.
 ///
 /// # Errors
 /// Their pixels are more than those of one request may; or the problem of the first frame.
 pub async fn respond(state: AppState, mut request: FramesRequest) -> Result<Response, Problem> {
-    let deadline = Instant::now() + state.config.work_timeout;
+    let deadline = clock::now() + state.config.work_timeout;
     let limits = state.service.request_limits();
     let files = std::mem::take(&mut request.upload.files);
     let check = move |_: &mut WorkMeter| {

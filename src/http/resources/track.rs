@@ -24,7 +24,7 @@ use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Request, State};
 use axum::response::{IntoResponse, Response};
 use bagtrack_ingest::video::VideoFormat;
-use bagtrack_sessions::{Boxes, ByteCharge, GivenBox, QueuePermit, TrackFrom, TrackedAway};
+use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -231,7 +231,7 @@ fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Probl
 }
 
 /// The body of the answer, whose memory is charged before it is taken.
-fn body(tracked: &TrackedAway, mut charge: ByteCharge) -> Result<JsonBytes, Problem> {
+fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<JsonBytes, Problem> {
     let (estimates, snapshot) = (&tracked.estimates[..], &tracked.snapshot);
     // It is there as base64, and once more in the body.
     let text = snapshot.len().div_ceil(3) * 4;

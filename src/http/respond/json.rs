@@ -5,7 +5,7 @@ use axum::body::Bytes;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::{ByteCharge, ChargedBytes};
+use bagtrack_sessions::{Charge, ChargedBytes};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub type JsonBytes = ([(HeaderName, &'static str); 1], Bytes);
 ///
 /// # Errors
 /// It cannot be written as JSON.
-pub fn charged(value: &impl Serialize, charge: ByteCharge) -> Result<JsonBytes, Problem> {
+pub fn charged(value: &impl Serialize, charge: Charge) -> Result<JsonBytes, Problem> {
     let body = line(value).map_err(|error| Problem::internal(Arc::new(error)))?;
     let body = Bytes::from(ChargedBytes::new(body, charge));
     Ok(([(CONTENT_TYPE, "application/json")], body))

@@ -25,6 +25,7 @@ use crate::http::state::AppState;
 #[cfg(fuzzing)]
 use axum::Extension;
 use axum::Router;
+use bagtrack_sessions::clock::{interval, sleep, timeout};
 use bagtrack_sessions::{Clock, FileStoreError};
 use std::io::{self, Write};
 use std::net::SocketAddr;
@@ -33,7 +34,6 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
-use tokio::time::{interval, sleep, timeout};
 
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);

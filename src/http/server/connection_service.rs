@@ -10,6 +10,7 @@ use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
+use bagtrack_sessions::clock::timeout;
 use hyper::Request;
 use hyper::body::Incoming;
 use hyper::server::conn::http1;
@@ -19,7 +20,6 @@ use hyper_util::service::TowerToHyperService;
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::net::TcpStream;
-use tokio::time::timeout;
 
 /// How all connections of a service are served.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
 use bagtrack_sessions::{
-    Admission, ByteBudget, ByteCharge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
+    Admission, Budget, Charge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
     ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
 use saturation::Saturation;
@@ -32,7 +32,7 @@ pub struct Shared {
     /// The one door to sessions.
     pub service: SessionService,
     /// The memory of all uploads together.
-    pub uploads: ByteBudget,
+    pub uploads: Budget,
     /// What each client has in use.
     pub clients: Clients,
     /// Keys and secrets.
@@ -87,7 +87,7 @@ impl AppState {
             access,
             metrics,
             // A client has one at a time, and no client all of them.
-            videos: Arc::new(Semaphore::new(config.worker_count().max(2))),
+            videos: Arc::new(Semaphore::new(config.video_places())),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
             clock,
@@ -106,8 +106,8 @@ impl AppState {
     }
 
     /// Memory for a client's upload or answer: none so far.
-    pub fn charge(&self, client: &Client) -> ByteCharge {
-        ByteCharge::new(&self.uploads, self.clients.account(client).bytes())
+    pub fn charge(&self, client: &Client) -> Charge {
+        Charge::new(&self.uploads, self.clients.account(client).bytes())
     }
 
     /// In whose turn the work of a client is done.
@@ -122,6 +122,9 @@ impl AppState {
         let workers = config.worker_count();
         let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
         let is_draining = usize::from(self.is_draining());
+        let videos = config
+            .video_places()
+            .saturating_sub(self.videos.available_permits());
         for (name, description, value) in [
             ("bagtrack_sessions", "Sessions in memory.", sessions),
             (
@@ -141,6 +144,12 @@ impl AppState {
             ),
             ("bagtrack_workers", "Workers.", workers),
             (
+                "bagtrack_upload_bytes",
+                "Bytes of bodies that have come, and of answers that are not taken.",
+                self.uploads.held(),
+            ),
+            ("bagtrack_videos", "Videos that are decoded.", videos),
+            (
                 "bagtrack_draining",
                 "1 while the service is about to end.",
                 is_draining,
@@ -157,6 +166,9 @@ impl AppState {
             let (name, is_up) = ("bagtrack_store_up", f64::from(u8::from(store.is_ready())));
             self.metrics
                 .set(name, "1 while the store answers and takes writes.", is_up);
+            let (name, is_full) = ("bagtrack_store_full", f64::from(u8::from(store.is_full())));
+            let description = "1 after the store took no new session for want of room.";
+            self.metrics.set(name, description, is_full);
             self.metrics.store_failures(store.failures());
         }
     }

@@ -10,7 +10,8 @@
 use crate::http::net::least_rate::LeastRate;
 use crate::http::quotas::clients::MessageRate;
 use arrayvec::ArrayVec;
-use bagtrack_sessions::{ByteBudget, ByteCharge, BytesFull};
+use bagtrack_sessions::clock::{self, Sleep, sleep_until};
+use bagtrack_sessions::{Budget, BytesFull, Charge};
 use bytes::{Buf, BytesMut};
 use governor::clock::{Clock, DefaultClock};
 use std::future::poll_fn;
@@ -21,7 +22,6 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::coop::poll_proceed;
-use tokio::time::{Instant, Sleep, sleep_until};
 
 /// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
 const FRAGMENT: usize = 16 << 10;
@@ -63,6 +63,8 @@ struct Frame {
 pub struct Rates {
     /// Least bytes a second.
     pub bytes: LeastRate,
+    /// The time of a message, which no bytes pay back.
+    pub message: LeastRate,
     /// Most frames a second, of all streams of the client.
     pub messages: Arc<MessageRate>,
 }
@@ -77,13 +79,15 @@ pub struct Fragments<S> {
     /// The head of the next fragment, and the bytes of it that follow.
     head: ArrayVec<u8, 8>,
     fragment_left: usize,
-    budgets: [ByteBudget; 2],
+    budgets: [Budget; 2],
     /// The memory of the message that arrives.
-    charge: ByteCharge,
+    charge: Charge,
     /// How many frames the client may send.
     messages: Arc<MessageRate>,
     retry: Pin<Box<Sleep>>,
     rate: LeastRate,
+    /// The whole time of a message.
+    deadline: LeastRate,
     /// Whether a message has begun.
     is_within: bool,
     is_heard: bool,
@@ -92,8 +96,8 @@ pub struct Fragments<S> {
 impl<S> Fragments<S> {
     /// For a connection from which `read` was read already. Messages are charged to the budgets of all clients and of
     /// this one, and come at these rates.
-    pub fn new(stream: S, read: &[u8], budgets: [ByteBudget; 2], rates: Rates) -> Self {
-        let charge = ByteCharge::new(&budgets[0], &budgets[1]);
+    pub fn new(stream: S, read: &[u8], budgets: [Budget; 2], rates: Rates) -> Self {
+        let charge = Charge::new(&budgets[0], &budgets[1]);
         Self {
             stream,
             input: BytesMut::from(read),
@@ -103,16 +107,17 @@ impl<S> Fragments<S> {
             budgets,
             charge,
             messages: rates.messages,
-            retry: Box::pin(sleep_until(Instant::now())),
+            retry: Box::pin(sleep_until(clock::now())),
             rate: rates.bytes,
+            deadline: rates.message,
             is_within: false,
             is_heard: false,
         }
     }
 
     /// The charge of the message that has just been read.
-    pub fn take_charge(&mut self) -> ByteCharge {
-        let next = ByteCharge::new(&self.budgets[0], &self.budgets[1]);
+    pub fn take_charge(&mut self) -> Charge {
+        let next = Charge::new(&self.budgets[0], &self.budgets[1]);
         std::mem::replace(&mut self.charge, next)
     }
 
@@ -123,6 +128,7 @@ impl<S> Fragments<S> {
 
     /// Nothing is read for a while, which is not the client's fault.
     pub fn pause(&mut self) {
+        self.deadline.pause();
         self.rate.pause();
     }
 
@@ -139,11 +145,11 @@ impl<S> Fragments<S> {
         let Err(early) = self.messages.check() else {
             return Poll::Ready(());
         };
-        self.rate.pause();
+        self.pause();
         let wait = early.wait_time_from(DefaultClock::default().now());
         self.retry
             .as_mut()
-            .reset(Instant::now() + wait.max(LEAST_WAIT));
+            .reset(clock::now() + wait.max(LEAST_WAIT));
         let _ = self.retry.as_mut().poll(cx);
         Poll::Pending
     }
@@ -185,6 +191,9 @@ impl<S> Fragments<S> {
         self.head.extend(frame.mask.into_iter().flatten());
         self.fragment_left = length;
         if is_data {
+            if !self.is_within {
+                self.deadline.reset();
+            }
             self.is_within = !is_last || frame.first & FINAL == 0;
         }
         // What follows goes on with the message.
@@ -227,13 +236,17 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
             Poll::Ready(read) => {
                 read?;
                 self.rate.moved(buffer.filled().len());
+                self.deadline.pause();
                 self.input.extend_from_slice(buffer.filled());
                 self.is_heard |= !buffer.filled().is_empty();
                 Poll::Ready(Ok(!buffer.filled().is_empty()))
             }
             Poll::Pending if self.is_message_begun() => {
-                ready!(self.rate.poll_late(cx));
-                Poll::Ready(Err(io::Error::other(MessageTooSlow)))
+                let is_late = self.rate.poll_late(cx).is_ready();
+                match self.deadline.poll_late(cx).is_ready() || is_late {
+                    true => Poll::Ready(Err(io::Error::other(MessageTooSlow))),
+                    false => Poll::Pending,
+                }
             }
             Poll::Pending => Poll::Pending,
         }
@@ -259,7 +272,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
         if self.rate.poll_late(cx).is_ready() {
             return Poll::Ready(io::Error::other(full));
         }
-        self.retry.as_mut().reset(Instant::now() + RETRY);
+        self.retry.as_mut().reset(clock::now() + RETRY);
         let _ = self.retry.as_mut().poll(cx);
         Poll::Pending
     }

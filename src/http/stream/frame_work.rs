@@ -6,18 +6,16 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
+use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
-    ActError, Estimates, FrameBatch, FramesError, QueuePermit, Session, SessionPermit, StreamPlace,
-    Tracked, box_warnings,
+    ActError, Estimates, FrameBatch, FramesError, QueueFull, QueuePermit, Session, SessionBusy,
+    SessionPermit, StreamPlace, Tracked, box_warnings,
 };
 use bagtrack_tracker::{Diagnostics, Rect};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tokio::time::{Instant, sleep};
 use uuid::Uuid;
 
-/// How long to wait before asking for a place again.
-const RETRY: Duration = Duration::from_millis(20);
 /// How long to wait before the store is tried again.
 const STORE_RETRY: Duration = Duration::from_millis(250);
 /// The last answers that are kept for a client that takes up after a broken line.
@@ -90,32 +88,37 @@ impl FrameWork {
         Some(Done { answer, skipped })
     }
 
-    /// The permits of a frame. Where there is no place it waits, as long as a plain request may.
+    /// The permits of a frame. Where there is no place it waits for one, in order of arrival, as long as a plain request
+    /// may.
     async fn permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
-        let deadline = Instant::now() + self.state.config.work_timeout;
-        loop {
-            let problem = match self.try_permits().await {
-                Ok(permits) => return Ok(permits),
-                Err(problem) => problem,
-            };
-            if !may_wait(problem.kind()) || Instant::now() >= deadline {
-                return Err(problem);
-            }
-            sleep(RETRY).await;
-        }
+        let deadline = clock::now() + self.state.config.work_timeout;
+        let session = self.find_until(deadline).await?;
+        let permit = timeout_at(deadline, session.enter_in_order()).await;
+        let permit = permit.map_err(|_| SessionBusy)?;
+        self.account.count_frame_in_order(deadline).await?;
+        let request = timeout_at(deadline, self.account.request_in_order()).await;
+        let request = match request {
+            Ok(request) => request,
+            Err(_) => self.account.request()?,
+        };
+        let queue = &self.state.service.admission;
+        let queue = queue.enter_in_order(request.flow(), Box::new(request));
+        let queue = timeout_at(deadline, queue).await.map_err(|_| QueueFull)?;
+        Ok((permit, queue.for_frames(session.target_count())))
     }
 
-    async fn try_permits(&self) -> Result<(SessionPermit, QueuePermit), Problem> {
-        let state = &self.state;
-        let session = self.find().await?.enter()?;
-        let request = Arc::new(self.account.request()?);
-        let queue = state
-            .service
-            .admission
-            .enter(request.flow(), Box::new(request.clone()))?;
-        request.count_frames(1)?;
-        let targets = session.session().target_count();
-        Ok((session, queue.for_frames(targets)))
+    /// The session, once the store tells it.
+    async fn find_until(&self, deadline: Instant) -> Result<Arc<Session>, Problem> {
+        loop {
+            match self.find().await {
+                Err(problem)
+                    if problem.kind() == Kind::StoreUnavailable && clock::now() < deadline =>
+                {
+                    sleep(STORE_RETRY).await;
+                }
+                found => return found,
+            }
+        }
     }
 
     /// The session, if the caller may still use it.
@@ -153,11 +156,7 @@ impl FrameWork {
         frame: ArrivedFrame,
         (mut session, mut queue): (SessionPermit, QueuePermit),
     ) -> Result<Given, Problem> {
-        let ArrivedFrame {
-            header,
-            file,
-            charge,
-        } = frame;
+        let ArrivedFrame { header, file } = frame;
         if self.newest_wins && header.frame.is_some() {
             let detail = "With drop=true frames are skipped, so they have no numbers.";
             return Err(Problem::malformed(detail));
@@ -166,8 +165,8 @@ impl FrameWork {
             return Err(Problem::missing_frame());
         }
         let config = &self.state.config;
-        let deadline = Instant::now() + config.work_timeout;
-        let (mut number, charge) = (header.frame, Arc::new(charge));
+        let deadline = clock::now() + config.work_timeout;
+        let mut number = header.frame;
         let shown = header.target.unwrap_or(0);
         if header.see && shown >= session.session().target_count() {
             return Err(Problem::which_target(session.session().target_count()));
@@ -180,7 +179,6 @@ impl FrameWork {
                 min_answers: MAX_KEPT.min(config.max_frames),
                 with_diagnostics: header.see,
                 stream: Some(self.place.clone()),
-                charge: Some(charge.clone()),
             };
             let at = session.session().clone();
             match self.state.service.advance(session, queue, next).await {
@@ -189,7 +187,7 @@ impl FrameWork {
                     let warnings = box_warnings(given.as_slice(), at.source_size());
                     return Ok(Given::of(answered, shown, warnings));
                 }
-                Err(FramesError::Act(ActError::Store(_))) if Instant::now() < deadline => {
+                Err(FramesError::Act(ActError::Store(_))) if clock::now() < deadline => {
                     // The store may have the frame, and only its answer was lost.
                     number = number.or(Some(at.latest_frame() + 1));
                     sleep(STORE_RETRY).await;
@@ -214,12 +212,4 @@ impl Given {
             checkpoint: answered.checkpoint,
         }
     }
-}
-
-/// Whether a frame waits where there is such a problem, and is tried again.
-fn may_wait(kind: Kind) -> bool {
-    matches!(
-        kind,
-        Kind::QueueFull | Kind::QuotaExceeded | Kind::SessionBusy | Kind::StoreUnavailable
-    )
 }

@@ -92,6 +92,7 @@ pub async fn open(State(state): State<AppState>, request: Request) -> Result<Res
     let config = &state.config;
     let rates = Rates {
         bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+        message: LeastRate::new(config.body_timeout, u32::MAX),
         messages: account.messages(),
     };
     let stream = SessionStream {

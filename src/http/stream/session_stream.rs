@@ -12,7 +12,8 @@ use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::StreamAnswer;
 use axum::body::Bytes;
-use bagtrack_sessions::{ByteCharge, BytesFull, Estimates};
+use bagtrack_sessions::clock::{self, interval_at, timeout};
+use bagtrack_sessions::{BytesFull, Charge, ChargedBytes, Estimates};
 use futures_util::stream::FusedStream;
 use futures_util::{SinkExt, StreamExt};
 use serde::Serialize;
@@ -21,7 +22,6 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{Instant, interval_at, timeout};
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 /// Time for a client to answer the close.
@@ -66,7 +66,7 @@ impl SessionStream {
     /// Serves the stream until it ends.
     pub async fn run(mut self, mut socket: Socket) {
         self.connection.activity().stream();
-        let started = Instant::now();
+        let started = clock::now();
         let mut counts = Counts::default();
         let mut cut_off = self.connection.clone();
         let end = tokio::select! {
@@ -98,7 +98,7 @@ impl SessionStream {
         let mut header = Ok(FrameHeader::default());
         let mut answering: Option<Answering> = None;
         let period = work.state.config.limits.ping_interval;
-        let mut pings = interval_at(Instant::now() + period, period);
+        let mut pings = interval_at(clock::now() + period, period);
         let (mut is_heard, mut is_ending) = (true, false);
         loop {
             if answering.is_none() && !work.waiting().is_empty() {
@@ -173,7 +173,7 @@ impl SessionStream {
             Some(Ok(Message::Binary(file))) => {
                 let header = std::mem::replace(header, Ok(FrameHeader::default()));
                 let charge = socket.get_mut().take_charge();
-                let arrived = header.and_then(|header| self.arrived(header, file, charge));
+                let arrived = header.map(|header| self.arrived(header, file, charge));
                 self.work.waiting().push(arrived);
             }
             Some(Ok(_)) => {}
@@ -212,21 +212,12 @@ impl SessionStream {
         Ok(None)
     }
 
-    /// A frame with the memory that it takes.
-    fn arrived(
-        &self,
-        header: FrameHeader,
-        file: Bytes,
-        mut charge: ByteCharge,
-    ) -> Result<ArrivedFrame, Problem> {
-        charge.shrink(file.len());
+    /// A frame, which owns the memory that it takes.
+    fn arrived(&self, header: FrameHeader, file: Bytes, charge: Charge) -> ArrivedFrame {
         let received = &self.work.state.metrics.received_bytes;
         received.increment(file.len() as u64);
-        Ok(ArrivedFrame {
-            header,
-            file,
-            charge,
-        })
+        let file = ChargedBytes::new(file, charge).into();
+        ArrivedFrame { header, file }
     }
 
     fn answer(&self, estimates: &Estimates, skipped: u64, replayed: bool) -> StreamAnswer {

@@ -11,7 +11,7 @@ use axum::http::header::{
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::ByteBudget;
+use bagtrack_sessions::Budget;
 use hyper::upgrade::OnUpgrade;
 use hyper_util::rt::TokioIo;
 use tokio_tungstenite::WebSocketStream;
@@ -63,7 +63,7 @@ impl Upgrade {
     pub fn answer<F, S>(
         self,
         max_bytes: usize,
-        budgets: [ByteBudget; 2],
+        budgets: [Budget; 2],
         rates: Rates,
         serve: F,
     ) -> Response

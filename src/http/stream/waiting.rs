@@ -3,7 +3,6 @@
 use super::message::FrameHeader;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
-use bagtrack_sessions::ByteCharge;
 use std::collections::VecDeque;
 
 /// Frames that wait behind the one at work. The next one is there when that is done; more would only wait here in place
@@ -24,10 +23,8 @@ pub struct Arrived {
 pub struct ArrivedFrame {
     /// What was said of it.
     pub header: FrameHeader,
-    /// The file.
+    /// The file, with its memory.
     pub file: Bytes,
-    /// Its memory.
-    pub charge: ByteCharge,
 }
 
 impl Arrived {
@@ -93,10 +90,8 @@ impl Waiting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bagtrack_sessions::ByteBudget;
 
     fn frame(name: &'static str, corrects: bool) -> Result<ArrivedFrame, Problem> {
-        let budget = ByteBudget::new(1);
         let r#box = corrects.then(|| "1,2,3,4".parse().unwrap());
         Ok(ArrivedFrame {
             header: FrameHeader {
@@ -104,7 +99,6 @@ mod tests {
                 ..FrameHeader::default()
             },
             file: Bytes::from_static(name.as_bytes()),
-            charge: ByteCharge::new(&budget, &budget),
         })
     }
 

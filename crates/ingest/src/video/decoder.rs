@@ -4,14 +4,17 @@ use super::child;
 use super::error::VideoError;
 use super::parts;
 use super::sniff::VideoFormat;
-use std::io::{BufRead, BufReader, Write};
+use std::ffi::OsString;
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdout};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// The kinds of uploads that are read: MP4, Matroska and WebM, GIF, JPEG files in a row.
 const FORMATS: &str = "mov,matroska,gif,mjpeg";
+/// The codecs of these, by the names of their decoders.
+const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg,gif";
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
 /// Most bytes of a line of what the program says.
@@ -33,8 +36,11 @@ pub struct VideoLimits {
 pub struct VideoDecoder {
     child: Arc<Mutex<Child>>,
     pictures: BufReader<ChildStdout>,
-    said: Option<JoinHandle<String>>,
+    said: Said,
+    hearing: Option<JoinHandle<()>>,
     limits: VideoLimits,
+    program: String,
+    given: usize,
 }
 
 /// Ends the process from elsewhere.
@@ -48,11 +54,12 @@ impl Drop for Stop {
 }
 
 impl VideoDecoder {
-    /// Begins to decode these bytes with this program.
+    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words.
     ///
     /// # Errors
     /// The program cannot be started.
     pub fn of_bytes(
+        launcher: &[OsString],
         program: &str,
         bytes: impl AsRef<[u8]> + Send + 'static,
         format: VideoFormat,
@@ -61,11 +68,12 @@ impl VideoDecoder {
         // MP4 files may have their index at the end. The cache makes it possible to go back in a pipe.
         let mut input = vec!["-protocol_whitelist", "cache,pipe"];
         input.extend(["-format_whitelist", FORMATS]);
+        input.extend(["-codec_whitelist", CODECS]);
         match format {
             VideoFormat::Container => input.extend(["-i", "cache:pipe:0"]),
             VideoFormat::MotionJpeg => input.extend(["-f", "mjpeg", "-i", "pipe:0"]),
         }
-        Self::start(program, &input, bytes, limits)
+        Self::start((launcher, program), &input, bytes, limits)
     }
 
     /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown `from`
@@ -86,11 +94,11 @@ impl VideoDecoder {
             input.extend(["-ss", seconds]);
         }
         input.extend(["-i", &url]);
-        Self::start(program, &input, [], limits)
+        Self::start((&[], program), &input, [], limits)
     }
 
     fn start(
-        program: &str,
+        (launcher, program): (&[OsString], &str),
         input: &[&str],
         bytes: impl AsRef<[u8]> + Send + 'static,
         limits: VideoLimits,
@@ -99,6 +107,8 @@ impl VideoDecoder {
         let count = limits.max_pictures.min(MAX_PICTURES) + 1;
         let count = count.to_string();
         let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
+        // It ends at damage, in place of leaving pictures out.
+        let strict = ["-xerror", "-err_detect", "explode"];
         let limit = ["-max_pixels", &pixels];
         let chosen = [
             "-map",
@@ -114,8 +124,18 @@ impl VideoDecoder {
             "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
         ];
         let output = ["-f", "mpjpeg", "pipe:1"];
-        let arguments = [&before[..], &limit, input, &chosen, &times, &coded, &output].concat();
-        let mut child = child::start(program, arguments)?;
+        let arguments = [
+            &before[..],
+            &strict,
+            &limit,
+            input,
+            &chosen,
+            &times,
+            &coded,
+            &output,
+        ]
+        .concat();
+        let mut child = child::start(launcher, program, arguments)?;
         let piped = "the command says that it is a pipe";
         let (mut stdin, stdout, stderr) = (
             child.stdin.take().expect(piped),
@@ -126,12 +146,17 @@ impl VideoDecoder {
         thread::spawn(move || {
             let _ = stdin.write_all(bytes.as_ref());
         });
-        let said = thread::spawn(move || last_line(BufReader::new(stderr)));
+        let said = Said::default();
+        let heard = said.clone();
+        let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));
         Ok(Self {
             child: Arc::new(Mutex::new(child)),
             pictures: BufReader::new(stdout),
-            said: Some(said),
+            said,
+            hearing: Some(hearing),
             limits,
+            program: program.to_owned(),
+            given: 0,
         })
     }
 
@@ -146,20 +171,48 @@ impl VideoDecoder {
     /// The rest cannot be decoded.
     pub fn next_picture(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
         let read = parts::next_part(&mut self.pictures, self.limits.max_bytes);
-        if let Some(picture) = read.map_err(|error| VideoError::Damaged(error.to_string()))? {
-            return Ok(Some(picture));
+        let picture = read.map_err(|error| self.damaged(error.to_string()))?;
+        if picture.is_none() {
+            return self.end();
         }
-        let Some(said) = self.said.take() else {
+        // Pictures after damage have unknown numbers.
+        if let Some(reason) = self.said.damage() {
+            return Err(self.damaged(reason));
+        }
+        self.given += 1;
+        Ok(picture)
+    }
+
+    /// Whether the pictures that were given are all.
+    fn end(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
+        let Some(hearing) = self.hearing.take() else {
             return Ok(None);
         };
-        let said = said.join().unwrap_or_default();
+        let _ = hearing.join();
         let ended = lock(&self.child).wait();
-        match ended {
-            Ok(status) if status.success() => Ok(None),
-            Ok(_) if !said.is_empty() => Err(VideoError::Damaged(said)),
-            Ok(status) => Err(VideoError::Damaged(format!("the decoder ended ({status})"))),
-            Err(error) => Err(VideoError::Damaged(error.to_string())),
+        if let Some(reason) = self.said.damage() {
+            return Err(self.damaged(reason));
         }
+        let reason = match ended {
+            Ok(status) if status.success() => return Ok(None),
+            Ok(status) if status.code() == Some(child::NOT_STARTED) => {
+                return Err(VideoError::NoProgram {
+                    program: self.program.clone(),
+                    source: io::ErrorKind::NotFound.into(),
+                });
+            }
+            Ok(_) if self.said.is_unlisted() => {
+                "its codec is none of those that are read".to_owned()
+            }
+            Ok(status) => format!("the decoder ended ({status})"),
+            Err(error) => error.to_string(),
+        };
+        Err(self.damaged(reason))
+    }
+
+    fn damaged(&self, reason: String) -> VideoError {
+        let picture = self.given + 1;
+        VideoError::Damaged { picture, reason }
     }
 }
 
@@ -181,22 +234,50 @@ fn end(child: &Mutex<Child>) {
     let _ = child.wait();
 }
 
-/// The last line that tells something. All is read, so that the program never waits.
-fn last_line(mut said: impl BufRead) -> String {
-    let mut last = String::new();
-    let mut line = Vec::new();
-    while said
-        .read_until(b'\n', &mut line)
-        .is_ok_and(|count| count > 0)
-    {
-        let text = String::from_utf8_lossy(&line);
-        let text = text.trim();
-        // The cache says on every start that it cannot know the length of a pipe.
-        let is_noise = text.starts_with("[cache @") || text.contains("Last message repeated");
-        if !is_noise && !text.is_empty() {
-            last = text.chars().take(MAX_SAID).collect();
-        }
-        line.clear();
+/// What the program says. Clones hear the same.
+#[derive(Debug, Clone, Default)]
+struct Said(Arc<Mutex<Heard>>);
+
+#[derive(Debug, Default)]
+struct Heard {
+    /// The last line that tells of damage.
+    damage: Option<String>,
+    /// Whether a codec was not read because it is none of the list.
+    unlisted: bool,
+}
+
+impl Said {
+    fn lock(&self) -> MutexGuard<'_, Heard> {
+        // Nothing panics while it is held.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
-    last
+
+    fn damage(&self) -> Option<String> {
+        self.lock().damage.clone()
+    }
+
+    fn is_unlisted(&self) -> bool {
+        self.lock().unlisted
+    }
+
+    /// Hears all, so that the program never waits.
+    fn hear(&self, mut said: impl BufRead) {
+        let mut line = Vec::new();
+        while said
+            .read_until(b'\n', &mut line)
+            .is_ok_and(|count| count > 0)
+        {
+            let text = String::from_utf8_lossy(&line);
+            let text = text.trim();
+            // The cache says on every start that it cannot know the length of a pipe.
+            let is_noise = text.starts_with("[cache @") || text.contains("Last message repeated");
+            // Sound is not decoded, and its codecs are not read either.
+            let is_unlisted = text.contains("not on whitelist");
+            self.lock().unlisted |= is_unlisted;
+            if !is_noise && !is_unlisted && !text.is_empty() {
+                self.lock().damage = Some(text.chars().take(MAX_SAID).collect());
+            }
+            line.clear();
+        }
+    }
 }

@@ -11,7 +11,12 @@ pub enum VideoError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// The video is damaged, of an unknown kind, or takes more than it may; the text says what the program found.
-    #[error("the video cannot be decoded: {0}")]
-    Damaged(String),
+    /// The video is damaged, of an unknown kind, or takes more than it may.
+    #[error("the video cannot be decoded from its picture {picture} on: {reason}")]
+    Damaged {
+        /// The first picture that cannot be had, counted from 1.
+        picture: usize,
+        /// What the program found.
+        reason: String,
+    },
 }

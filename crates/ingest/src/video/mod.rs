@@ -4,8 +4,11 @@
 //! of uploaded frames.
 //!
 //! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads one
-//! pipe and writes another, knows no other protocol and few formats, and its memory, processor time and files are
-//! limited (on Linux). It ends when its pictures are no longer wanted.
+//! pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor time, files
+//! and priority are limited (on Linux). It ends when its pictures are no longer wanted.
+//!
+//! What it says is damage: from the next picture on nothing is given, since nobody knows which picture of the video that
+//! would be.
 //!
 //! What can go wrong: there is no `ffmpeg`, or it cannot decode the video; what it says then is told.
 
@@ -15,6 +18,7 @@ mod error;
 mod parts;
 mod sniff;
 
+pub use child::MAX_MEMORY as MAX_DECODER_MEMORY;
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
 pub use error::VideoError;
 pub use sniff::{VideoFormat, video_format};

@@ -69,6 +69,39 @@ fn a_jpeg_cut_in_its_data_and_closed_with_an_end_marker_is_an_error() {
     }
 }
 
+/// Where the first segment of this marker begins.
+fn segment(bytes: &[u8], marker: u8) -> usize {
+    let pair = bytes.windows(2).position(|pair| pair == [0xFF, marker]);
+    pair.expect("the file has one")
+}
+
+#[test]
+fn a_jpeg_with_bytes_between_its_headers_is_an_error() {
+    // rusty_jpeg 0.4.8 by itself passes over them.
+    let mut bytes = jpeg(&color(61, 47), BASELINE, None);
+    let at = segment(&bytes, 0xC0);
+    bytes.splice(at..at, [7; 9]);
+    assert!(decode(&bytes, &SMALL).is_err());
+}
+
+#[test]
+fn a_jpeg_with_a_huffman_code_of_ones_alone_is_an_error() {
+    // With such a code, missing blocks could be read out of the one-bits that are put at the end. rusty_jpeg 0.4.8 by
+    // itself takes it.
+    let mut bytes = jpeg(&color(61, 47), BASELINE, None);
+    let table = segment(&bytes, 0xC4) + 5;
+    let values: usize = bytes[table..table + 16]
+        .iter()
+        .map(|&n| usize::from(n))
+        .sum();
+    let code = [&[2u8, 0][..], &[0; 14], &[0, 1]].concat();
+    bytes.splice(table..table + 16 + values, code);
+    let length = (3 + 16 + 2u16).to_be_bytes();
+    bytes[table - 3..table - 1].copy_from_slice(&length);
+    let error = decode(&bytes, &SMALL).expect_err("its table is full");
+    assert!(error.to_string().contains("Huffman"), "{error}");
+}
+
 #[test]
 fn bytes_after_the_end_are_ignored() {
     for (name, bytes) in files() {

@@ -3,13 +3,13 @@
 use super::error::{ActError, FramesError};
 use super::frames::{FrameBatch, Tracked};
 use super::service::SessionService;
+use crate::clock::timeout;
 use crate::store::{Commit, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
 };
 use bytes::Bytes;
 use std::sync::Arc;
-use tokio::time::timeout;
 
 /// How often the frames of one request are looked at: other replicas may be there first each time.
 const MAX_ATTEMPTS: usize = 4;

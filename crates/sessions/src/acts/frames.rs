@@ -6,10 +6,9 @@ use super::error::{FrameFault, FramesError};
 use super::tracking_metrics::TrackingMetrics;
 use crate::streams::StreamPlace;
 use crate::{
-    ByteCharge, Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError,
-    WorkMeter,
+    Correction, Estimates, Fingerprint, ReplayDecision, SessionState, StepError, WorkMeter,
 };
-use bagtrack_ingest::Limits;
+use bagtrack_ingest::{Inspected, Limits};
 use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
 use bytes::Bytes;
 use std::sync::Arc;
@@ -29,8 +28,6 @@ pub struct FrameBatch {
     pub with_diagnostics: bool,
     /// The stream that they came over. It tells their order, and tracks none after a newer one has taken its place.
     pub stream: Option<Arc<StreamPlace>>,
-    /// The memory of the files, where the place in the queue does not hold it.
-    pub charge: Option<Arc<ByteCharge>>,
 }
 
 /// The box of a target, given by the user.
@@ -123,15 +120,17 @@ impl FrameBatch {
                 checkpoint: None,
             });
         }
-        self.check_sizes(limits, state.source_size())?;
+        let mut inspected = self.inspect(limits, state.source_size())?.into_iter();
         let format = state.frame_format();
         let before = state.latest();
         let mut diagnostics = Vec::new();
         let wanted = self.with_diagnostics && correction.is_none();
         let seen = wanted.then_some(&mut diagnostics);
         let frame = |index: usize, meter: &mut WorkMeter| {
-            let (file, which) = (&self.files[index], (index, self.files.len()));
-            decode(file, which, &limits.frame, &|_| format, meter, metrics)
+            let file = inspected.next().expect("each file was inspected");
+            meter.check()?;
+            let decoded = metrics.decoding(|| file.decode(format));
+            decoded.map_err(|error| self.fault(index, error))
         };
         let estimates = state.advance(
             &fingerprints,
@@ -159,15 +158,21 @@ impl FrameBatch {
     ///
     /// # Errors
     /// It is one of these, or no image.
-    pub fn check_sizes(
+    pub fn check_sizes(&self, limits: &RequestLimits, size: (u32, u32)) -> Result<(), FramesError> {
+        self.inspect(limits, size).map(drop)
+    }
+
+    /// As [`check_sizes`](Self::check_sizes); returns what the headers say.
+    fn inspect(
         &self,
         limits: &RequestLimits,
         (width, height): (u32, u32),
-    ) -> Result<(), FramesError> {
-        let mut pixels = 0;
+    ) -> Result<Vec<Inspected<'_>>, FramesError> {
+        let mut inspected = Vec::with_capacity(self.files.len());
         for (index, file) in self.files.iter().enumerate() {
-            let size = bagtrack_ingest::size(file, &limits.frame);
-            let (got_width, got_height) = size.map_err(|error| self.fault(index, error))?;
+            let file = bagtrack_ingest::inspect(file, &limits.frame)
+                .map_err(|error| self.fault(index, error))?;
+            let (got_width, got_height) = file.size();
             if (got_width, got_height) != (width, height) {
                 let error = TrackerError::FrameSize {
                     width,
@@ -177,9 +182,10 @@ impl FrameBatch {
                 };
                 return Err(self.fault(index, error));
             }
-            pixels += u64::from(width) * u64::from(height);
+            inspected.push(file);
         }
-        limits.check_pixels(pixels, self.files.len())
+        limits.check_pixels(pixels(&inspected), self.files.len())?;
+        Ok(inspected)
     }
 
     fn fault(&self, index: usize, fault: impl Into<FrameFault>) -> FramesError {
@@ -212,13 +218,12 @@ impl RequestLimits {
 /// # Errors
 /// They have, or one of them is no image.
 pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
-    let mut pixels = 0;
-    for (index, file) in files.iter().enumerate() {
-        let size = bagtrack_ingest::size(file, &limits.frame);
-        let (width, height) = size.map_err(|error| fault_of(index, files.len(), error))?;
-        pixels += u64::from(width) * u64::from(height);
-    }
-    limits.check_pixels(pixels, files.len())
+    let inspected = files.iter().enumerate().map(|(index, file)| {
+        bagtrack_ingest::inspect(file, &limits.frame)
+            .map_err(|error| fault_of(index, files.len(), error))
+    });
+    let inspected: Vec<Inspected> = inspected.collect::<Result<_, _>>()?;
+    limits.check_pixels(pixels(&inspected), files.len())
 }
 
 /// The same where each frame is answered for itself: one that is no image is refused in its turn.
@@ -226,11 +231,19 @@ pub(super) fn check_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<()
 /// # Errors
 /// Those that are images have too many pixels.
 pub fn check_readable_pixels(files: &[Bytes], limits: &RequestLimits) -> Result<(), FramesError> {
-    let sizes = files
+    let inspected = files
         .iter()
-        .filter_map(|file| bagtrack_ingest::size(file, &limits.frame).ok());
-    let pixels = sizes.map(|(width, height)| u64::from(width) * u64::from(height));
-    limits.check_pixels(pixels.sum(), files.len())
+        .filter_map(|file| bagtrack_ingest::inspect(file, &limits.frame).ok());
+    let inspected: Vec<Inspected> = inspected.collect();
+    limits.check_pixels(pixels(&inspected), files.len())
+}
+
+/// How many pixels the files have together.
+fn pixels(inspected: &[Inspected]) -> u64 {
+    let sizes = inspected.iter().map(Inspected::size);
+    sizes
+        .map(|(width, height)| u64::from(width) * u64::from(height))
+        .sum()
 }
 
 /// Decodes a file in the format that `format` says for uploads of a size, where `meter` says that the work goes on.

@@ -1,17 +1,17 @@
 //! Opens sessions: once for each name, so that a request that comes again gets the same answer.
 
-use super::error::OpenError;
+use super::error::{OpenError, QuotaExhausted};
 use super::idempotency::CreationKey;
 use super::service::SessionService;
 use super::start::Start;
-use crate::store::{Outcome, Record, Version};
+use crate::clock::timeout;
+use crate::store::{Counted, Outcome, Record, SessionName, StoreShare, Version};
 use crate::{
     ActError, NewSession, Owner, QueuePermit, Reservation, Session, SessionState, Stopped,
     WorkMeter,
 };
 use std::fmt::Debug;
 use std::sync::Arc;
-use tokio::time::timeout;
 use uuid::Uuid;
 
 /// How many sessions a client may have.
@@ -28,6 +28,9 @@ pub trait SessionQuota: Debug + Send + Sync {
     /// # Errors
     /// There are not so many left.
     fn reserve(&self, targets: usize, bytes: usize) -> Result<Reservation, OpenError>;
+
+    /// What the client may have in a store that replicas share.
+    fn store_share(&self) -> StoreShare;
 }
 
 /// A request to open a session.
@@ -170,8 +173,23 @@ impl SessionService {
                 state: bytes,
                 ttl,
             };
+            let share = quota.store_share();
+            let counted = Counted {
+                name: SessionName {
+                    id,
+                    incarnation: opening.incarnation,
+                },
+                places: state.target_count(),
+                bytes: state.session_bytes(),
+                ttl,
+            };
+            if !store.admit(&share, counted).await? {
+                let (what, limit) = ("sessions in the store", share.max_places);
+                return Err(QuotaExhausted { what, limit }.into());
+            }
             match store.create(id, &record).await? {
                 Outcome::Committed(_) => version = Some(record.version),
+                Outcome::Full => return Err(self.registry.full().into()),
                 _ => return Err(OpenError::Exists),
             }
         }

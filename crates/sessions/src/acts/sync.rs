@@ -4,6 +4,7 @@
 
 use super::error::ActError;
 use super::service::SessionService;
+use crate::clock::timeout;
 use crate::store::{Gone, Intent, Local, Outcome, Step, reconcile};
 use crate::{
     Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
@@ -11,7 +12,6 @@ use crate::{
 };
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::time::timeout;
 
 /// How often a session is fenced: other replicas may be there first each time.
 const MAX_ATTEMPTS: usize = 4;

@@ -1,9 +1,10 @@
 //! What decoding and tracking measure.
 
 use crate::Estimates;
+use crate::clock;
 use bagtrack_tracker::Status;
 use metrics::{Counter, Histogram};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What decoding and tracking measure. Clones are the same metrics.
 #[derive(Debug, Clone)]
@@ -25,7 +26,7 @@ pub struct TrackingMetrics {
 impl TrackingMetrics {
     /// Decodes with `work`, and measures it.
     pub fn decoding<T>(&self, work: impl FnOnce() -> T) -> T {
-        let started = Instant::now();
+        let started = clock::now();
         let result = work();
         self.decode.record(started.elapsed().as_secs_f64());
         result

@@ -6,9 +6,9 @@
 
 use super::error::FramesError;
 use super::service::SessionService;
+use crate::clock;
 use crate::{QueuePermit, SessionPermit};
 use std::time::Duration;
-use tokio::time::Instant;
 
 /// How long an early frame waits for its turn.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -44,8 +44,8 @@ impl SessionService {
             permit.wait_for_turn(number, PATIENCE).await;
             return Ok(self.admission.rejoin(request)?);
         }
-        let (deadline, mut pause) = (Instant::now() + PATIENCE, FIRST_PAUSE);
-        while permit.is_early(number) && Instant::now() < deadline {
+        let (deadline, mut pause) = (clock::now() + PATIENCE, FIRST_PAUSE);
+        while permit.is_early(number) && clock::now() < deadline {
             self.refresh(permit.session(), Some(permit), flow).await?;
             permit.wait_for_turn(number, pause).await;
             pause = LONGEST_PAUSE.min(2 * pause);

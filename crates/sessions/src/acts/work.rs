@@ -4,9 +4,8 @@
 //! gone. Until it has ended it keeps its permits and the session's lock.
 
 use super::service::SessionService;
+use crate::clock::{self, timeout};
 use crate::{QueuePermit, Stopped, WorkLimit, WorkMeter, WorkPanicked};
-use std::time::Instant;
-use tokio::time::timeout;
 
 impl SessionService {
     /// Runs `work` on a worker.
@@ -19,12 +18,12 @@ impl SessionService {
         E: From<Stopped> + From<WorkPanicked> + Send + 'static,
         F: FnOnce(&mut WorkMeter) -> Result<T, E> + Send + 'static,
     {
-        let deadline = Instant::now() + self.settings.work_timeout;
+        let deadline = clock::now() + self.settings.work_timeout;
         let max_cpu = self.settings.max_request_cpu;
         let max_cpu = max_cpu.saturating_mul(queue.cpu_share());
         let limit = WorkLimit::new(deadline, max_cpu, queue.spent().clone());
         let _client = limit.abandon_on_drop();
-        let (asked, waited) = (Instant::now(), self.queue_wait.clone());
+        let (asked, waited) = (clock::now(), self.queue_wait.clone());
         let work = self.admission.run(queue, move |turn| {
             waited.record(asked.elapsed().as_secs_f64());
             work(&mut limit.start(turn))

@@ -98,6 +98,13 @@ impl Admission {
         self.rejoin(Ticket::new(flow, held))
     }
 
+    /// The same, but waits for a place, in order of arrival.
+    pub async fn enter_in_order(&self, flow: Flow, held: Reservation) -> QueuePermit {
+        let place = self.queue.clone().acquire_owned().await;
+        let place = place.expect("the queue is never closed");
+        QueuePermit::new(Ticket::new(flow, held), place)
+    }
+
     /// Takes a place in the queue for a request that has left it.
     ///
     /// # Errors

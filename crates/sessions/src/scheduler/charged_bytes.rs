@@ -1,6 +1,6 @@
 //! Bytes that own the memory which they are charged to.
 
-use super::budget::Charge as ByteCharge;
+use super::budget::Charge;
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -9,18 +9,18 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct ChargedBytes<B> {
     bytes: B,
-    _charge: Arc<ByteCharge>,
+    _charge: Arc<Charge>,
 }
 
 impl<B: AsRef<[u8]>> ChargedBytes<B> {
     /// Bytes for which `charge` has been reserved. What is too much of it is given back at once.
-    pub fn new(bytes: B, mut charge: ByteCharge) -> Self {
+    pub fn new(bytes: B, mut charge: Charge) -> Self {
         charge.shrink(bytes.as_ref().len());
         Self::sharing(bytes, &Arc::new(charge))
     }
 
     /// Bytes of several that are charged together.
-    pub fn sharing(bytes: B, charge: &Arc<ByteCharge>) -> Self {
+    pub fn sharing(bytes: B, charge: &Arc<Charge>) -> Self {
         Self {
             bytes,
             _charge: charge.clone(),
@@ -43,20 +43,19 @@ impl<B: AsRef<[u8]> + Send + 'static> From<ChargedBytes<B>> for Bytes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ByteBudget;
+    use crate::Budget;
 
     #[test]
     fn the_memory_is_free_when_the_last_clone_is_dropped() {
-        let budget = ByteBudget::new(1 << 20);
-        let mut charge = ByteCharge::new(&budget, &budget.clone());
+        let (all, client) = (Budget::new(1 << 20), Budget::new(1 << 20));
+        let mut charge = Charge::new(&all, &client);
         charge.grow(64 << 10).unwrap();
-        let all = budget.left();
         let bytes = Bytes::from(ChargedBytes::new(vec![7; 32 << 10], charge));
-        assert_eq!(budget.left(), all + 2 * (32 << 10), "what is not needed");
+        assert_eq!(all.held(), 32 << 10, "what is not needed is given back");
         let part = bytes.slice(1..2);
         drop(bytes);
-        assert_eq!((budget.left(), &part[..]), (all + 2 * (32 << 10), &[7][..]));
+        assert_eq!((client.held(), &part[..]), (32 << 10, &[7][..]));
         drop(part);
-        assert_eq!(budget.left(), 1 << 20);
+        assert_eq!((all.held(), client.held()), (0, 0));
     }
 }

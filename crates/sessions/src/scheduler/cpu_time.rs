@@ -15,8 +15,8 @@ pub(super) fn thread_cpu_time() -> Duration {
 /// Elsewhere the time of day stands in for it.
 #[cfg(not(unix))]
 pub(super) fn thread_cpu_time() -> Duration {
+    use crate::clock::{self, Instant};
     use std::sync::OnceLock;
-    use std::time::Instant;
     static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed()
+    START.get_or_init(clock::now).elapsed()
 }

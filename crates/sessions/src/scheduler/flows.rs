@@ -1,7 +1,8 @@
 //! The requests that wait, in a flow for each client, and which of them is next.
 
+use crate::clock::{self, Instant};
 use std::collections::{HashMap, VecDeque};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Work that takes more processor time without a break makes its flow a slow one. It is some ten times what a frame of a
 /// camera takes, and half of the time between two of them.
@@ -133,7 +134,7 @@ impl<G> Flows<G> {
             now: [Duration::ZERO; 2],
             flows: HashMap::new(),
             firsts: 0,
-            started: Instant::now(),
+            started: clock::now(),
             #[cfg(test)]
             passed: Duration::ZERO,
         }

@@ -5,9 +5,10 @@
 
 use super::cpu_time::thread_cpu_time;
 use super::fair_queue::WorkerSlot;
+use crate::clock::{self, Instant};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Why work was stopped. What it had done was undone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -122,7 +123,7 @@ impl WorkMeter<'_> {
         if limit.abandoned.load(Ordering::Acquire) {
             return Err(Stopped::Abandoned);
         }
-        if Instant::now() >= limit.deadline {
+        if clock::now() >= limit.deadline {
             return Err(Stopped::Deadline);
         }
         if limit.spent.total() + self.cpu_time() > limit.max_cpu {
@@ -149,13 +150,13 @@ mod tests {
     #[tokio::test]
     async fn each_limit_stops_the_work() {
         let mut turn = FairQueue::new(1).ask(Flow(0), Job::Single).await.unwrap();
-        let soon = || Instant::now() + LONG;
+        let soon = || clock::now() + LONG;
         let limit = WorkLimit::new(soon(), LONG, CpuSpent::default());
         let client = limit.abandon_on_drop();
         assert_eq!(limit.start(&mut turn).check(), Ok(()));
         drop(client);
         assert_eq!(limit.start(&mut turn).check(), Err(Stopped::Abandoned));
-        let late = WorkLimit::new(Instant::now(), LONG, CpuSpent::default());
+        let late = WorkLimit::new(clock::now(), LONG, CpuSpent::default());
         assert_eq!(late.start(&mut turn).check(), Err(Stopped::Deadline));
         let limit = WorkLimit::new(soon(), Duration::from_micros(10), CpuSpent::default());
         let mut meter = limit.start(&mut turn);

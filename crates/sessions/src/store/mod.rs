@@ -34,4 +34,6 @@ pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
-pub use session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+pub use session_store::{
+    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
+};

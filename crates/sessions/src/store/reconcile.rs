@@ -60,6 +60,8 @@ pub fn reconcile(local: Local, outcome: Result<Outcome, StoreUnavailable>) -> St
         Ok(Outcome::Committed(ttl)) => return Step::Commit(ttl),
         Ok(Outcome::NotFound) => return Step::Gone(Gone::NoRecord),
         Ok(Outcome::Tombstoned) => return Step::Gone(Gone::Ended),
+        // Only a new session is refused so.
+        Ok(Outcome::Full) => return Step::Unavailable(StoreUnavailable("it is full".to_owned())),
         Ok(Outcome::Conflict(record)) => record,
     };
     if record.opening.incarnation != local.incarnation {

@@ -23,6 +23,8 @@ pub enum Outcome {
     NotFound,
     /// The session was ended.
     Tombstoned,
+    /// The store is nearly full: it takes no further session, so that it can take the frames of those that it has.
+    Full,
 }
 
 /// A frame that is to be committed.
@@ -42,6 +44,30 @@ pub struct Commit<'a> {
     pub ttl: Duration,
 }
 
+/// What a client may have in the store, at all replicas together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoreShare {
+    /// Names the client.
+    pub client: String,
+    /// Most places of sessions, one for each target.
+    pub max_places: usize,
+    /// Most bytes of their states.
+    pub max_bytes: usize,
+}
+
+/// A session that is to be counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counted {
+    /// Which one.
+    pub name: SessionName,
+    /// Its places.
+    pub places: usize,
+    /// Bytes that its state takes at most.
+    pub bytes: usize,
+    /// How long its record lives without a frame.
+    pub ttl: Duration,
+}
+
 /// The answer to a call.
 pub type StoreFuture<'a, T> = BoxFuture<'a, Result<T, StoreUnavailable>>;
 
@@ -49,6 +75,15 @@ pub type StoreFuture<'a, T> = BoxFuture<'a, Result<T, StoreUnavailable>>;
 pub trait SessionStore: Debug + Send + Sync {
     /// Adds a record, unless there is one under this id or the session was ended.
     fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome>;
+
+    /// Counts a session that is about to be created against what its client may have in the store. False where it may not
+    /// have it. A session counts as long as its record lives.
+    ///
+    /// A store that nothing shares need not count: its process does.
+    fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
+        let _ = (share, session);
+        Box::pin(async { Ok(true) })
+    }
 
     /// The record of this id at its checkpoint, if there is one.
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>>;
@@ -77,6 +112,11 @@ pub trait SessionStore: Debug + Send + Sync {
 
     /// Whether the store answers and takes writes.
     fn is_ready(&self) -> bool;
+
+    /// Whether it is so full that it takes no further session.
+    fn is_full(&self) -> bool {
+        false
+    }
 
     /// How many calls got no answer or were refused since the start.
     fn failures(&self) -> u64;

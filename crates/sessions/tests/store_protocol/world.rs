@@ -6,7 +6,7 @@ use bagtrack_sessions::{
     ActError, Admission, Boxes, Clock, CreationKey, Estimates, Flow, FrameBatch, FramesError,
     IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Owner, Registry,
     ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
-    Start, StreamPlace, TrackingMetrics,
+    Start, StoreShare, StreamPlace, TrackingMetrics,
 };
 use metrics::{Counter, Histogram};
 use std::sync::atomic::AtomicBool;
@@ -63,6 +63,14 @@ struct NoQuota;
 impl SessionQuota for NoQuota {
     fn check(&self) -> Result<(), OpenError> {
         Ok(())
+    }
+
+    fn store_share(&self) -> StoreShare {
+        StoreShare {
+            client: "a client".to_owned(),
+            max_places: usize::MAX,
+            max_bytes: usize::MAX,
+        }
     }
 
     fn reserve(&self, _targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {

@@ -6,7 +6,7 @@ use super::database::OpenError;
 use super::durability::Durability;
 use super::rules::{Fault, OwnedCommit, Transaction};
 use super::writer::{Call, Health, Ruled, Writer};
-use crate::clock::Clock;
+use crate::clock::{Clock, timeout};
 use crate::owner::Owner;
 use std::io;
 use std::path::Path;
@@ -16,7 +16,6 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::sync::oneshot;
-use tokio::time::timeout;
 use uuid::Uuid;
 
 /// The store. When it is dropped, what was written is synced, and the folder is free.

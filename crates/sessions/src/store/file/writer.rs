@@ -3,7 +3,7 @@
 use super::database::{Database, OpenError};
 use super::durability::Durability;
 use super::rules::{Fault, Transaction};
-use crate::clock::Clock;
+use crate::clock::{Clock, Instant, now};
 use crate::store::session_store::StoreUnavailable;
 use fjall::PersistMode;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 use tokio::sync::oneshot;
 
 /// Most calls that are written together.
@@ -116,7 +116,7 @@ impl Writer {
     ) -> Result<Self, OpenError> {
         let database = Database::open(&folder)?;
         health.is_up.store(true, Ordering::Release);
-        let now = Instant::now();
+        let begun = now();
         Ok(Self {
             folder,
             durability,
@@ -124,8 +124,8 @@ impl Writer {
             health,
             database: Some(database),
             sync_due: None,
-            sweep_due: now,
-            reopen_due: now,
+            sweep_due: begun,
+            reopen_due: begun,
             pause: REOPEN.0,
         })
     }
@@ -155,7 +155,7 @@ impl Writer {
             Some(_) => self.sync_due.unwrap_or(self.sweep_due).min(self.sweep_due),
             None => self.reopen_due,
         };
-        due.saturating_duration_since(Instant::now())
+        due.saturating_duration_since(now())
     }
 
     fn do_group(&mut self, mut group: Vec<Box<dyn Call>>) {
@@ -176,11 +176,11 @@ impl Writer {
         let Some(database) = &mut self.database else {
             return Err("its files could not be written lately".to_owned());
         };
-        let (now, durability) = (self.time.now(), self.durability);
+        let (time, durability) = (self.time.now(), self.durability);
         let mut failures = 0;
         // Files that were damaged since they were opened may break an assumption of the database.
         let result = catch_unwind(AssertUnwindSafe(|| {
-            let mut transaction = database.begin(now);
+            let mut transaction = database.begin(time);
             for call in group.iter_mut() {
                 failures += u64::from(!call.run(&mut transaction));
             }
@@ -195,8 +195,8 @@ impl Writer {
         self.health.failures.fetch_add(failures, Ordering::Relaxed);
         match result {
             Ok(Ok(promises)) => {
-                if let (Durability::Every(time), true) = (durability, promises) {
-                    self.sync_due.get_or_insert_with(|| Instant::now() + time);
+                if let (Durability::Every(pause), true) = (durability, promises) {
+                    self.sync_due.get_or_insert_with(|| now() + pause);
                 }
                 Ok(())
             }
@@ -212,34 +212,34 @@ impl Writer {
         }
         self.database = None;
         self.sync_due = None;
-        self.reopen_due = Instant::now() + self.pause;
+        self.reopen_due = now() + self.pause;
         self.pause = (2 * self.pause).min(REOPEN.1);
         reason.to_owned()
     }
 
     /// Does what is due.
     fn maintain(&mut self) {
-        let now = Instant::now();
+        let begun = now();
         let Some(database) = &mut self.database else {
-            if now >= self.reopen_due {
+            if begun >= self.reopen_due {
                 self.reopen();
             }
             return;
         };
-        if self.sync_due.is_some_and(|due| now >= due) {
+        if self.sync_due.is_some_and(|due| begun >= due) {
             self.sync_due = None;
             if let Err(error) = database.sync() {
                 self.fail(&error.to_string());
                 return;
             }
         }
-        if now >= self.sweep_due {
+        if begun >= self.sweep_due {
             let time = self.time.now();
             let swept = catch_unwind(AssertUnwindSafe(|| database.sweep(time)));
-            let took = now.elapsed();
+            let took = begun.elapsed();
             match swept {
-                Ok(Ok(true)) => self.sweep_due = Instant::now() + took,
-                Ok(Ok(false)) => self.sweep_due = Instant::now() + SWEEP.max(20 * took),
+                Ok(Ok(true)) => self.sweep_due = now() + took,
+                Ok(Ok(false)) => self.sweep_due = now() + SWEEP.max(20 * took),
                 Ok(Err(error)) => drop(self.fail(&error.to_string())),
                 Err(_) => drop(self.fail("the database could not make sense of its files")),
             }

@@ -1,19 +1,24 @@
 //! A store in Redis or Valkey: each call is one script.
 
 use super::super::record::{Record, SessionName, Version};
-use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+use super::super::session_store::{
+    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
+};
 use super::address::RedisAddress;
 use super::connection::{Call, Connection};
 use super::scripts::Scripts;
+use crate::clock::{sleep, wall_now};
 use crate::owner::Owner;
 use redis::{FromRedisValue, Script, ScriptInvocation};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
-use std::time::Duration;
-use tokio::time::sleep;
+use std::time::{Duration, SystemTime};
 use uuid::Uuid;
 
 /// How long an idempotency key names its session.
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+/// How long a client's sessions are counted after it opened the last one.
+const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
 /// How often the store is asked whether it is there.
 const PROBE: Duration = Duration::from_millis(250);
 
@@ -28,6 +33,8 @@ struct Shared {
     connection: Connection,
     scripts: Scripts,
     prefix: String,
+    /// Whether it refused the last new session for want of room.
+    is_full: AtomicBool,
 }
 
 impl Shared {
@@ -58,6 +65,9 @@ impl FromRedisValue for Answer {
         let kind = i64::from_redis_value(next()?)?;
         if kind == 0 {
             return Ok(Self(Outcome::NotFound));
+        }
+        if kind == 4 {
+            return Ok(Self(Outcome::Full));
         }
         if kind == 3 {
             return Ok(Self(Outcome::Tombstoned));
@@ -91,6 +101,7 @@ impl RedisStore {
             connection,
             scripts: Scripts::new(),
             prefix: prefix.to_owned(),
+            is_full: AtomicBool::new(false),
         });
         shared.probe().await;
         tokio::spawn(probe(Arc::downgrade(&shared)));
@@ -108,6 +119,58 @@ impl RedisStore {
     /// Of a record. Braces make a cluster keep the keys of a session at one node.
     fn key(&self, id: Uuid) -> String {
         format!("{}:session:{{{id}}}", self.0.prefix)
+    }
+
+    /// Of the sessions of a client.
+    fn key_of_client(&self, client: &str) -> String {
+        let name = blake3::hash(client.as_bytes()).to_hex();
+        format!("{}:client:{name}", self.0.prefix)
+    }
+
+    /// Counts a session; where there is no room, the sessions that were looked at longest ago.
+    async fn try_admit(
+        &self,
+        share: &StoreShare,
+        session: Counted,
+    ) -> Result<Option<Vec<String>>, StoreUnavailable> {
+        let SessionName { id, incarnation } = session.name;
+        let (places, bytes) = (session.places, session.bytes);
+        let member = format!("{id}:{incarnation}:{places}:{bytes}");
+        let mut script = self.0.scripts.admit.key(self.key_of_client(&share.client));
+        script.arg(member).arg(now() + milliseconds(session.ttl));
+        script.arg(share.max_places).arg(share.max_bytes);
+        script.arg(milliseconds(COUNTED));
+        let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
+        Ok((answer.0 == 0).then_some(answer.1))
+    }
+
+    /// Finds out which of these sessions of a client live. Their records may be at other nodes.
+    async fn recount(
+        &self,
+        share: &StoreShare,
+        members: Vec<String>,
+    ) -> Result<(), StoreUnavailable> {
+        for member in members {
+            let mut parts = member.split(':');
+            let id = parts.next().and_then(|id| id.parse().ok());
+            let (Some(id), Some(incarnation)) = (id, parts.next()) else {
+                continue;
+            };
+            let mut lives = self.0.scripts.lives.key(self.key(id));
+            lives.arg(incarnation);
+            let lives: i64 = self.0.connection.call(Call::Script(lives)).await?;
+            let until = u64::try_from(lives).ok().filter(|lives| *lives > 0);
+            let mut script = self
+                .0
+                .scripts
+                .recount
+                .key(self.key_of_client(&share.client));
+            script
+                .arg(&member)
+                .arg(until.map_or(0, |lives| now() + lives));
+            let _: i64 = self.0.connection.call(Call::Script(script)).await?;
+        }
+        Ok(())
     }
 
     /// Runs a script on a session.
@@ -128,7 +191,22 @@ impl SessionStore for RedisStore {
         script.arg(token()).arg(incarnation);
         script.arg(record.head()).arg(&record.state[..]);
         script.arg(milliseconds(record.ttl));
-        Box::pin(self.about_record(script))
+        Box::pin(async move {
+            let outcome = self.about_record(script).await?;
+            let is_full = outcome == Outcome::Full;
+            self.0.is_full.store(is_full, Ordering::Relaxed);
+            Ok(outcome)
+        })
+    }
+
+    fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
+        Box::pin(async move {
+            if let Some(counted) = self.try_admit(share, session).await? {
+                self.recount(share, counted).await?;
+                return Ok(self.try_admit(share, session).await?.is_none());
+            }
+            Ok(true)
+        })
     }
 
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
@@ -139,7 +217,9 @@ impl SessionStore for RedisStore {
         Box::pin(async move {
             Ok(match self.about_record(script).await? {
                 Outcome::Conflict(record) => Some(*record),
-                Outcome::NotFound | Outcome::Tombstoned | Outcome::Committed(_) => None,
+                Outcome::NotFound | Outcome::Tombstoned | Outcome::Full | Outcome::Committed(_) => {
+                    None
+                }
             })
         })
     }
@@ -197,6 +277,10 @@ impl SessionStore for RedisStore {
         })
     }
 
+    fn is_full(&self) -> bool {
+        self.0.is_full.load(Ordering::Relaxed)
+    }
+
     fn is_ready(&self) -> bool {
         self.0.connection.is_ready()
     }
@@ -204,6 +288,12 @@ impl SessionStore for RedisStore {
     fn failures(&self) -> u64 {
         self.0.connection.failures()
     }
+}
+
+/// Milliseconds since 1970.
+fn now() -> u64 {
+    let since = wall_now().duration_since(SystemTime::UNIX_EPOCH);
+    milliseconds(since.unwrap_or_default())
 }
 
 /// A name for one write.

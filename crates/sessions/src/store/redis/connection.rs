@@ -2,6 +2,7 @@
 
 use super::super::session_store::StoreUnavailable;
 use super::address::{Kind, RedisAddress};
+use crate::clock::{self, sleep, timeout_at};
 use redis::aio::{ConnectionLike, ConnectionManager, ConnectionManagerConfig};
 use redis::cluster::ClusterConfig;
 use redis::cluster_async::ClusterConnection;
@@ -12,7 +13,6 @@ use redis::{
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
-use tokio::time::{Instant, sleep, timeout_at};
 
 /// Between two attempts of one call.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -150,9 +150,9 @@ impl Connection {
     }
 
     async fn attempt(&self, call: Call<'_>) -> Result<Value, StoreUnavailable> {
-        let deadline = Instant::now() + self.timeout;
+        let deadline = clock::now() + self.timeout;
         let mut reason: Option<RedisError> = None;
-        while Instant::now() < deadline {
+        while clock::now() < deadline {
             let (number, mut link) = self.lock().clone();
             match timeout_at(deadline, call.send(&mut link)).await {
                 Ok(Ok(value)) => {

@@ -28,13 +28,24 @@ local function tell(key, takes_over)
 end
 ";
 
-/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live.
+/// Of a server with a bound of memory, which refuses writes then: whether it is nearly used up.
+const NEARLY_FULL: &str = r"
+local function nearly_full()
+  local memory = redis.call('INFO', 'memory')
+  local most = tonumber(string.match(memory, 'maxmemory:(%d+)')) or 0
+  local used = tonumber(string.match(memory, 'used_memory:(%d+)')) or 0
+  return most > 0 and used > 0.9 * most
+end
+";
+
+/// ARGV: generation, frame, token, incarnation, head, state, milliseconds to live. Answers `{4}` where there is no room.
 const CREATE: &str = r"
 local key = KEYS[1]
 local token = redis.call('HGET', key, 'token')
 if token == ARGV[3] then return {1, 0} end
 if token then return tell(key, false) end
 if redis.call('EXISTS', KEYS[2]) == 1 then return {3} end
+if nearly_full() then return {4} end
 redis.call('HSET', key, 'generation', ARGV[1], 'frame', ARGV[2], 'checkpoint', ARGV[2],
   'token', ARGV[3], 'incarnation', ARGV[4], 'head', ARGV[5], 'state', ARGV[6])
 redis.call('PEXPIRE', key, ARGV[7])
@@ -95,6 +106,37 @@ redis.call('SET', KEYS[1], ARGV[1], 'PX', ARGV[2])
 return ARGV[1]
 ";
 
+/// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in milliseconds)
+/// until which they are known to live. ARGV: member, time, most places, most bytes, milliseconds to keep the key. Answers
+/// whether the session is counted, and else the members that were looked at longest ago.
+const ADMIT: &str = r"
+local places, bytes = 0, 0
+local function count(member)
+  local of_one, its_bytes = string.match(member, ':(%d+):(%d+)$')
+  places, bytes = places + tonumber(of_one), bytes + tonumber(its_bytes)
+end
+for _, member in ipairs(redis.call('ZRANGE', KEYS[1], 0, -1)) do count(member) end
+count(ARGV[1])
+if places > tonumber(ARGV[3]) or bytes > tonumber(ARGV[4]) then
+  return {0, redis.call('ZRANGE', KEYS[1], 0, 31)}
+end
+redis.call('ZADD', KEYS[1], ARGV[2], ARGV[1])
+redis.call('PEXPIRE', KEYS[1], ARGV[5])
+return {1, {}}
+";
+
+/// KEYS: that of a client. ARGV: a member of it, and until when its session is known to live; 0 where it has ended.
+const RECOUNT: &str = r"
+if ARGV[2] == '0' then return redis.call('ZREM', KEYS[1], ARGV[1]) end
+return redis.call('ZADD', KEYS[1], 'XX', ARGV[2], ARGV[1])
+";
+
+/// KEYS: a record's. ARGV: incarnation. Answers the milliseconds that the session lives; 0 where it has ended.
+const LIVES: &str = r"
+if redis.call('HGET', KEYS[1], 'incarnation') ~= ARGV[1] then return 0 end
+return redis.call('PTTL', KEYS[1])
+";
+
 /// Whether the store takes writes.
 const PROBE: &str = r"
 redis.call('HSET', KEYS[1], 'token', '')
@@ -110,19 +152,25 @@ pub(super) struct Scripts {
     pub(super) claim: Script,
     pub(super) end: Script,
     pub(super) probe: Script,
+    pub(super) admit: Script,
+    pub(super) recount: Script,
+    pub(super) lives: Script,
 }
 
 impl Scripts {
     pub(super) fn new() -> Self {
         let telling = |body: &str| Script::new(&format!("{ABSENT}{TELL}{body}"));
         Self {
-            create: telling(CREATE),
+            create: telling(&format!("{NEARLY_FULL}{CREATE}")),
             commit: telling(COMMIT),
             check: telling(CHECK),
             fence: telling(FENCE),
             claim: Script::new(CLAIM),
             end: Script::new(END),
             probe: Script::new(PROBE),
+            admit: Script::new(ADMIT),
+            recount: Script::new(RECOUNT),
+            lives: Script::new(LIVES),
         }
     }
 }

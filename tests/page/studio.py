@@ -1,0 +1,136 @@
+"""Several objects, the timeline, corrections of earlier frames, and what is saved of them."""
+
+import io
+import json
+import re
+import xml.etree.ElementTree
+import zipfile
+
+from browser import choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+
+CORRECTED = 100
+
+
+def to_frame(page, frame):
+    """Goes to a frame on the timeline, by keyboard."""
+    timeline = page.locator("#timeline")
+    timeline.focus()
+    page.keyboard.press("Home")
+    shown(page, 0)
+    for _ in range(frame // 10):
+        before = int(timeline.get_attribute("aria-valuenow"))
+        page.keyboard.press("PageDown")
+        shown(page, before + 10)
+
+
+def shown(page, frame):
+    page.locator(f"#timeline[aria-valuenow='{frame}']").wait_for()
+
+
+def of_target(table, target):
+    return [row for row in table if row["target"] == str(target)]
+
+
+def values(table):
+    return [(row["frame"], numbers(row), row["score"], row["status"]) for row in table]
+
+
+def two_objects(page, clip):
+    """The first object is the clip's; the second one is a part of the ground."""
+    choose(page, "card")
+    drag(page, clip["truth"][0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    page.locator("#add").click()
+    said(page, "Draw a box around the object to add")
+    drag(page, [20, 20, 60, 60])
+    page.locator("#list li:nth-child(2)").wait_for()
+    page.locator("#pause").click()
+    page.locator("#list li:nth-child(1) input[type=radio]").check()
+    to_the_end(page)
+
+
+def objects_in(checks, where):
+    page = checks.page(where=where)
+    clip = checks.clips["card"]
+    two_objects(page, clip)
+    checks.shot(page, f"objects-{where}")
+    checks.no_axe_violations(page, "two objects")
+    table = rows(page)
+    first, second = of_target(table, 0), of_target(table, 1)
+    assert len(first) == 150 and near(first, clip["truth"]) >= 100
+    begun = int(second[0]["frame"])
+    assert 19 <= begun < 150 and [int(row["frame"]) for row in second] == list(range(begun, 150))
+    assert numbers(second[0]) == [20, 20, 60, 60], second[0]
+
+    to_frame(page, CORRECTED)
+    checks.shot(page, f"earlier-{where}")
+    box = [30, 200, 80, 60]
+    drag(page, box)
+    said(page, f"Followed anew from frame {CORRECTED}")
+    after = rows(page)
+    assert values(of_target(after, 1)) == values(second), "the other object has changed"
+    redone = of_target(after, 0)
+    assert values(redone[:CORRECTED]) == values(first[:CORRECTED]), "earlier frames have changed"
+    assert len(redone) == 150
+    assert all(abs(one - other) <= 1 for one, other in zip(numbers(redone[CORRECTED]), box)), redone[CORRECTED]
+    assert values(redone[CORRECTED:]) != values(first[CORRECTED:])
+    check_exports(page, after)
+    page.locator("#list li:nth-child(2)").get_by_text("Delete").click()
+    assert not of_target(rows(page), 1)
+    page.context.close()
+
+
+def check_exports(page, table):
+    """All formats tell the same boxes."""
+    told = {(int(row["frame"]), int(row["target"])): numbers(row) for row in table if row["status"] != "lost"}
+    whole = {key: box for key, box in told.items() if box[0] >= 0 and box[1] >= 0 and box[0] + box[2] <= 480 and box[1] + box[3] <= 360}
+    assert len(whole) > 100
+
+    def same(found, by):
+        assert set(found) >= set(whole)
+        for key, box in whole.items():
+            assert max(abs(one - other) for one, other in zip(found[key], box)) <= by, (key, found[key], box)
+
+    lines = [line.split(",") for line in saved(page, "#save-mot").decode().splitlines()]
+    assert len(lines) == len(table) and all(len(line) == 10 for line in lines)
+    same({(int(f) - 1, int(t) - 1): [float(x) - 1, float(y) - 1, float(w), float(h)] for f, t, x, y, w, h, *_ in lines}, 0.001)
+
+    coco = json.loads(saved(page, "#save-coco"))
+    images = {image["id"]: image for image in coco["images"]}
+    assert {category["name"] for category in coco["categories"]} == {"Object 1", "Object 2"}
+    frame = lambda note: images[note["image_id"]]["frame_id"]
+    same({(frame(note), note["category_id"] - 1): note["bbox"] for note in coco["annotations"]}, 0.01)
+    assert len({note["id"] for note in coco["annotations"]}) == len(coco["annotations"])
+
+    archive = zipfile.ZipFile(io.BytesIO(saved(page, "#save-yolo")))
+    assert archive.testzip() is None and "data.yaml" in archive.namelist()
+    found = {}
+    for name in archive.namelist()[1:]:
+        frame = int(re.search(r"(\d+)\.txt$", name)[1])
+        for line in archive.read(name).decode().splitlines():
+            target, x, y, w, h = line.split()
+            w, h = float(w) * 480, float(h) * 360
+            found[frame, int(target)] = [float(x) * 480 - w / 2, float(y) * 360 - h / 2, w, h]
+    same(found, 0.01)
+
+    cvat = xml.etree.ElementTree.fromstring(saved(page, "#save-cvat"))
+    assert cvat.findtext("version") == "1.1" and cvat.findtext("meta/task/size") == "150"
+    boxes = {}
+    for track in cvat.iter("track"):
+        for box in track.iter("box"):
+            left, top, right, bottom = (float(box.get(side)) for side in ("xtl", "ytl", "xbr", "ybr"))
+            boxes[int(box.get("frame")), int(track.get("id"))] = [left, top, right - left, bottom - top]
+    assert len(boxes) == len(table)
+    same(boxes, 0.011)
+
+
+def objects_in_the_page(checks):
+    objects_in(checks, "here")
+
+
+def objects_with_the_service(checks):
+    objects_in(checks, "there")
+
+
+ALL = [objects_in_the_page, objects_with_the_service]

@@ -1,0 +1,250 @@
+// What follows an object: a session in this page, or one of the service. Frames go in, answers come out.
+
+import { Problem } from "./js/bagtrack.js";
+
+/**
+ * @typedef {import("./js/bagtrack.js").Box} Box
+ * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
+ * @typedef {import("./source.js").Picture} Picture
+ *
+ * @typedef {{box?: Box, see?: boolean}} Header The right box, where the user drew it; whether the answer tells what was
+ *   seen.
+ *
+ * @typedef {object} Told
+ * @property {(isUp: boolean) => void} line
+ * @property {() => void} anew The service had lost the session: another one goes on from the last box.
+ * @property {(error: unknown) => void} fail
+ *
+ * @typedef {object} Follower
+ * @property {(picture: Picture, box: Box) => Promise<Answer>} open
+ * @property {(saved: Uint8Array<ArrayBuffer>) => Promise<number>} restore Goes on from there; the number of its frame.
+ * @property {(picture: Picture, header: Header) => Promise<Answer | undefined>} track Nothing for a frame that was skipped.
+ * @property {() => Promise<Uint8Array<ArrayBuffer>>} save
+ * @property {() => Promise<Blob>} bag A picture of what is kept of the object.
+ * @property {() => void} end
+ */
+
+/** Frames on their way at a time. */
+export const WINDOW = 8;
+
+/** Tracks a frame for all objects at once: it is decoded once. */
+class Batch {
+  /** @param {import("./js/bagtrack.js").LocalClient} client */
+  constructor(client) {
+    this.client = client;
+    /** @type {{picture: Picture, see: boolean, sessions: any[], told: ((answers: Promise<Answer[]>) => void)[]} | undefined} */
+    this.open = undefined;
+  }
+
+  /**
+   * @param {import("./js/bagtrack.js").LocalSession} session
+   * @param {Picture} picture
+   * @param {boolean} see
+   * @returns {Promise<Answer>}
+   */
+  async track(session, picture, see) {
+    if (this.open?.picture !== picture) {
+      this.flush();
+      this.open = { picture, see: false, sessions: [], told: [] };
+      // The other objects ask for it in the same turn.
+      queueMicrotask(() => this.flush());
+    }
+    const { open } = this;
+    open.see ||= see;
+    const at = open.sessions.push(session) - 1;
+    /** @type {Promise<Answer[]>} */
+    const answers = new Promise((resolve) => open.told.push(resolve));
+    return (await answers)[at];
+  }
+
+  flush() {
+    const { open } = this;
+    if (!open) return;
+    this.open = undefined;
+    const answers = this.client.track(open.sessions, open.picture.image, { see: open.see });
+    open.told.forEach((tell) => tell(answers));
+  }
+}
+
+/** @type {WeakMap<import("./js/bagtrack.js").LocalClient, Batch>} */
+const batches = new WeakMap();
+
+/** @implements {Follower} */
+export class LocalFollower {
+  /** @param {import("./js/bagtrack.js").LocalClient} client */
+  constructor(client) {
+    this.client = client;
+    this.batch = batches.get(client) ?? new Batch(client);
+    batches.set(client, this.batch);
+    /** @type {import("./js/bagtrack.js").LocalSession | undefined} */
+    this.session = undefined;
+  }
+
+  get own() {
+    if (!this.session) throw new Error("The session is not open.");
+    return this.session;
+  }
+
+  /** @param {Picture} picture
+   * @param {Box} box */
+  async open(picture, box) {
+    this.session = await this.client.open(picture.image, box);
+    return this.session;
+  }
+
+  /** @param {Uint8Array<ArrayBuffer>} saved */
+  async restore(saved) {
+    this.session = await this.client.restore(saved);
+    return this.session.frame;
+  }
+
+  /** @param {Picture} picture
+   * @param {Header} header */
+  track(picture, { box, see = false }) {
+    return box ? this.own.correct(picture.image, box) : this.batch.track(this.own, picture, see);
+  }
+
+  save() {
+    return this.own.snapshot();
+  }
+
+  bag() {
+    return this.own.bag();
+  }
+
+  end() {
+    this.session?.end().catch(() => undefined);
+    this.session = undefined;
+  }
+}
+
+/** @implements {Follower} */
+export class ServiceFollower {
+  /**
+   * @param {import("./js/bagtrack.js").Client} client
+   * @param {boolean} isLive
+   * @param {Told} told
+   */
+  constructor(client, isLive, told) {
+    this.client = client;
+    this.isLive = isLive;
+    this.told = told;
+    /** @type {import("./js/bagtrack.js").Session | undefined} */
+    this.session = undefined;
+    /** @type {import("./js/bagtrack.js").FrameStream | undefined} */
+    this.stream = undefined;
+    /** Whether the session has answered. */
+    this.hasAnswered = false;
+    this.isOver = false;
+    /** @type {Promise<unknown>} The state that was asked for last is here. */
+    this.saving = Promise.resolve();
+    /** @type {{picture: Picture, box: Box} | undefined} What was answered last. */
+    this.last = undefined;
+    /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void}[]} Oldest first. */
+    this.waiting = [];
+  }
+
+  get own() {
+    if (!this.session) throw new Error("The session is not open.");
+    return this.session;
+  }
+
+  /** @param {Picture} picture
+   * @param {Box} box
+   * @returns {Promise<Answer>} */
+  async open(picture, box) {
+    const session = await this.client.open(picture.blob, box);
+    this.last = { picture, box: session.box };
+    this.connect(session);
+    return { frame: 0, box: session.box, score: 1, status: "tracking" };
+  }
+
+  /** @param {Uint8Array<ArrayBuffer>} saved */
+  async restore(saved) {
+    const session = await this.client.restore(saved);
+    this.connect(session);
+    return session.frame;
+  }
+
+  /** @param {import("./js/bagtrack.js").Session} session */
+  connect(session) {
+    this.session = session;
+    this.hasAnswered = false;
+    if (this.isOver) return this.end();
+    const onLine = (/** @type {boolean} */ isUp) => this.told.line(isUp);
+    const stream = session.stream({ live: this.isLive, window: WINDOW, patience: Infinity, onLine });
+    this.stream = stream;
+    stream.ended.then((problem) => problem && this.stream === stream && this.fail(problem));
+  }
+
+  /** @param {Picture} picture
+   * @param {Header} header
+   * @returns {Promise<Answer | undefined>} */
+  track(picture, header) {
+    return new Promise((resolve) => {
+      const sent = { picture, header, resolve };
+      this.waiting.push(sent);
+      this.transmit(sent);
+    });
+  }
+
+  /** @param {ServiceFollower["waiting"][number]} sent */
+  async transmit(sent) {
+    const { stream } = this;
+    if (!stream) return;
+    try {
+      const answer = await stream.track(sent.picture.blob, sent.header);
+      if (this.stream !== stream) return;
+      this.waiting = this.waiting.filter((other) => other !== sent);
+      if (answer) {
+        this.hasAnswered = true;
+        this.last = { picture: sent.picture, box: answer.box };
+      }
+      sent.resolve(answer);
+    } catch (problem) {
+      if (this.stream === stream) this.fail(problem);
+    }
+  }
+
+  /** @param {unknown} problem */
+  fail(problem) {
+    // Such as a service with other keys after its restart, which does not take the session's snapshot.
+    if (problem instanceof Problem && problem.isGone && this.hasAnswered && !this.isOver) this.goOn();
+    else this.told.fail(problem);
+  }
+
+  /** Goes on in another session, from the last picture and its box. */
+  async goOn() {
+    this.stream = undefined;
+    this.hasAnswered = false;
+    try {
+      if (!this.last) return;
+      await this.open(this.last.picture, this.last.box);
+      if (this.isOver) return;
+      this.told.anew();
+      this.waiting.forEach((sent) => this.transmit(sent));
+    } catch (error) {
+      this.told.fail(error);
+    }
+  }
+
+  /** Of now: frames on their way may be in it. */
+  save() {
+    const taken = this.own.call("GET", "/snapshot");
+    this.saving = taken.catch(() => undefined);
+    return taken.then(async (response) => new Uint8Array(await response.arrayBuffer()));
+  }
+
+  bag() {
+    return this.own.bag();
+  }
+
+  end() {
+    const { session } = this;
+    this.isOver = true;
+    this.session = undefined;
+    this.stream?.close();
+    // One that cannot be ended expires.
+    this.saving.then(() => session?.end()).catch(() => undefined);
+  }
+}
