@@ -140,7 +140,8 @@ export class ServiceFollower {
     this.saving = Promise.resolve();
     /** @type {{picture: Picture, box: Box} | undefined} What was answered last. */
     this.last = undefined;
-    /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void}[]} Oldest first. */
+    /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void, by?: object}[]} Oldest
+     * first; `by` is the stream that has it. */
     this.waiting = [];
   }
 
@@ -182,6 +183,7 @@ export class ServiceFollower {
    * @returns {Promise<Answer | undefined>} */
   track(picture, header) {
     return new Promise((resolve) => {
+      /** @type {ServiceFollower["waiting"][number]} */
       const sent = { picture, header, resolve };
       this.waiting.push(sent);
       this.transmit(sent);
@@ -191,7 +193,8 @@ export class ServiceFollower {
   /** @param {ServiceFollower["waiting"][number]} sent */
   async transmit(sent) {
     const { stream } = this;
-    if (!stream) return;
+    if (!stream || sent.by === stream) return;
+    sent.by = stream;
     try {
       const answer = await stream.track(sent.picture.blob, sent.header);
       if (this.stream !== stream) return;

@@ -47,7 +47,7 @@ def check_rows(table, path, truth, numbers, times):
         about = [row[name] for name in ("video", "video_width", "video_height")]
         assert about == [path.name, str(SIZE[0]), str(SIZE[1])], about
     print(f"  {path.name}: {len(table)} of {len(numbers)} frames, {near} within 10 px of the file")
-    assert near >= 0.9 * len(numbers)
+    assert near >= 0.9 * len(numbers), (near, [(row["frame"], row["x"], row["y"], row["status"]) for row in table])
 
 
 def check_video(video, numbers, seconds, size=SENT):

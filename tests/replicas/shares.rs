@@ -69,9 +69,9 @@ async fn a_store_that_is_nearly_full_takes_frames_and_no_new_session() {
     let refused = open(&client, &replica, "198.51.100.1").await;
     assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
     let frames = Clip::of(0, 4).frames;
-    for number in 1..4 {
+    for (number, frame) in frames.into_iter().enumerate().skip(1) {
         let post = client.post(replica.url(&format!("{path}/frames?frame={number}")));
-        let answer = post.body(frames[number].clone()).send().await.unwrap();
+        let answer = post.body(frame).send().await.unwrap();
         assert_eq!(answer.status(), StatusCode::OK, "frame {number}");
     }
     let metrics = client.get(replica.url("/metrics")).send().await.unwrap();

@@ -49,7 +49,7 @@ settings! {
         max_connections: usize = 4096, permits;
         /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
         /// commas; `*` for all. Requests of other pages are refused.
-        cors_origins: Vec<String> = Vec::new(), origins;
+        cors_origins: Vec<String> = Vec::new(), |values| origins(values);
         /// The path of the service on a host that it shares with others, like `/tracker`.
         base_path: BasePath = BasePath::default();
         /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for

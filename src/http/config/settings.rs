@@ -100,7 +100,7 @@ impl Value for Duration {
 impl Value for PathBuf {
     const NAME: Option<&'static str> = Some("FILE");
     fn parser() -> ValueParser {
-        value_parser!(PathBuf).into()
+        value_parser!(PathBuf)
     }
 }
 
@@ -212,7 +212,7 @@ pub(super) fn delay(value: &Duration) -> Result<(), &'static str> {
 }
 
 /// Origins like `https://example.org`, or `*` for all.
-pub(super) fn origins(values: &Vec<String>) -> Result<(), &'static str> {
+pub(super) fn origins(values: &[String]) -> Result<(), &'static str> {
     let plain = |byte: u8| byte.is_ascii_graphic() && byte != b'/';
     let is_origin = |text: &String| {
         let host = text.split_once("://").map_or("", |(_, host)| host);
