@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The price of the store: time a frame without it, with it, and with a new replica for each frame.
+"""The price of the store: time a frame without it, with it in a folder and in a Redis, and with a new replica for each
+frame.
 
     cargo build --release
     tools/measure_replicas.py /path/to/sequences/Coke
 
-Starts a Redis and four replicas on free ports. The ways to send a frame are measured in turns, frame by frame, so that
+Starts a Redis and six replicas on free ports. The ways to send a frame are measured in turns, frame by frame, so that
 they share what the machine does beside. Beside them: SET and GET of as many bytes as the store holds of the session.
 Needs redis-server; no Python packages.
 """
@@ -104,39 +105,45 @@ def main():
     options.add_argument("--program", default="target/release/bagtrack")
     options.add_argument("--rounds", type=int, default=5, help="how often the video is played")
     options.add_argument("--fsync", default="everysec", help="appendfsync of the Redis")
+    options.add_argument("--folder", help="where the stores in folders are made; otherwise in the system's temporary one")
     options.add_argument("--every", default="1", help="--store-every")
     options = options.parse_args()
     files, box = read(options.video)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=options.folder) as folder:
         port = free_port()
         redis = start_redis(port, folder, options.fsync)
         store = ["--store", f"redis://127.0.0.1:{port}"]
         alone = Replica(options.program, [])
+        in_folders = [
+            Replica(options.program, ["--store", f"file:{folder}/{durability}", "--durability", durability])
+            for durability in ["250ms", "each"]
+        ]
         sticky = Replica(options.program, [*store, "--store-every", options.every])
         turns = [Replica(options.program, store) for _ in range(2)]
         calls = Redis(port)
-        times = {"without a store": [], "with a store, one replica": [], "with a store, replicas in turns": [],
+        times = {"without a store": [], "in a folder, synced every 250 ms": [], "in a folder, each answer synced": [],
+                 "with a store, one replica": [], "with a store, replicas in turns": [],
                  "SET and GET alone": []}
         sizes = []
         try:
             for _ in range(options.rounds):
-                ids = [uuid.uuid4() for _ in range(3)]
-                for replica, name in zip([alone, sticky, turns[0]], ids):
+                ids = [uuid.uuid4() for _ in range(5)]
+                for replica, name in zip([alone, *in_folders, sticky, turns[0]], ids):
                     replica.send("PUT", f"/sessions/{name}?seed=1&box={box}", files[0])
                 for number, file in enumerate(files[1:], 1):
-                    replicas = [alone, sticky, turns[number % 2]]
+                    replicas = [alone, *in_folders, sticky, turns[number % 2]]
                     for kind, replica, name in zip(times, replicas, ids):
                         before = time.perf_counter()
                         replica.send("POST", f"/sessions/{name}/frames?frame={number}", file)
                         times[kind].append(time.perf_counter() - before)
-                    state = calls.call("HGET", f"bagtrack:session:{{{ids[2]}}}", "state")
+                    state = calls.call("HGET", f"bagtrack:session:{{{ids[4]}}}", "state")
                     sizes.append(len(state))
                     before = time.perf_counter()
                     calls.call("SET", "probe", state)
                     calls.call("GET", "probe")
                     times["SET and GET alone"].append(time.perf_counter() - before)
         finally:
-            for replica in [alone, sticky, *turns]:
+            for replica in [alone, *in_folders, sticky, *turns]:
                 replica.process.terminate()
             redis.terminate()
             redis.wait()

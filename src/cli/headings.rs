@@ -87,7 +87,13 @@ const HEADINGS: [(&str, &[&str]); 10] = [
     ),
     (
         "Store",
-        &["store", "store_every", "store_timeout", "store_prefix"],
+        &[
+            "store",
+            "durability",
+            "store_every",
+            "store_timeout",
+            "store_prefix",
+        ],
     ),
     ("Shutdown", &["shutdown_delay", "shutdown_timeout"]),
     ("Logging", &["log", "log_format"]),

@@ -60,6 +60,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         work = mib(bound.work),
         sessions = mib(bound.sessions),
         connections = mib(bound.connections),
+        store = mib(bound.store),
         videos = mib(bound.videos),
         "resident memory stays below {} MiB",
         mib(bound.total())

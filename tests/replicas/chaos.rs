@@ -18,20 +18,20 @@ use tokio::sync::Notify;
 use tokio::task::JoinSet;
 
 /// A number that the environment may set.
-fn setting(name: &str, default: usize) -> usize {
+pub fn setting(name: &str, default: usize) -> usize {
     let text = std::env::var(name).ok();
     text.map_or(default, |text| text.parse().expect("a number"))
 }
 
 /// What the clients have reached together.
 #[derive(Default)]
-struct Progress {
-    frames: AtomicUsize,
-    moved: Notify,
+pub struct Progress {
+    pub frames: AtomicUsize,
+    pub moved: Notify,
 }
 
 impl Progress {
-    async fn reaches(&self, frames: usize) {
+    pub async fn reaches(&self, frames: usize) {
         loop {
             let moved = self.moved.notified();
             if self.frames.load(Ordering::Acquire) >= frames {
@@ -43,10 +43,10 @@ impl Progress {
 }
 
 /// With the same secret, snapshots of the same state are the same bytes.
-const SECRET: [&str; 2] = ["--snapshot-keys", "a secret of these tests"];
+pub const SECRET: [&str; 2] = ["--snapshot-keys", "a secret of these tests"];
 
 /// The boxes without a store and without failures, which are rounded, and the states that they lead to, which are not.
-async fn undisturbed(clips: &[Clip]) -> Vec<(Vec<Answer>, Vec<u8>)> {
+pub async fn undisturbed(clips: &[Clip]) -> Vec<(Vec<Answer>, Vec<u8>)> {
     let alone = Replica::start(&SECRET);
     let mut tracks = Vec::new();
     for (number, clip) in clips.iter().enumerate() {

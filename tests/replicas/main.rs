@@ -1,10 +1,11 @@
-//! Several replicas of the program, and a Redis that they share.
+//! Several replicas of the program, and a Redis that they share; or one, with a folder.
 
 mod addresses;
 mod balancers;
 mod chaos;
 mod clip;
 mod failures;
+mod folder;
 mod incarnations;
 mod lost_records;
 mod pair;

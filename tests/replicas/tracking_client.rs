@@ -66,6 +66,10 @@ impl Track {
         true
     }
 
+    pub fn id(&self) -> Uuid {
+        self.id
+    }
+
     /// How many frames the service had answered, and asked for again.
     pub fn resent(&self) -> u64 {
         self.session.resent()

@@ -74,9 +74,9 @@ pub use snapshot::{
 };
 pub use state::{SessionState, StepError};
 pub use store::{
-    AddressError, Commit, Gone, Intent, Local, Outcome, Record, RedisStore, SessionName,
-    SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
-    reconcile,
+    AddressError, Commit, Durability, DurabilityError, FileStore, FileStoreError, Gone, Intent,
+    Local, Outcome, Record, RedisAddress, RedisAddressError, RedisStore, SessionName, SessionStore,
+    Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version, reconcile,
 };
 pub use store::{Counted, StoreShare};
 pub use streams::{OpenStreams, StreamPlace};

@@ -24,6 +24,9 @@ pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 #[cfg(feature = "tls")]
 const TLS_CONNECTION: u64 = MAX_UNSENT_BYTES as u64 + (64 << 10) + (32 << 10);
 
+/// What a store in a folder keeps: what is on its way to tables, and blocks that were read.
+const FILE_STORE: u64 = 128 << 20;
+
 /// Bytes that the parts of the service take at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBound {
@@ -35,6 +38,8 @@ pub struct MemoryBound {
     pub sessions: u64,
     /// Buffers of connections.
     pub connections: u64,
+    /// The store in a folder, where there is one.
+    pub store: u64,
     /// The processes that decode videos.
     pub videos: u64,
 }
@@ -58,6 +63,11 @@ impl MemoryBound {
                 + threads * (WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES)),
             sessions: count(config.session_bytes()),
             connections: count(config.max_connections) * connection(config),
+            store: if config.store.is_in_folder() {
+                FILE_STORE
+            } else {
+                0
+            },
             videos: match config.limits.ffmpeg.as_str() {
                 OFF => 0,
                 _ => count(config.video_places()) * MAX_DECODER_MEMORY,
@@ -67,7 +77,13 @@ impl MemoryBound {
 
     /// All parts together, with the program itself.
     pub fn total(&self) -> u64 {
-        PROGRAM + self.uploads + self.work + self.sessions + self.connections + self.videos
+        PROGRAM
+            + self.uploads
+            + self.work
+            + self.sessions
+            + self.connections
+            + self.videos
+            + self.store
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::base_path::BasePath;
 use super::flag_values::{parse_duration, parse_listen, parse_network};
+use bagtrack_sessions::Durability;
 use clap::builder::{BoolishValueParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use ipnet::IpNet;
@@ -84,6 +85,7 @@ values! {
     SocketAddr: parse_listen;
     IpNet: parse_network;
     BasePath: value_parser!(BasePath), "PATH";
+    Durability: value_parser!(Durability), "TIME|each";
 }
 
 impl Value for Duration {

@@ -1,16 +1,22 @@
-//! The settings of the store that replicas share.
+//! The settings of the store: one that replicas share, or one of this process in a folder.
 
 use super::settings::{ConfigError, Secret, in_range, moment, positive, settings};
-use bagtrack_sessions::{RedisStore, SessionStore, StoreAddress};
+use bagtrack_sessions::{
+    Clock, Durability, FileStore, FileStoreError, RedisStore, SessionStore, StoreAddress,
+};
 use std::sync::Arc;
 use std::time::Duration;
 
 settings! {
-    /// The store that replicas share. Without one, sessions live in this process only.
+    /// Where sessions are kept. Without a store they live in this process only, and end with it.
     pub struct StoreConfig {
-        /// Where sessions are stored: `redis://[user:password@]host[:port][/database]`, `valkey` alike, or
-        /// `redis-cluster://host:port,host:port`. `rediss` and `valkeys` for TLS.
+        /// Where sessions are stored: `file:DIR` for one process, which goes on from there after a restart. For replicas
+        /// `redis://[user:password@]host[:port][/database]`, `valkey` alike, or `redis-cluster://host:port,host:port`.
+        /// `rediss` and `valkeys` for TLS.
         store: Option<Secret> = None, as "URL";
+        /// When a store in a folder is synced to the disk: at least once in this time, or before `each` answer. A process
+        /// that is killed loses nothing; a power cut may lose what was answered since the last sync.
+        durability: Durability = Durability::default();
         /// Write a session's state at every so many frames. Answers say `Checkpoint: N`; after the end of a replica, its
         /// clients send the frames after N again. More than 1 needs a load balancer that keeps a session at one replica.
         store_every: u64 = 1, positive;
@@ -23,22 +29,48 @@ settings! {
 }
 
 impl StoreConfig {
+    /// Whether the store is in a folder.
+    pub(super) fn is_in_folder(&self) -> bool {
+        let text = self.store.as_ref().map_or("", Secret::text);
+        matches!(
+            StoreAddress::parse(text, self.store_timeout),
+            Ok(StoreAddress::File(_))
+        )
+    }
+
     /// Checks the address.
     pub(super) fn check_address(&self) -> Result<(), ConfigError> {
         let address = |text: &Secret| StoreAddress::parse(text.text(), self.store_timeout).is_ok();
         let held = in_range(
             self.store.as_ref().is_none_or(address),
-            "an address like redis://localhost:6379; rediss is in builds with the feature tls",
+            "file:DIR, or an address like redis://localhost:6379; rediss is in builds with the feature tls",
         );
         ConfigError::check("store", held)
     }
 }
 
-/// The store of these settings, where they name one.
-pub async fn connect(config: &StoreConfig) -> Option<Arc<dyn SessionStore>> {
-    let text = config.store.as_ref()?.text();
-    let address = StoreAddress::parse(text, config.store_timeout).ok()?;
-    let store = RedisStore::connect(address, &config.store_prefix, config.store_timeout).await;
-    let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
-    Some(Arc::new(store.ok()?))
+/// The store of these settings, where they name one. Sessions expire by `clock`.
+///
+/// # Errors
+/// The folder that they name cannot be used. A Redis may come later.
+pub async fn connect(
+    config: &StoreConfig,
+    clock: Clock,
+) -> Result<Option<Arc<dyn SessionStore>>, FileStoreError> {
+    let (timeout, prefix) = (config.store_timeout, &config.store_prefix);
+    let address = config.store.as_ref().map(Secret::text);
+    // The settings were checked.
+    let address = address.and_then(|text| StoreAddress::parse(text, timeout).ok());
+    Ok(match address {
+        None => None,
+        Some(StoreAddress::File(folder)) => {
+            let store = FileStore::open(&folder, config.durability, timeout, clock)?;
+            Some(Arc::new(store))
+        }
+        Some(StoreAddress::Redis(address)) => {
+            let store = RedisStore::connect(address, prefix, timeout).await;
+            let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
+            store.ok().map(|store| Arc::new(store) as _)
+        }
+    })
 }

@@ -168,7 +168,7 @@ kinds! {
         cause: "The service is about to end, or something of it is full."
         cure: "Open sessions at another instance, or try again after `Retry-After`."
     StoreUnavailable: 503 "store-unavailable" "The store of the sessions gives no answer"
-        cause: "The Redis of `--store` cannot be reached. The frame does not count."
+        cause: "The Redis of `--store` cannot be reached, or its folder cannot be written. The frame does not count."
         cure: "Send the request again after `Retry-After`, with its number (`?frame=N`)."
 }
 

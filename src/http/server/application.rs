@@ -25,8 +25,8 @@ use crate::http::state::AppState;
 #[cfg(fuzzing)]
 use axum::Extension;
 use axum::Router;
-use bagtrack_sessions::Clock;
 use bagtrack_sessions::clock::{interval, sleep, timeout};
+use bagtrack_sessions::{Clock, FileStoreError};
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -59,6 +59,9 @@ pub enum BindError {
         /// What the system says.
         source: io::Error,
     },
+    /// The folder of the store cannot be used.
+    #[error("{0} (--store, BAGTRACK_STORE)")]
+    Store(#[from] FileStoreError),
     /// The system gives no threads.
     #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
     Workers(io::Error),
@@ -110,9 +113,10 @@ impl Application {
         #[cfg(not(feature = "tls"))]
         let security = Security::Plain;
         let listener = TcpListener::bind(address).await;
-        let store = store::connect(&config.store).await;
+        let listener = listener.map_err(|source| BindError::Listen { address, source })?;
+        let store = store::connect(&config.store, clock.clone()).await?;
         Ok(Self {
-            listener: listener.map_err(|source| BindError::Listen { address, source })?,
+            listener,
             security,
             state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
             extra: Router::new(),

@@ -1,4 +1,5 @@
-//! The store: sessions that all replicas of the service share.
+//! The store: sessions that all replicas of the service share in a [Redis](redis), or that one process keeps in a
+//! [folder](file).
 //!
 //! In: the [`Record`] of a session, with the [`Version`] that this replica has of it. Out: an [`Outcome`], which
 //! [`reconcile`] turns into what the replica does next. The store is the truth, and memory is a cache.
@@ -14,19 +15,23 @@
 //! knowing, tracks no further frame.
 //!
 //! What can go wrong, and what is done about it:
-//! - The store is away or slow: [`StoreUnavailable`]. Nothing is tracked then.
+//! - The store is away, slow or full: [`StoreUnavailable`]. Nothing is tracked then.
 //! - Nobody ends a session. Each commit renews the record's time to live.
 //! - The store loses a record. Then the session is gone, and clients open it again from their snapshot.
 //! - A session is ended, and copies of it are in the memory of other replicas. A mark stays for as long as these may
 //!   live. A new session may be opened under the same id; each has a random number of its own, its *incarnation*, which
 //!   tells them apart.
 
+mod address;
+mod file;
 mod reconcile;
 mod record;
 mod redis;
 mod session_store;
 
-pub use self::redis::{AddressError, RedisStore, StoreAddress};
+pub use self::redis::{RedisAddress, RedisAddressError, RedisStore};
+pub use address::{AddressError, StoreAddress};
+pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
 pub use session_store::{

@@ -1,6 +1,6 @@
 //! A store whose calls and replies are on their way for as long as a test wants. They can be lost or done twice.
 
-use crate::memory::Records;
+use crate::records::Backend;
 use bagtrack_sessions::{
     Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, StoreUnavailable,
     Version,
@@ -12,7 +12,7 @@ use tokio::sync::{Notify, oneshot};
 use uuid::Uuid;
 
 type Reply = Box<dyn Any + Send>;
-type Script = Arc<dyn Fn(&mut Records) -> Reply + Send + Sync>;
+type Script = Arc<dyn Fn(&mut dyn Backend) -> Reply + Send + Sync>;
 type Sender = oneshot::Sender<Option<Reply>>;
 
 /// A call on its way to the store.
@@ -23,9 +23,8 @@ pub struct Call {
     creates: bool,
 }
 
-#[derive(Default)]
 struct Wire {
-    records: Records,
+    records: Box<dyn Backend>,
     calls: Vec<Call>,
     replies: Vec<(Sender, Reply)>,
     /// Requests that neither wait for the store nor have ended.
@@ -33,7 +32,7 @@ struct Wire {
 }
 
 /// The store. Clones are the same.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct HostileStore {
     wire: Arc<Mutex<Wire>>,
     idle: Arc<Notify>,
@@ -56,6 +55,20 @@ impl Drop for Busy {
 }
 
 impl HostileStore {
+    /// With these records.
+    pub fn new(records: impl Backend + 'static) -> Self {
+        let wire = Wire {
+            records: Box::new(records),
+            calls: Vec::new(),
+            replies: Vec::new(),
+            busy: 0,
+        };
+        Self {
+            wire: Arc::new(Mutex::new(wire)),
+            idle: Arc::default(),
+        }
+    }
+
     fn wire(&self) -> MutexGuard<'_, Wire> {
         self.wire.lock().unwrap()
     }
@@ -85,7 +98,7 @@ impl HostileStore {
     pub fn run(&self, pick: usize) {
         let mut wire = self.wire();
         let call = wire.calls.remove(pick);
-        let reply = (call.script)(&mut wire.records);
+        let reply = (call.script)(&mut *wire.records);
         wire.replies
             .extend(call.sender.map(|sender| (sender, reply)));
     }
@@ -113,9 +126,12 @@ impl HostileStore {
         }
     }
 
-    /// A call was sent twice.
+    /// A call was sent twice, where there is a connection that may do that.
     pub fn repeat(&self, pick: usize) {
         let mut wire = self.wire();
+        if !wire.records.knows_repeats() {
+            return;
+        }
         let Call {
             script, creates, ..
         } = &wire.calls[pick];
@@ -133,8 +149,13 @@ impl HostileStore {
         self.drop_creates();
     }
 
+    /// The store ends, and begins again with what it has kept.
+    pub fn restart(&self) {
+        self.wire().records.restart();
+    }
+
     pub fn has(&self, id: Uuid) -> bool {
-        self.wire().records.has(id)
+        self.wire().records.load(id).is_some()
     }
 
     /// What makes a record is not on its way for so long that one that was there is lost or ended meanwhile.
@@ -156,7 +177,7 @@ impl HostileStore {
     fn call<'a, T: Send + 'static>(
         &'a self,
         creates: bool,
-        script: impl Fn(&mut Records) -> T + Send + Sync + 'static,
+        script: impl Fn(&mut dyn Backend) -> T + Send + Sync + 'static,
     ) -> StoreFuture<'a, T> {
         let (sender, reply) = oneshot::channel();
         let script: Script = Arc::new(move |records| Box::new(script(records)));

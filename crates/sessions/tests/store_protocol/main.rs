@@ -3,9 +3,11 @@
 //! [`suite`] holds for every store. [`schedule`] drives the real service, with trackers and workers, over a store that
 //! delays, drops, repeats and forgets.
 
+mod folder;
 mod hostile;
 mod memory;
 mod pictures;
+mod records;
 mod schedule;
 mod suite;
 mod world;

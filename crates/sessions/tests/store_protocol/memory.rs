@@ -1,5 +1,6 @@
 //! A store in memory, with the rules of the scripts that Redis runs.
 
+use crate::records::Backend;
 use bagtrack_sessions::{
     Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, Version,
 };
@@ -49,8 +50,10 @@ impl Records {
             None => Err(Outcome::NotFound),
         }
     }
+}
 
-    pub fn create(&mut self, token: u64, id: Uuid, record: &Record) -> Outcome {
+impl Backend for Records {
+    fn create(&mut self, token: u64, id: Uuid, record: &Record) -> Outcome {
         let incarnation = record.opening.incarnation;
         match self.find(SessionName { id, incarnation }) {
             Ok(kept) if kept.token == token => Outcome::Committed(record.ttl),
@@ -72,7 +75,7 @@ impl Records {
         }
     }
 
-    pub fn load(&self, id: Uuid) -> Option<Record> {
+    fn load(&mut self, id: Uuid) -> Option<Record> {
         let mut kept = self.kept.get(&id)?.clone();
         match kept.tell(false) {
             Outcome::Conflict(record) => Some(*record),
@@ -80,7 +83,7 @@ impl Records {
         }
     }
 
-    pub fn commit(&mut self, token: u64, commit: Commit<'_>) -> Outcome {
+    fn commit(&mut self, token: u64, commit: Commit<'_>) -> Outcome {
         let kept = match self.find(commit.name) {
             Ok(kept) => kept,
             Err(outcome) => return outcome,
@@ -100,7 +103,7 @@ impl Records {
         Outcome::Committed(commit.ttl)
     }
 
-    pub fn check(&mut self, name: SessionName, version: Version, takes_over: bool) -> Outcome {
+    fn check(&mut self, name: SessionName, version: Version, takes_over: bool) -> Outcome {
         match self.find(name) {
             Ok(kept) if kept.is_at(version) => Outcome::Committed(kept.record.ttl),
             Ok(kept) => kept.tell(takes_over),
@@ -108,7 +111,7 @@ impl Records {
         }
     }
 
-    pub fn fence(&mut self, name: SessionName, version: Version) -> Outcome {
+    fn fence(&mut self, name: SessionName, version: Version) -> Outcome {
         match self.find(name) {
             Ok(kept) if kept.is_at(version) => {
                 kept.record.version.generation += 1;
@@ -119,7 +122,7 @@ impl Records {
         }
     }
 
-    pub fn end(&mut self, name: SessionName) -> bool {
+    fn end(&mut self, name: SessionName) -> bool {
         let is_own = |kept: &Kept| kept.record.opening.incarnation == name.incarnation;
         let is_here = match self.kept.get(&name.id) {
             Some(kept) => is_own(kept),
@@ -130,18 +133,22 @@ impl Records {
         is_here
     }
 
-    pub fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid {
+    fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid {
         let name = (owner.name().map(str::to_owned), key.to_owned());
         *self.claimed.entry(name).or_insert(id)
     }
 
     /// Loses all records.
-    pub fn forget(&mut self) {
+    fn forget(&mut self) {
         self.kept.clear();
     }
 
-    pub fn has(&self, id: Uuid) -> bool {
-        self.kept.contains_key(&id)
+    fn restart(&mut self) {
+        // What is in memory is a Redis that goes on.
+    }
+
+    fn knows_repeats(&self) -> bool {
+        true
     }
 }
 

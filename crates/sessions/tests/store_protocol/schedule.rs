@@ -6,7 +6,9 @@
 //! to another one with its id; and without failures the client gets to the end.
 
 use crate::hostile::HostileStore;
+use crate::memory::Records;
 use crate::pictures::{FRAMES, History, histories};
+use crate::records::{Backend, InFolder};
 use crate::world::{Answer, Answers, Asked, ID, Replica, Request, begin};
 use proptest::prelude::*;
 
@@ -32,8 +34,7 @@ struct World {
 }
 
 impl World {
-    async fn new(every: u64, has_rival: bool) -> Self {
-        let store = HostileStore::default();
+    async fn new(store: HostileStore, every: u64, has_rival: bool) -> Self {
         let replica = || Replica::new(&store, every);
         let mut world = Self {
             replicas: [replica(), replica()],
@@ -208,6 +209,7 @@ impl World {
                 self.store.forget();
                 self.end();
             }
+            17 if pick == 0 => self.store.restart(),
             18 if pick < 2 && is_idle && self.is_open && self.ended + 1 < MAX_SESSIONS => {
                 self.ask(replica, Asked::End).await;
             }
@@ -282,30 +284,49 @@ impl World {
 }
 
 /// How many schedules are tried; `BAGTRACK_SCHEDULES` sets another number.
-fn cases() -> u32 {
-    let given = std::env::var("BAGTRACK_SCHEDULES");
-    given.ok().and_then(|text| text.parse().ok()).unwrap_or(500)
+fn cases(default: u32) -> ProptestConfig {
+    let given = std::env::var("BAGTRACK_SCHEDULES").ok();
+    ProptestConfig {
+        cases: given.and_then(|text| text.parse().ok()).unwrap_or(default),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+/// Runs a schedule to its end.
+fn run(records: impl Backend + 'static, every: u64, has_rival: bool, schedule: Vec<u16>) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    runtime.unwrap().block_on(async {
+        let mut world = World::new(HostileStore::new(records), every, has_rival).await;
+        for choice in schedule {
+            world.step(choice).await;
+        }
+        world.finish().await;
+    });
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: cases(),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(cases(500))]
     #[test]
     fn nothing_that_was_promised_is_taken_back(
         every in 1_u64..4,
         has_rival in any::<bool>(),
         schedule in prop::collection::vec(any::<u16>(), 0..200),
     ) {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-        runtime.unwrap().block_on(async {
-            let mut world = World::new(every, has_rival).await;
-            for choice in schedule {
-                world.step(choice).await;
-            }
-            world.finish().await;
-        });
+        run(Records::default(), every, has_rival, schedule);
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(40))]
+    #[test]
+    fn a_store_in_a_folder_takes_nothing_back(
+        every in 1_u64..4,
+        has_rival in any::<bool>(),
+        schedule in prop::collection::vec(any::<u16>(), 0..200),
+    ) {
+        run(InFolder::default(), every, has_rival, schedule);
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::memory::MemoryStore;
 use bagtrack_sessions::{
-    Commit, Estimates, Opening, Outcome, Owner, Record, RedisStore, SessionName, SessionStore,
-    StoreAddress, Version,
+    Commit, Estimates, Opening, Outcome, Owner, Record, RedisAddress, RedisStore, SessionName,
+    SessionStore, Version,
 };
 use bagtrack_tracker::{Estimate, Rect, Status};
 use std::net::{TcpListener, TcpStream};
@@ -11,9 +11,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use uuid::Uuid;
 
-const TTL: Duration = Duration::from_secs(60);
+pub const TTL: Duration = Duration::from_secs(60);
 
-fn record(incarnation: u64, frame: u64, state: &[u8]) -> Record {
+pub fn record(incarnation: u64, frame: u64, state: &[u8]) -> Record {
     let estimate = Estimate {
         frame,
         target: Rect::new(1.0, 2.0, 30.0, 40.0),
@@ -79,11 +79,11 @@ impl<'a> Stored<'a> {
     }
 }
 
-fn is_committed(outcome: &Outcome) -> bool {
+pub fn is_committed(outcome: &Outcome) -> bool {
     matches!(outcome, Outcome::Committed(_))
 }
 
-fn told(outcome: Outcome) -> Record {
+pub fn told(outcome: Outcome) -> Record {
     match outcome {
         Outcome::Conflict(record) => *record,
         other => panic!("{other:?} in place of a record"),
@@ -198,7 +198,7 @@ async fn a_key_names_the_first_id_for_each_owner(store: &dyn SessionStore) {
     assert_eq!(nobody.unwrap(), second);
 }
 
-async fn holds_for(store: &dyn SessionStore) {
+pub async fn holds_for(store: &dyn SessionStore) {
     a_record_is_read_as_it_was_written(store).await;
     of_two_frames_after_one_version_one_is_committed(store).await;
     whoever_lacks_frames_takes_over_at_the_checkpoint(store).await;
@@ -249,7 +249,7 @@ async fn redis_keeps_to_the_rules() {
     let redis = Redis::start();
     let timeout = Duration::from_secs(5);
     let address = format!("redis://127.0.0.1:{}", redis.port);
-    let address = StoreAddress::parse(&address, timeout).unwrap();
+    let address = RedisAddress::parse(&address, timeout).unwrap();
     let store = RedisStore::connect(address, "suite", timeout)
         .await
         .unwrap();

@@ -1,17 +1,17 @@
-//! Where the store is.
+//! Where the Redis is.
 
 use redis::cluster::ClusterClient;
 use redis::{Client, ErrorKind};
 use std::time::Duration;
 
-/// The text is no address of a store.
+/// The text is no address of a Redis.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct AddressError(String);
+pub struct RedisAddressError(String);
 
-/// The address of a store. It may hold a password, so its debug output shows nothing.
+/// The address of a Redis. It may hold a password, so its debug output shows nothing.
 #[derive(Clone)]
-pub struct StoreAddress(pub(super) Kind);
+pub struct RedisAddress(pub(super) Kind);
 
 #[derive(Clone)]
 pub(super) enum Kind {
@@ -21,20 +21,20 @@ pub(super) enum Kind {
     Cluster(Box<ClusterClient>),
 }
 
-impl StoreAddress {
+impl RedisAddress {
     /// Reads `redis://[user:password@]host[:port][/database]`, with `rediss` for TLS, `valkey` and `valkeys` in their
     /// place, `unix:///path`, or `redis-cluster://…` and its like, with more nodes as `host:port` after commas. Calls
     /// to a cluster take at most `timeout`.
     ///
     /// # Errors
     /// The text is none of these. It is not repeated, since it may hold a password.
-    pub fn parse(text: &str, timeout: Duration) -> Result<Self, AddressError> {
+    pub fn parse(text: &str, timeout: Duration) -> Result<Self, RedisAddressError> {
         let failed = |error: redis::RedisError| {
             let reason = match error.kind() {
                 ErrorKind::InvalidClientConfig => error.detail().unwrap_or("").to_owned(),
                 kind => format!("{kind:?}"),
             };
-            AddressError(format!("no address of a store: {reason}"))
+            RedisAddressError(format!("no address of a store: {reason}"))
         };
         let Some((scheme, rest)) = text.split_once("-cluster://") else {
             let client = Client::open(text).map_err(failed)?;
@@ -55,9 +55,9 @@ impl StoreAddress {
     }
 }
 
-impl std::fmt::Debug for StoreAddress {
+impl std::fmt::Debug for RedisAddress {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str("StoreAddress")
+        formatter.write_str("RedisAddress")
     }
 }
 
@@ -67,14 +67,14 @@ mod tests {
 
     #[test]
     fn addresses_of_servers_and_clusters_are_taken_and_passwords_are_not_shown() {
-        let parse = |text| StoreAddress::parse(text, Duration::from_secs(1));
+        let parse = |text| RedisAddress::parse(text, Duration::from_secs(1));
         for text in [
             "redis://localhost",
             "valkey://:secret@10.0.0.1:7000/3",
             "unix:///run/redis.sock",
         ] {
             assert!(
-                matches!(parse(text), Ok(StoreAddress(Kind::Server(_)))),
+                matches!(parse(text), Ok(RedisAddress(Kind::Server(_)))),
                 "{text}"
             );
         }
@@ -83,7 +83,7 @@ mod tests {
             "valkey-cluster://a.example.org",
         ] {
             assert!(
-                matches!(parse(text), Ok(StoreAddress(Kind::Cluster(_)))),
+                matches!(parse(text), Ok(RedisAddress(Kind::Cluster(_)))),
                 "{text}"
             );
         }

@@ -4,7 +4,7 @@ use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
 };
-use super::address::StoreAddress;
+use super::address::RedisAddress;
 use super::connection::{Call, Connection};
 use super::scripts::Scripts;
 use crate::clock::{sleep, wall_now};
@@ -91,7 +91,7 @@ impl RedisStore {
     /// # Errors
     /// The address cannot be used.
     pub async fn connect(
-        address: StoreAddress,
+        address: RedisAddress,
         prefix: &str,
         timeout: Duration,
     ) -> Result<Self, StoreUnavailable> {

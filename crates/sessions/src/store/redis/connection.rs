@@ -1,7 +1,7 @@
 //! The connection to the store: calls that end in bounded time, and a probe that finds the store again.
 
 use super::super::session_store::StoreUnavailable;
-use super::address::{Kind, StoreAddress};
+use super::address::{Kind, RedisAddress};
 use crate::clock::{self, sleep, timeout_at};
 use redis::aio::{ConnectionLike, ConnectionManager, ConnectionManagerConfig};
 use redis::cluster::ClusterConfig;
@@ -41,7 +41,7 @@ pub(super) enum Link {
 
 /// The connection, and whether the store answers.
 pub(super) struct Connection {
-    address: StoreAddress,
+    address: RedisAddress,
     timeout: Duration,
     /// With the number of links before it.
     link: Mutex<(u64, Link)>,
@@ -54,7 +54,7 @@ pub(super) struct Connection {
 }
 
 impl Link {
-    fn new(address: &StoreAddress, timeout: Duration) -> RedisResult<Self> {
+    fn new(address: &RedisAddress, timeout: Duration) -> RedisResult<Self> {
         match &address.0 {
             Kind::Server(client) => {
                 let config = ConnectionManagerConfig::new()
@@ -104,7 +104,7 @@ impl ConnectionLike for Link {
 
 impl Connection {
     /// To the store at this address, whose calls end after `timeout`. Nothing is sent yet.
-    pub(super) fn new(address: StoreAddress, timeout: Duration) -> RedisResult<Self> {
+    pub(super) fn new(address: RedisAddress, timeout: Duration) -> RedisResult<Self> {
         let link = Link::new(&address, timeout)?;
         Ok(Self {
             address,

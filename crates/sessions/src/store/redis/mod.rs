@@ -17,5 +17,5 @@ mod calls;
 mod connection;
 mod scripts;
 
-pub use address::{AddressError, StoreAddress};
+pub use address::{RedisAddress, RedisAddressError};
 pub use calls::RedisStore;

@@ -1,0 +1,77 @@
+//! Where the store is: one value that is like a URL.
+
+use super::redis::{RedisAddress, RedisAddressError};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The text is no address of a store. It is not repeated, since it may hold a password.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AddressError {
+    /// It begins with `file:`, and names no folder.
+    #[error("file: is followed by a folder, like file:/var/lib/bagtrack")]
+    NoFolder,
+    /// It is neither.
+    #[error(transparent)]
+    Redis(#[from] RedisAddressError),
+}
+
+/// Where a store is.
+#[derive(Debug, Clone)]
+pub enum StoreAddress {
+    /// A Redis, which replicas share.
+    Redis(RedisAddress),
+    /// A folder of this machine, for one process.
+    File(PathBuf),
+}
+
+impl StoreAddress {
+    /// Reads `file:DIR` (also `file:///DIR`), or the address of a Redis: see [`RedisAddress::parse`].
+    ///
+    /// # Errors
+    /// The text is neither.
+    pub fn parse(text: &str, timeout: Duration) -> Result<Self, AddressError> {
+        let Some(folder) = text.strip_prefix("file:") else {
+            return Ok(Self::Redis(RedisAddress::parse(text, timeout)?));
+        };
+        // What follows two slashes would be a host.
+        let folder = match folder.strip_prefix("//") {
+            Some(path) if path.starts_with('/') => path,
+            Some(_) => return Err(AddressError::NoFolder),
+            None => folder,
+        };
+        match folder {
+            "" => Err(AddressError::NoFolder),
+            folder => Ok(Self::File(folder.into())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_or_a_redis_is_named() {
+        let parse = |text| StoreAddress::parse(text, Duration::from_secs(1));
+        for (text, folder) in [
+            ("file:sessions", "sessions"),
+            ("file:/var/lib/bagtrack", "/var/lib/bagtrack"),
+            ("file:///var/lib/bagtrack", "/var/lib/bagtrack"),
+        ] {
+            match parse(text) {
+                Ok(StoreAddress::File(path)) => assert_eq!(path, PathBuf::from(folder)),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+        assert!(matches!(
+            parse("redis://localhost"),
+            Ok(StoreAddress::Redis(_))
+        ));
+        for text in ["file:", "file://", "file://host/folder"] {
+            assert_eq!(parse(text).unwrap_err(), AddressError::NoFolder, "{text}");
+        }
+        for text in ["/var/lib/bagtrack", "http://localhost", ""] {
+            assert!(matches!(parse(text), Err(AddressError::Redis(_))), "{text}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The store's calls, which go to its thread.
+
+use super::super::record::{Record, SessionName, Version};
+use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+use super::database::OpenError;
+use super::durability::Durability;
+use super::rules::{Fault, OwnedCommit, Transaction};
+use super::writer::{Call, Health, Ruled, Writer};
+use crate::clock::{Clock, timeout};
+use crate::owner::Owner;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use tokio::sync::oneshot;
+use uuid::Uuid;
+
+/// The store. When it is dropped, what was written is synced, and the folder is free.
+#[derive(Debug)]
+pub struct FileStore {
+    /// None while it is dropped.
+    calls: Option<Sender<Box<dyn Call>>>,
+    thread: Option<JoinHandle<()>>,
+    health: Arc<Health>,
+    timeout: Duration,
+}
+
+impl FileStore {
+    /// The store in this folder, which is made where there is none. Calls end after `timeout`; sessions expire by
+    /// `clock`.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub fn open(
+        folder: &Path,
+        durability: Durability,
+        timeout: Duration,
+        clock: Clock,
+    ) -> Result<Self, OpenError> {
+        let health = Arc::new(Health::default());
+        let writer = Writer::new(folder.to_owned(), durability, clock, health.clone())?;
+        let (sender, calls) = channel();
+        let thread = std::thread::Builder::new().name("bagtrack-store".to_owned());
+        let thread = thread.spawn(move || writer.run(&calls));
+        let thread = thread.map_err(|source: io::Error| OpenError::Io {
+            folder: folder.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            calls: Some(sender),
+            thread: Some(thread),
+            health,
+            timeout,
+        })
+    }
+
+    /// Sends a rule to the thread, and waits for what comes of it.
+    fn call<'a, T: Send + 'static>(
+        &'a self,
+        rule: impl FnMut(&mut Transaction<'_>) -> Result<T, Fault> + Send + 'static,
+    ) -> StoreFuture<'a, T> {
+        Box::pin(async move {
+            let ended = || StoreUnavailable("its thread has ended".to_owned());
+            let (sender, answer) = oneshot::channel();
+            let call = Box::new(Ruled {
+                rule,
+                found: None,
+                sender,
+            });
+            let calls = self.calls.as_ref().ok_or_else(ended)?;
+            calls.send(call).map_err(|_| ended())?;
+            match timeout(self.timeout, answer).await {
+                Ok(answer) => answer.map_err(|_| ended())?,
+                Err(_) => {
+                    self.health.failures.fetch_add(1, Ordering::Relaxed);
+                    Err(StoreUnavailable("time is over".to_owned()))
+                }
+            }
+        })
+    }
+}
+
+impl Drop for FileStore {
+    fn drop(&mut self) {
+        self.calls = None;
+        if let Some(thread) = self.thread.take() {
+            // One that panicked has logged it.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl SessionStore for FileStore {
+    fn create<'a>(&'a self, id: Uuid, record: &'a Record) -> StoreFuture<'a, Outcome> {
+        let record = record.clone();
+        self.call(move |transaction| transaction.create(id, &record))
+    }
+
+    fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
+        self.call(move |transaction| transaction.load(id))
+    }
+
+    fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
+        let commit = OwnedCommit::from(commit);
+        self.call(move |transaction| transaction.commit(&commit))
+    }
+
+    fn check(
+        &self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        renew: Option<Duration>,
+    ) -> StoreFuture<'_, Outcome> {
+        self.call(move |transaction| transaction.check(name, version, takes_over, renew))
+    }
+
+    fn fence(&self, name: SessionName, version: Version) -> StoreFuture<'_, Outcome> {
+        self.call(move |transaction| transaction.fence(name, version))
+    }
+
+    fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool> {
+        self.call(move |transaction| transaction.end(name, ttl))
+    }
+
+    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
+        let (owner, key) = (owner.clone(), key.to_owned());
+        self.call(move |transaction| transaction.claim(&owner, &key, id))
+    }
+
+    fn is_ready(&self) -> bool {
+        self.health.is_up.load(Ordering::Acquire)
+    }
+
+    fn failures(&self) -> u64 {
+        self.health.failures.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,356 @@
+//! The database in its folder: opened, repaired, swept, and given back to the disk.
+
+use super::row::Row;
+use super::rules::{Transaction, Written, moment};
+use fjall::{
+    Keyspace, KeyspaceCreateOptions, PersistMode, Readable, SingleWriterTxDatabase,
+    SingleWriterTxKeyspace,
+};
+use std::fs::{DirBuilder, File};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{JoinHandle, sleep};
+use std::time::Duration;
+
+/// Of what was written, in memory, before it goes to tables in order.
+const MEMTABLE_BYTES: u64 = 16 << 20;
+/// Of blocks that were read.
+const CACHE_BYTES: u64 = 8 << 20;
+/// The journal is kept to about this; the database takes no less.
+const JOURNAL_BYTES: u64 = 64 << 20;
+/// Space is given back when as many bytes of states were dropped.
+const COMPACTED_BYTES: u64 = 8 << 20;
+/// Most rows that are dropped in one transaction.
+const SWEPT_ROWS: usize = 1024;
+
+/// A key that is no session's id.
+const NO_SESSION: [u8; 1] = [0];
+
+/// Why a folder cannot be used as a store.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// Another process has it.
+    #[error("another process uses the store in {0}: give each process a folder of its own")]
+    Locked(PathBuf),
+    /// The system says no.
+    #[error("the store in {folder} cannot be opened: {source}")]
+    Io {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Its files are damaged.
+    #[error(
+        "the files of the store in {folder} are damaged ({reason}): put a copy of the folder in its place, or move it \
+         away to begin without its sessions"
+    )]
+    Damaged {
+        /// The folder.
+        folder: PathBuf,
+        /// What the database says.
+        reason: String,
+    },
+    /// Another version of the database wrote it.
+    #[error(
+        "the store in {0} was written by another version of this program: start that one, or move the folder away"
+    )]
+    Version(PathBuf),
+}
+
+impl OpenError {
+    fn of(folder: &Path, error: fjall::Error) -> Self {
+        let folder = folder.to_owned();
+        match error {
+            fjall::Error::Locked => Self::Locked(folder),
+            fjall::Error::Io(source) if is_of_system(&source) => Self::Io { folder, source },
+            fjall::Error::Storage(fjall::LsmError::Io(source)) if is_of_system(&source) => {
+                Self::Io { folder, source }
+            }
+            fjall::Error::InvalidVersion(Some(_)) => Self::Version(folder),
+            other => Self::Damaged {
+                folder,
+                reason: other.to_string(),
+            },
+        }
+    }
+}
+
+/// Whether an error is of the system, and not of what a file holds or of one that is missing.
+fn is_of_system(error: &io::Error) -> bool {
+    error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound
+}
+
+/// What the database has, each by its key.
+pub(super) struct Tables {
+    /// Rows by the sessions' ids.
+    pub(super) rows: SingleWriterTxKeyspace,
+    /// States by the sessions' ids.
+    pub(super) states: SingleWriterTxKeyspace,
+    /// Until when it is known that a session was ended, by its name.
+    pub(super) ended: SingleWriterTxKeyspace,
+    /// Until when an idempotency key names a session, and the session's id.
+    pub(super) claims: SingleWriterTxKeyspace,
+}
+
+impl Tables {
+    fn all(&self) -> [&SingleWriterTxKeyspace; 4] {
+        [&self.rows, &self.states, &self.ended, &self.claims]
+    }
+}
+
+/// The open database.
+pub(super) struct Database {
+    /// Has handles of the others, so it is waited for before they are dropped.
+    compaction: Option<JoinHandle<()>>,
+    is_closing: Arc<AtomicBool>,
+    tables: Tables,
+    inner: SingleWriterTxDatabase,
+    /// Of what is in memory and not in tables yet.
+    written_bytes: u64,
+    /// Of states that were dropped and may still take space.
+    dropped_bytes: u64,
+}
+
+impl Drop for Database {
+    fn drop(&mut self) {
+        self.is_closing.store(true, Ordering::Release);
+        if let Some(compaction) = self.compaction.take() {
+            // One that panicked has logged it.
+            let _ = compaction.join();
+        }
+    }
+}
+
+impl Database {
+    /// Opens the database in this folder, and makes one where there is none.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub(super) fn open(folder: &Path) -> Result<Self, OpenError> {
+        let written = make_folder(folder)
+            .and_then(|()| journals(folder))
+            .map_err(|source| OpenError::Io {
+                folder: folder.to_owned(),
+                source,
+            })?;
+        // Damaged files may break an assumption of the database.
+        let opened = catch_unwind(AssertUnwindSafe(|| Self::open_unguarded(folder)));
+        let opened = opened.map_err(|_| OpenError::Damaged {
+            folder: folder.to_owned(),
+            reason: "the database could not make sense of them".to_owned(),
+        })?;
+        let database = opened.map_err(|error| OpenError::of(folder, error))?;
+        for (path, length) in written {
+            // A journal that is not there any more was wholly read.
+            let kept = path.metadata().map_or(length, |metadata| metadata.len());
+            if kept < length {
+                tracing::warn!(
+                    bytes = length - kept,
+                    journal = %path.display(),
+                    "the end of the store's journal was cut off while it was written, or is damaged, and was left out; \
+                     the sessions in it go on from before"
+                );
+            }
+        }
+        Ok(database)
+    }
+
+    fn open_unguarded(folder: &Path) -> fjall::Result<Self> {
+        let inner = SingleWriterTxDatabase::builder(folder)
+            .manual_journal_persist(true)
+            .max_journaling_size(JOURNAL_BYTES)
+            .cache_size(CACHE_BYTES)
+            .worker_threads(1)
+            .open()?;
+        // The database would ask its worker for each write above the limit, and its queue may be full then. So it is
+        // told here when to write tables.
+        let options = || KeyspaceCreateOptions::default().max_memtable_size(u64::MAX);
+        Ok(Self {
+            tables: Tables {
+                rows: inner.keyspace("rows", options)?,
+                states: inner.keyspace("states", options)?,
+                ended: inner.keyspace("ended", options)?,
+                claims: inner.keyspace("claims", options)?,
+            },
+            compaction: None,
+            is_closing: Arc::default(),
+            inner,
+            // What is in the journal is in memory again: it goes to tables with the first write.
+            written_bytes: MEMTABLE_BYTES,
+            dropped_bytes: 0,
+        })
+    }
+
+    pub(super) fn begin(&self, now: u64) -> Transaction<'_> {
+        Transaction {
+            inner: self.inner.write_tx(),
+            tables: &self.tables,
+            now,
+            promises: false,
+            written_bytes: 0,
+            dropped_bytes: 0,
+        }
+    }
+
+    /// Syncs what was written.
+    pub(super) fn sync(&self) -> fjall::Result<()> {
+        self.inner.persist(PersistMode::SyncData)
+    }
+
+    /// Finds out whether a record of the usual size can be written, after writing has failed.
+    pub(super) fn probe(&self) -> fjall::Result<()> {
+        let mut probe = self.begin(0);
+        let noise: Vec<u8> = (0..64 << 10).map(|i: u32| (i >> 3) as u8).collect();
+        probe.inner.insert(&self.tables.states, NO_SESSION, noise);
+        probe.write(PersistMode::SyncData)?;
+        let mut clear = self.begin(0);
+        clear.inner.remove(&self.tables.states, NO_SESSION);
+        clear.write(PersistMode::SyncData)?;
+        Ok(())
+    }
+
+    /// Drops what has expired. Returns whether there may be more.
+    pub(super) fn sweep(&mut self, now: u64) -> fjall::Result<bool> {
+        let snapshot = self.inner.read_tx();
+        let mut sweep = self.begin(now);
+        let mut rows = 0;
+        for entry in snapshot.iter(&self.tables.rows) {
+            let (id, row) = entry.into_inner()?;
+            // A row of another format is another version's, which knows when it is over.
+            if let Ok(row) = Row::from_bytes(&row)
+                && row.expires <= now
+            {
+                sweep.dropped_bytes += row.state_bytes;
+                sweep.inner.remove(&self.tables.rows, id.clone());
+                sweep.inner.remove(&self.tables.states, id);
+                rows += 1;
+            }
+            if rows == SWEPT_ROWS {
+                break;
+            }
+        }
+        for table in [&self.tables.ended, &self.tables.claims] {
+            for entry in snapshot.iter(table) {
+                let (key, until) = entry.into_inner()?;
+                if moment(&until).is_none_or(|until| until <= now) {
+                    sweep.inner.remove(table, key);
+                }
+            }
+        }
+        let written = sweep.write(PersistMode::Buffer)?;
+        drop(snapshot);
+        let bytes = written.dropped_bytes;
+        if rows > 0 {
+            tracing::debug!(rows, bytes, "sessions in the store have expired");
+        }
+        self.account(&written)?;
+        Ok(rows == SWEPT_ROWS)
+    }
+
+    /// Counts what was written. What is much goes to tables, and space that is not used is given back.
+    pub(super) fn account(&mut self, written: &Written) -> fjall::Result<()> {
+        self.written_bytes += written.written_bytes;
+        self.dropped_bytes += written.dropped_bytes;
+        if written.written_bytes > 0 && self.written_bytes >= MEMTABLE_BYTES {
+            self.written_bytes = 0;
+            // All of them, so that the journal up to here can go.
+            for table in self.tables.all() {
+                table.inner().rotate_memtable()?;
+            }
+        }
+        let is_at_work = |thread: &JoinHandle<()>| !thread.is_finished();
+        if self.dropped_bytes >= COMPACTED_BYTES
+            && !self.compaction.as_ref().is_some_and(is_at_work)
+        {
+            self.compact();
+        }
+        Ok(())
+    }
+
+    /// Begins to give back space.
+    fn compact(&mut self) {
+        self.dropped_bytes = 0;
+        let tables = [&self.tables.states, &self.tables.rows];
+        let tables = tables.map(|table| table.inner().clone());
+        let is_closing = self.is_closing.clone();
+        let thread = std::thread::Builder::new().name("bagtrack-compact".to_owned());
+        let compaction = thread.spawn(move || {
+            if let Err(error) = compact(&tables, &is_closing) {
+                tracing::error!(%error, "the store's space cannot be given back");
+            }
+        });
+        self.compaction = compaction.ok();
+    }
+}
+
+/// Rewrites tables without what was dropped from them.
+fn compact(tables: &[Keyspace], is_closing: &AtomicBool) -> fjall::Result<()> {
+    for table in tables {
+        write_tables(table, is_closing)?;
+        if !is_closing.load(Ordering::Acquire) {
+            table.major_compact()?;
+        }
+    }
+    // The files from before go when the next tables are written.
+    for table in tables {
+        table.insert(NO_SESSION, [])?;
+        write_tables(table, is_closing)?;
+    }
+    Ok(())
+}
+
+/// Writes what is in memory to tables.
+fn write_tables(table: &Keyspace, is_closing: &AtomicBool) -> fjall::Result<()> {
+    table.rotate_memtable()?;
+    // The database has no call that waits and can be stopped.
+    while table.sealed_memtable_count() > 0 && !is_closing.load(Ordering::Acquire) {
+        sleep(Duration::from_millis(10));
+    }
+    Ok(())
+}
+
+/// Makes a folder that others of this machine cannot look into.
+fn make_folder(folder: &Path) -> io::Result<()> {
+    let mut builder = DirBuilder::new();
+    builder.recursive(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::DirBuilderExt;
+        builder.mode(0o700);
+    }
+    builder.create(folder)
+}
+
+/// The journals in a folder, and how long each is without the zeros at its end.
+fn journals(folder: &Path) -> io::Result<Vec<(PathBuf, u64)>> {
+    let mut journals = Vec::new();
+    for entry in folder.read_dir()? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "jnl") {
+            let length = written_length(&mut File::open(&path)?)?;
+            journals.push((path, length));
+        }
+    }
+    Ok(journals)
+}
+
+/// The length of a file without the zeros at its end.
+fn written_length(file: &mut File) -> io::Result<u64> {
+    let mut block = vec![0; 1 << 20];
+    let mut end = file.metadata()?.len();
+    while end > 0 {
+        let start = end.saturating_sub(block.len() as u64);
+        let length = usize::try_from(end - start).expect("at most the block's");
+        file.seek(SeekFrom::Start(start))?;
+        file.read_exact(&mut block[..length])?;
+        if let Some(last) = block[..length].iter().rposition(|byte| *byte != 0) {
+            return Ok(start + last as u64 + 1);
+        }
+        end = start;
+    }
+    Ok(0)
+}

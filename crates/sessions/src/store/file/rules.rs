@@ -1,0 +1,333 @@
+//! What each call does to the database, inside of a transaction.
+
+use super::super::record::{Record, SessionName, UnreadableRecord, Version};
+use super::super::session_store::{Commit, Outcome};
+use super::database::Tables;
+use super::row::Row;
+use crate::owner::Owner;
+use fjall::{PersistMode, Readable, SingleWriterWriteTx};
+use std::time::Duration;
+use uuid::Uuid;
+
+/// How long an idempotency key names its session.
+const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+
+/// Why a call did nothing.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Fault {
+    /// The database could not be read.
+    #[error("the files cannot be read: {0}")]
+    Database(#[from] fjall::Error),
+    /// The record could not be read.
+    #[error(transparent)]
+    Record(#[from] UnreadableRecord),
+}
+
+impl Fault {
+    /// Whether what was written is damaged, rather than out of reach or another version's.
+    fn is_damage(&self) -> bool {
+        match self {
+            Self::Database(fjall::Error::Io(_))
+            | Self::Database(fjall::Error::Storage(fjall::LsmError::Io(_)))
+            | Self::Record(UnreadableRecord::Format(_)) => false,
+            Self::Database(_) | Self::Record(UnreadableRecord::Damaged) => true,
+        }
+    }
+}
+
+/// A frame that is to be committed; see [`Commit`].
+pub(super) struct OwnedCommit {
+    pub(super) name: SessionName,
+    pub(super) before: Version,
+    pub(super) frame: u64,
+    pub(super) state: Option<Vec<u8>>,
+    pub(super) takes_over: bool,
+    pub(super) ttl: Duration,
+}
+
+impl From<Commit<'_>> for OwnedCommit {
+    fn from(commit: Commit<'_>) -> Self {
+        Self {
+            name: commit.name,
+            before: commit.before,
+            frame: commit.frame,
+            state: commit.state.map(<[u8]>::to_vec),
+            takes_over: commit.takes_over,
+            ttl: commit.ttl,
+        }
+    }
+}
+
+/// The calls of a group, which are written together. Each reads first and writes then, so one that fails has written
+/// nothing. In damaged tables the row and the state of a session may be of different frames: that is found out.
+pub(super) struct Transaction<'a> {
+    pub(super) inner: SingleWriterWriteTx<'a>,
+    pub(super) tables: &'a Tables,
+    /// Milliseconds since 1970.
+    pub(super) now: u64,
+    /// Whether an answer promises something that is written here.
+    pub(super) promises: bool,
+    /// Of what was written.
+    pub(super) written_bytes: u64,
+    /// Of the states that were dropped.
+    pub(super) dropped_bytes: u64,
+}
+
+/// The key of the mark that a session was ended.
+fn ended_key(name: SessionName) -> [u8; 24] {
+    let mut key = [0; 24];
+    key[..16].copy_from_slice(name.id.as_bytes());
+    key[16..].copy_from_slice(&name.incarnation.to_be_bytes());
+    key
+}
+
+/// A moment, as it is written.
+pub(super) fn moment(bytes: &[u8]) -> Option<u64> {
+    let (moment, _) = bytes.split_first_chunk()?;
+    Some(u64::from_be_bytes(*moment))
+}
+
+fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
+}
+
+/// What was written.
+pub(super) struct Written {
+    /// See [`Transaction::promises`].
+    pub(super) promises: bool,
+    /// See [`Transaction::written_bytes`].
+    pub(super) written_bytes: u64,
+    /// See [`Transaction::dropped_bytes`].
+    pub(super) dropped_bytes: u64,
+}
+
+impl Transaction<'_> {
+    /// Writes it.
+    pub(super) fn write(self, mode: PersistMode) -> fjall::Result<Written> {
+        self.inner.durability(Some(mode)).commit()?;
+        Ok(Written {
+            promises: self.promises,
+            written_bytes: self.written_bytes,
+            dropped_bytes: self.dropped_bytes,
+        })
+    }
+
+    fn expiry(&self, ttl: Duration) -> u64 {
+        self.now.saturating_add(milliseconds(ttl))
+    }
+
+    /// The row of this id, if its time is not over. One that is damaged is lost.
+    fn row(&mut self, id: Uuid) -> Result<Option<Row>, Fault> {
+        let bytes = self.inner.get(&self.tables.rows, id.as_bytes());
+        let row = bytes
+            .map_err(Fault::from)
+            .and_then(|bytes| Ok(bytes.map(|bytes| Row::from_bytes(&bytes)).transpose()?));
+        let row = self.unless_damaged(id, row.transpose())?;
+        Ok(row.filter(|row| row.expires > self.now))
+    }
+
+    /// What was read of a session. If it is damaged, the session is lost and dropped.
+    fn unless_damaged<T>(
+        &mut self,
+        id: Uuid,
+        read: Option<Result<T, Fault>>,
+    ) -> Result<Option<T>, Fault> {
+        match read.transpose() {
+            Err(fault) if fault.is_damage() => {
+                let session = crate::short_id(id);
+                tracing::error!(session, reason = %fault, "a session in the store is damaged, and lost");
+                self.drop_session(id);
+                Ok(None)
+            }
+            read => read,
+        }
+    }
+
+    fn put(&mut self, id: Uuid, row: &Row) {
+        let bytes = row.to_bytes();
+        self.written_bytes += bytes.len() as u64;
+        self.inner.insert(&self.tables.rows, *id.as_bytes(), bytes);
+    }
+
+    /// The state of a session, after the number of its frame.
+    fn put_state(&mut self, id: Uuid, frame: u64, state: &[u8]) {
+        let bytes = [&frame.to_be_bytes(), state].concat();
+        self.written_bytes += bytes.len() as u64;
+        self.inner
+            .insert(&self.tables.states, *id.as_bytes(), bytes);
+    }
+
+    /// Drops what belongs to a session.
+    fn drop_session(&mut self, id: Uuid) {
+        self.inner.remove(&self.tables.rows, *id.as_bytes());
+        self.inner.remove(&self.tables.states, *id.as_bytes());
+    }
+
+    fn has_ended(&self, name: SessionName) -> Result<bool, Fault> {
+        let ended = self.inner.get(&self.tables.ended, ended_key(name))?;
+        let until = ended.and_then(|bytes| moment(&bytes));
+        Ok(until.is_some_and(|until| until > self.now))
+    }
+
+    fn absent(&self, name: SessionName) -> Result<Outcome, Fault> {
+        Ok(match self.has_ended(name)? {
+            true => Outcome::Tombstoned,
+            false => Outcome::NotFound,
+        })
+    }
+
+    /// The record of a row; none if it is damaged.
+    fn record(&mut self, id: Uuid, row: &Row) -> Result<Option<Record>, Fault> {
+        let read = self.read_record(id, row);
+        self.unless_damaged(id, Some(read))
+    }
+
+    fn read_record(&self, id: Uuid, row: &Row) -> Result<Record, Fault> {
+        let state = self.inner.get(&self.tables.states, id.as_bytes())?;
+        let (frame, state) = state
+            .as_ref()
+            .and_then(|bytes| bytes.split_first_chunk())
+            .ok_or(UnreadableRecord::Damaged)?;
+        // A state of another frame is one that the damaged files have kept from before or after.
+        if u64::from_be_bytes(*frame) != row.checkpoint {
+            return Err(UnreadableRecord::Damaged.into());
+        }
+        Ok(row.record(state.to_vec(), self.now)?)
+    }
+
+    /// Tells the record. `takes_over` says whether the replica that asks goes on from the checkpoint.
+    fn tell(&mut self, id: Uuid, row: Row, takes_over: bool) -> Result<Outcome, Fault> {
+        let mut row = row;
+        let is_behind = row.frame != row.checkpoint;
+        if takes_over && is_behind {
+            row.generation += 1;
+            row.frame = row.checkpoint;
+        }
+        let Some(record) = self.record(id, &row)? else {
+            return Ok(Outcome::NotFound);
+        };
+        if takes_over && is_behind {
+            self.put(id, &row);
+            self.promises = true;
+        }
+        Ok(Outcome::Conflict(Box::new(record)))
+    }
+
+    fn time_left(&self, row: &Row) -> Duration {
+        Duration::from_millis(row.expires.saturating_sub(self.now))
+    }
+
+    pub(super) fn create(&mut self, id: Uuid, record: &Record) -> Result<Outcome, Fault> {
+        if let Some(row) = self.row(id)? {
+            return self.tell(id, row, false);
+        }
+        let incarnation = record.opening.incarnation;
+        if self.has_ended(SessionName { id, incarnation })? {
+            return Ok(Outcome::Tombstoned);
+        }
+        self.put(id, &Row::of(record, self.expiry(record.ttl)));
+        self.put_state(id, record.version.frame, &record.state);
+        self.promises = true;
+        Ok(Outcome::Committed(record.ttl))
+    }
+
+    pub(super) fn load(&mut self, id: Uuid) -> Result<Option<Record>, Fault> {
+        match self.row(id)? {
+            Some(row) => self.record(id, &row),
+            None => Ok(None),
+        }
+    }
+
+    pub(super) fn commit(&mut self, commit: &OwnedCommit) -> Result<Outcome, Fault> {
+        let id = commit.name.id;
+        let Some(mut row) = self.row(id)? else {
+            return self.absent(commit.name);
+        };
+        if !row.is_at(commit.before) {
+            return self.tell(id, row, commit.takes_over);
+        }
+        row.frame = commit.frame;
+        row.expires = self.expiry(commit.ttl);
+        if let Some(state) = &commit.state {
+            row.checkpoint = commit.frame;
+            row.state_bytes = state.len() as u64;
+            self.put_state(id, commit.frame, state);
+        }
+        self.put(id, &row);
+        self.promises = true;
+        Ok(Outcome::Committed(commit.ttl))
+    }
+
+    pub(super) fn check(
+        &mut self,
+        name: SessionName,
+        version: Version,
+        takes_over: bool,
+        renew: Option<Duration>,
+    ) -> Result<Outcome, Fault> {
+        let Some(mut row) = self.row(name.id)? else {
+            return self.absent(name);
+        };
+        if let Some(ttl) = renew {
+            row.expires = self.expiry(ttl);
+            self.put(name.id, &row);
+        }
+        match row.is_at(version) {
+            true => Ok(Outcome::Committed(self.time_left(&row))),
+            false => self.tell(name.id, row, takes_over),
+        }
+    }
+
+    pub(super) fn fence(&mut self, name: SessionName, version: Version) -> Result<Outcome, Fault> {
+        let Some(mut row) = self.row(name.id)? else {
+            return self.absent(name);
+        };
+        if !row.is_at(version) {
+            return self.tell(name.id, row, true);
+        }
+        row.generation += 1;
+        self.put(name.id, &row);
+        self.promises = true;
+        Ok(Outcome::Committed(self.time_left(&row)))
+    }
+
+    pub(super) fn end(&mut self, name: SessionName, ttl: Duration) -> Result<bool, Fault> {
+        // A row that cannot be read goes, too: whoever ends a session wants it gone.
+        let row = match self.row(name.id) {
+            Err(Fault::Record(_)) => None,
+            row => row?,
+        };
+        let is_own = row.as_ref().map(|row| row.incarnation == name.incarnation);
+        let is_here = match is_own {
+            Some(is_own) => is_own,
+            None => !self.has_ended(name)?,
+        };
+        if is_own != Some(false) {
+            self.dropped_bytes += row.map_or(0, |row| row.state_bytes);
+            self.drop_session(name.id);
+        }
+        let until = self.expiry(ttl).to_be_bytes();
+        self.inner
+            .insert(&self.tables.ended, ended_key(name), until);
+        self.promises = true;
+        Ok(is_here)
+    }
+
+    pub(super) fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Result<Uuid, Fault> {
+        let owned = serde_json::json!([owner.name(), key]).to_string();
+        let name = *blake3::hash(owned.as_bytes()).as_bytes();
+        let claimed = self.inner.get(&self.tables.claims, name)?;
+        let until = claimed.as_ref().and_then(|bytes| moment(bytes));
+        if until.is_some_and(|until| until > self.now)
+            && let Some(first) = claimed.and_then(|bytes| Uuid::from_slice(bytes.get(8..)?).ok())
+        {
+            return Ok(first);
+        }
+        let mut value = [0; 24];
+        value[..8].copy_from_slice(&self.expiry(CLAIMED).to_be_bytes());
+        value[8..].copy_from_slice(id.as_bytes());
+        self.inner.insert(&self.tables.claims, name, value);
+        self.promises = true;
+        Ok(id)
+    }
+}

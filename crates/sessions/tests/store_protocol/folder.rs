@@ -1,0 +1,286 @@
+//! The store in a folder: what it keeps through restarts, damage and a full disk, and what it gives back.
+
+use crate::suite::{TTL, holds_for, is_committed, record};
+use bagtrack_sessions::{
+    Clock, Commit, Durability, FileStore, FileStoreError, Outcome, Record, SessionName,
+    SessionStore, Version,
+};
+use std::fs::{self, OpenOptions};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::TempDir;
+use uuid::Uuid;
+
+const LONG: Duration = Duration::from_secs(60);
+const DURABILITIES: [Durability; 2] = [
+    Durability::Each,
+    Durability::Every(Duration::from_millis(50)),
+];
+
+fn open(folder: &Path, durability: Durability) -> Result<FileStore, FileStoreError> {
+    FileStore::open(folder, durability, LONG, Clock::default())
+}
+
+/// A state of the usual size, which does not compress.
+fn state(seed: u64) -> Vec<u8> {
+    let mut number = seed.wrapping_mul(2).wrapping_add(1);
+    let mut next = || {
+        number = number
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (number >> 56) as u8
+    };
+    (0..36 << 10).map(|_| next()).collect()
+}
+
+/// A session in a store, as its client knows it.
+struct Known {
+    name: SessionName,
+    version: Version,
+    state: Vec<u8>,
+}
+
+impl Known {
+    async fn create(store: &dyn SessionStore, seed: u64, ttl: Duration) -> Self {
+        let (id, state) = (Uuid::from_u128(seed.into()), state(seed << 32));
+        let mut written = record(seed, 0, &state);
+        written.ttl = ttl;
+        let created = store.create(id, &written).await.unwrap();
+        assert!(is_committed(&created), "{created:?}");
+        Self {
+            name: SessionName {
+                id,
+                incarnation: seed,
+            },
+            version: written.version,
+            state,
+        }
+    }
+
+    async fn advance(&mut self, store: &dyn SessionStore) {
+        let frame = self.version.frame + 1;
+        let state = state((self.name.incarnation << 32) + frame);
+        let commit = Commit {
+            name: self.name,
+            before: self.version,
+            frame,
+            state: Some(&state),
+            takes_over: false,
+            ttl: TTL,
+        };
+        let committed = store.commit(commit).await.unwrap();
+        assert!(is_committed(&committed), "{committed:?}");
+        self.version = self.version.committed(frame, true);
+        self.state = state;
+    }
+
+    fn is(&self, record: &Record) -> bool {
+        record.version == self.version && record.state == self.state
+    }
+}
+
+/// Sessions in a folder that was closed.
+async fn filled(folder: &Path, sessions: u64, frames: usize) -> Vec<Known> {
+    let store = open(folder, Durability::default()).unwrap();
+    let mut all = Vec::new();
+    for seed in 1..=sessions {
+        all.push(Known::create(&store, seed, TTL).await);
+    }
+    for _ in 0..frames {
+        for session in &mut all {
+            session.advance(&store).await;
+        }
+    }
+    all
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => files.extend(self::files(&path)),
+            false => files.push(path),
+        }
+    }
+    files.sort();
+    files
+}
+
+fn copy(from: &Path) -> TempDir {
+    let to = tempfile::tempdir().unwrap();
+    for file in files(from) {
+        let target = to.path().join(file.strip_prefix(from).unwrap());
+        fs::create_dir_all(target.parent().unwrap()).unwrap();
+        fs::copy(&file, &target).unwrap();
+    }
+    to
+}
+
+#[tokio::test]
+async fn the_store_in_a_folder_keeps_to_the_rules() {
+    for durability in DURABILITIES {
+        let folder = tempfile::tempdir().unwrap();
+        let store = open(folder.path(), durability).unwrap();
+        holds_for(&store).await;
+        assert!(store.is_ready());
+        assert_eq!(store.failures(), 0);
+    }
+}
+
+#[tokio::test]
+async fn what_was_written_is_there_after_a_restart() {
+    for durability in DURABILITIES {
+        let folder = tempfile::tempdir().unwrap();
+        let store = open(folder.path(), durability).unwrap();
+        let mut session = Known::create(&store, 1, TTL).await;
+        let ended = Known::create(&store, 2, TTL).await;
+        session.advance(&store).await;
+        assert!(store.end(ended.name, TTL).await.unwrap());
+        let owner = bagtrack_sessions::Owner::named("ann");
+        let claimed = store.claim(&owner, "key", session.name.id).await.unwrap();
+        drop(store);
+        let store = open(folder.path(), durability).unwrap();
+        let loaded = store.load(session.name.id).await.unwrap().unwrap();
+        assert!(session.is(&loaded));
+        let checked = store.check(ended.name, ended.version, true, None).await;
+        assert_eq!(checked.unwrap(), Outcome::Tombstoned);
+        let again = store.claim(&owner, "key", Uuid::new_v4()).await.unwrap();
+        assert_eq!(again, claimed);
+        session.advance(&store).await;
+    }
+}
+
+#[tokio::test]
+async fn a_folder_is_one_stores_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = open(folder.path(), Durability::default()).unwrap();
+    let refused = open(folder.path(), Durability::default()).unwrap_err();
+    let text = refused.to_string();
+    assert!(matches!(refused, FileStoreError::Locked(_)), "{text}");
+    assert!(text.contains(folder.path().to_str().unwrap()), "{text}");
+    drop(store);
+    open(folder.path(), Durability::default()).unwrap();
+}
+
+#[tokio::test]
+async fn expired_sessions_are_swept_and_their_space_is_given_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Clock::default();
+    let open = || FileStore::open(folder.path(), Durability::default(), LONG, clock.clone());
+    let store = open().unwrap();
+    let disk = || {
+        use std::os::unix::fs::MetadataExt;
+        let sizes = files(folder.path());
+        let blocks = sizes.iter().filter_map(|file| file.metadata().ok());
+        blocks.map(|file| file.blocks() * 512).sum::<u64>()
+    };
+    let idle = Duration::from_secs(600);
+    // 2,000 sessions of 36 KiB are 70 MiB. Each round leaves them to expire; what stays is the journal.
+    for round in 0..4 {
+        for seed in 1..=2000 {
+            Known::create(&store, 2000 * round + seed, idle).await;
+        }
+        let full = disk();
+        clock.advance(idle);
+        let gone = store
+            .load(Uuid::from_u128(u128::from(2000 * round + 1)))
+            .await;
+        assert_eq!(gone.unwrap(), None, "its time is over");
+        // The files shrink without any call.
+        let waits = bagtrack_sessions::clock::now();
+        let mut left = disk();
+        while left > 100 << 20 && waits.elapsed() < LONG {
+            bagtrack_sessions::clock::sleep(Duration::from_millis(50)).await;
+            left = disk();
+        }
+        let took = waits.elapsed();
+        println!("{} MiB, after {took:?} {} MiB", full >> 20, left >> 20);
+        assert!(left <= 100 << 20, "{} MiB are left", left >> 20);
+    }
+    drop(store);
+    let store = open().unwrap();
+    assert_eq!(store.load(Uuid::from_u128(1)).await.unwrap(), None);
+}
+
+/// How a damaged folder was taken: what its sessions are then.
+async fn look(folder: &Path, sessions: &[Known], damage: &str) -> Result<usize, String> {
+    let store = open(folder, Durability::default());
+    let store = store.map_err(|refused| {
+        let text = refused.to_string();
+        assert!(text.contains(folder.to_str().unwrap()), "{damage}: {text}");
+        text
+    })?;
+    let mut intact = 0;
+    for session in sessions {
+        // Of what is told, nothing was made up: a state is one that was written.
+        if let Ok(Some(record)) = store.load(session.name.id).await {
+            let frame = record.version.frame;
+            let written = state((session.name.incarnation << 32) + frame);
+            assert!(record.state == written, "{damage}: another state");
+            intact += usize::from(session.is(&record));
+        }
+    }
+    Ok(intact)
+}
+
+#[tokio::test]
+async fn a_write_that_was_cut_off_is_left_out_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let sessions = filled(folder.path(), 4, 3).await;
+    let journal = files(folder.path())
+        .into_iter()
+        .find(|file| file.extension().is_some_and(|extension| extension == "jnl"))
+        .unwrap();
+    let bytes = fs::read(&journal).unwrap();
+    let written = bytes.iter().rposition(|byte| *byte != 0).unwrap() + 1;
+    let relative = journal.strip_prefix(folder.path()).unwrap();
+    for cut in [1, 9, 40, 300, 20_000, 36_000] {
+        let torn = copy(folder.path());
+        let file = OpenOptions::new()
+            .write(true)
+            .open(torn.path().join(relative));
+        file.unwrap().set_len((written - cut) as u64).unwrap();
+        let intact = look(torn.path(), &sessions, &format!("{cut} bytes cut off")).await;
+        assert_eq!(intact, Ok(3), "{cut} bytes cut off");
+    }
+}
+
+#[tokio::test]
+async fn damaged_files_are_refused_or_repaired_and_nothing_is_made_up() {
+    let folder = tempfile::tempdir().unwrap();
+    // Enough that states are in tables, too.
+    let sessions = filled(folder.path(), 12, 45).await;
+    let (mut refused, mut whole, mut partly) = (0, 0, 0);
+    let all = files(folder.path());
+    assert!(all.len() > 8, "{all:?}");
+    for file in all {
+        let relative = file.strip_prefix(folder.path()).unwrap();
+        let bytes = fs::read(&file).unwrap();
+        let written = bytes
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |last| last + 1);
+        for part in [0, 3, 7] {
+            for is_cut in [true, false] {
+                let at = (written * part / 8).min(written.saturating_sub(1));
+                let damage = format!("{} cut: {is_cut}, at {at}", relative.display());
+                let damaged = copy(folder.path());
+                let mut copy = bytes.clone();
+                match is_cut {
+                    true => copy.truncate(at),
+                    false if written > 0 => copy[at] ^= 1 << (part % 8),
+                    false => continue,
+                }
+                fs::write(damaged.path().join(relative), &copy).unwrap();
+                match look(damaged.path(), &sessions, &damage).await {
+                    Err(_) => refused += 1,
+                    Ok(12) => whole += 1,
+                    Ok(_) => partly += 1,
+                }
+            }
+        }
+    }
+    println!("refused {refused}, whole {whole}, in part {partly}");
+    assert!(refused > 0 && whole > 0);
+}

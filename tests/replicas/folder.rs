@@ -1,0 +1,233 @@
+//! One process with its store in a folder: killed, on a full disk, and beside another one.
+
+use crate::chaos::{Progress, SECRET, setting, undisturbed};
+use crate::clip::Clip;
+use crate::replica::Replica;
+use crate::server::{Process, free_port, wait_for};
+use crate::tracking_client::Track;
+use bagtrack_testing::command::program;
+use reqwest::{Client, StatusCode};
+use rustix::process::{Pid, Resource, Rlimit, prlimit};
+use std::net::SocketAddr;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use tempfile::TempDir;
+use tokio::task::JoinSet;
+
+/// A folder, and the setting that names it.
+fn folder() -> (TempDir, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let setting = format!("file:{}", folder.path().join("sessions").display());
+    (folder, setting)
+}
+
+/// How often the process is killed.
+const KILLS: usize = 6;
+
+/// Clients go on through `kill -9`: no track and no answered frame is lost, and all boxes are those of an undisturbed
+/// run.
+async fn goes_on_when_killed(durability: &str, (clients, frames): (usize, usize)) {
+    let clips: Vec<Clip> = (0..clients)
+        .map(|client| Clip::of(client, frames + 1))
+        .collect();
+    let expected = undisturbed(&clips).await;
+    let (_folder, store) = folder();
+    let flags = [&["--durability", durability], &SECRET[..]].concat();
+    let mut replica = Replica::with_store(&store, &flags);
+    let progress = Arc::new(Progress::default());
+    let mut tracks = JoinSet::new();
+    for (number, clip) in clips.into_iter().enumerate() {
+        let (base, progress) = (replica.url(""), progress.clone());
+        tracks.spawn(async move {
+            let mut track = Track::open(base, Client::new(), number, clip).await;
+            while track.advance().await {
+                progress.frames.fetch_add(1, Ordering::AcqRel);
+                progress.moved.notify_waiters();
+            }
+            let state = track.snapshot().await;
+            (number, track, state)
+        });
+    }
+    let kill = async {
+        for kill in 1..=KILLS {
+            progress
+                .reaches(kill * clients * frames / (KILLS + 1))
+                .await;
+            tokio::task::block_in_place(|| {
+                replica.kill();
+                replica.start_again();
+            });
+        }
+    };
+    let mut done = 0;
+    let finish = async {
+        while let Some(track) = tracks.join_next().await {
+            let (number, track, state) = track.expect("a track was lost");
+            assert!(
+                !track.went_back(),
+                "client {number}: an answered frame was lost"
+            );
+            let (answers, last) = &expected[number];
+            assert_eq!(track.answers.len(), frames, "client {number}");
+            assert_eq!(&track.answers, answers, "client {number}");
+            assert!(state == *last, "client {number}: another state");
+            done += 1;
+        }
+    };
+    tokio::join!(finish, kill);
+    assert_eq!(done, clients);
+    println!(
+        "{clients} clients, {frames} frames each, killed {KILLS} times, durability {durability}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_process_that_is_killed_goes_on_from_its_folder() {
+    let clients = setting("BAGTRACK_REPLICAS_CLIENTS", 20);
+    let frames = setting("BAGTRACK_REPLICAS_FRAMES", 100);
+    goes_on_when_killed("250ms", (clients, frames)).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_process_that_syncs_each_answer_goes_on_from_its_folder() {
+    goes_on_when_killed("each", (6, 40)).await;
+}
+
+/// What a process says that does not start.
+fn refusal(flags: &[&str]) -> String {
+    let mut command = Command::new(program("bagtrack"));
+    command
+        .args(["serve", "--listen", "127.0.0.1:0"])
+        .args(flags);
+    let output = command.output().expect("the program is built");
+    assert!(!output.status.success(), "{flags:?}: it starts");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_folder_of_another_process_is_refused() {
+    let (_folder, store) = folder();
+    let _first = Replica::with_store(&store, &[]);
+    let text = refusal(&["--store", &store]);
+    assert!(text.contains("another process uses the store in"), "{text}");
+    assert!(text.contains("--store"), "{text}");
+}
+
+#[test]
+fn a_setting_that_names_no_store_is_refused() {
+    for setting in ["file:", "/var/lib/bagtrack", "http://localhost"] {
+        let text = refusal(&["--store", setting]);
+        assert!(
+            text.contains("must be file:DIR, or an address like redis://"),
+            "{text}"
+        );
+    }
+    let text = refusal(&["--store", "file:/dev/null/sessions"]);
+    assert!(
+        text.contains("/dev/null/sessions cannot be opened"),
+        "{text}"
+    );
+    for durability in ["never", "0s", "2h"] {
+        let text = refusal(&["--durability", durability]);
+        assert!(text.contains("each, or a time from 1ms to 1h"), "{text}");
+    }
+}
+
+/// A process whose files may grow to a limit that can be moved. Writes above it fail as they do on a full disk.
+struct Limited {
+    process: Process,
+    address: SocketAddr,
+}
+
+impl Limited {
+    fn start(store: &str) -> Self {
+        let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
+        let mut command = Command::new("sh");
+        // A signal that is ignored stays so, and the write returns an error.
+        command.args(["-c", "trap '' XFSZ; exec \"$@\"", "sh"]);
+        command
+            .arg(program("bagtrack"))
+            .args(["serve", "--log", "warn", "--workers", "2"]);
+        command
+            .args(["--listen", &address.to_string(), "--store", store])
+            .args(SECRET);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        let mut process = Process(command.spawn().expect("there is a shell"));
+        wait_for(address, &mut process.0);
+        Self { process, address }
+    }
+
+    /// None is no limit.
+    fn limit(&self, bytes: Option<u64>) {
+        let pid = Pid::from_raw(i32::try_from(self.process.0.id()).unwrap());
+        let limit = Rlimit {
+            current: bytes,
+            maximum: None,
+        };
+        prlimit(pid, Resource::Fsize, limit).expect("it is a process of ours");
+    }
+
+    async fn readiness(&self) -> StatusCode {
+        let answer = reqwest::get(format!("http://{}/readyz", self.address)).await;
+        answer.expect("it listens").status()
+    }
+}
+
+/// The bytes of the journal without the zeros at its end.
+fn journal_bytes(folder: &TempDir) -> u64 {
+    let entries = folder.path().join("sessions").read_dir().unwrap();
+    let lengths = entries
+        .map(|entry| entry.unwrap().path())
+        .filter_map(|path| {
+            let is_journal = path.extension().is_some_and(|extension| extension == "jnl");
+            let bytes = is_journal.then(|| std::fs::read(path).unwrap())?;
+            Some(bytes.iter().rposition(|byte| *byte != 0)? as u64 + 1)
+        });
+    lengths.max().unwrap()
+}
+
+#[tokio::test]
+async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
+    let clip = Clip::of(0, 25);
+    let (answers, state) = undisturbed(std::slice::from_ref(&clip)).await.remove(0);
+    let (folder, store) = folder();
+    let replica = Limited::start(&store);
+    let base = format!("http://{}", replica.address);
+    let mut track = Track::open(base, Client::new(), 0, clip.clone()).await;
+    for full in [5, 10, 15] {
+        while track.answers.len() < full {
+            track.advance().await;
+        }
+        // One more may fit.
+        replica.limit(Some(journal_bytes(&folder) + (48 << 10)));
+        let url = format!("http://{}/sessions/{}/frames", replica.address, track.id());
+        let mut refused = None;
+        for number in full + 1.. {
+            let request = Client::new().post(format!("{url}?frame={number}"));
+            let answer = request
+                .body(clip.frames[number].clone())
+                .send()
+                .await
+                .unwrap();
+            match answer.status() {
+                StatusCode::OK => {}
+                status => {
+                    refused = Some((status, answer.text().await.unwrap()));
+                    break;
+                }
+            }
+        }
+        let (status, body) = refused.unwrap();
+        assert_eq!(status, StatusCode::SERVICE_UNAVAILABLE, "{body}");
+        assert!(body.contains("/docs/problems#store-unavailable"), "{body}");
+        while replica.readiness().await != StatusCode::SERVICE_UNAVAILABLE {}
+        replica.limit(None);
+        while replica.readiness().await != StatusCode::OK {}
+    }
+    // The client goes on: a frame that was answered meanwhile gets the same answer again.
+    while track.advance().await {}
+    assert!(!track.went_back());
+    assert_eq!(track.answers, answers);
+    assert!(track.snapshot().await == state, "another state");
+}
