@@ -79,7 +79,7 @@ pub trait SessionStore: Debug + Send + Sync {
     /// Counts a session that is about to be created against what its client may have in the store. False where it may not
     /// have it. A session counts as long as its record lives.
     ///
-    /// A store that nothing shares need not count: its process does.
+    /// A store that is as short-lived as its process and keeps nothing that left memory need not count.
     fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
         let _ = (share, session);
         Box::pin(async { Ok(true) })

@@ -2,8 +2,8 @@
 
 use crate::suite::{TTL, holds_for, is_committed, record};
 use bagtrack_sessions::{
-    Clock, Commit, Durability, FileStore, FileStoreError, Outcome, Record, SessionName,
-    SessionStore, Version,
+    Clock, Commit, Counted, Durability, FileStore, FileStoreError, Outcome, Record, SessionName,
+    SessionStore, StoreShare, Version,
 };
 use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -283,4 +283,36 @@ async fn damaged_files_are_refused_or_repaired_and_nothing_is_made_up() {
     }
     println!("refused {refused}, whole {whole}, in part {partly}");
     assert!(refused > 0 && whole > 0);
+}
+
+#[tokio::test]
+async fn a_client_has_so_many_places_in_the_store_until_its_sessions_end_or_expire() {
+    let (folder, clock) = (TempDir::new().unwrap(), Clock::default());
+    let store = FileStore::open(folder.path(), DURABILITIES[1], LONG, clock.clone()).unwrap();
+    let share = |client: &str| StoreShare {
+        client: client.to_owned(),
+        max_places: 3,
+        max_bytes: 1 << 20,
+    };
+    let counted = |seed: u64| Counted {
+        name: SessionName {
+            id: Uuid::from_u128(seed.into()),
+            incarnation: seed,
+        },
+        places: 1,
+        bytes: 100 << 10,
+        ttl: TTL,
+    };
+    for seed in 1..=3 {
+        assert!(store.admit(&share("one"), counted(seed)).await.unwrap());
+        Known::create(&store, seed, TTL).await;
+    }
+    assert!(!store.admit(&share("one"), counted(4)).await.unwrap());
+    assert!(store.admit(&share("other"), counted(5)).await.unwrap());
+    assert!(store.end(counted(2).name, TTL).await.unwrap());
+    assert!(store.admit(&share("one"), counted(6)).await.unwrap());
+    assert!(!store.admit(&share("one"), counted(7)).await.unwrap());
+    // They do not count for ever where nobody ends them.
+    clock.advance(TTL);
+    assert!(store.admit(&share("one"), counted(8)).await.unwrap());
 }

@@ -1,10 +1,13 @@
 //! The store's calls, which go to its thread.
 
 use super::super::record::{Record, SessionName, Version};
-use super::super::session_store::{Commit, Outcome, SessionStore, StoreFuture, StoreUnavailable};
+use super::super::session_store::{
+    Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
+};
 use super::database::OpenError;
 use super::durability::Durability;
 use super::rules::{Fault, OwnedCommit, Transaction};
+use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};
 use crate::owner::Owner;
@@ -25,6 +28,7 @@ pub struct FileStore {
     calls: Option<Sender<Box<dyn Call>>>,
     thread: Option<JoinHandle<()>>,
     health: Arc<Health>,
+    shares: Shares,
     timeout: Duration,
 }
 
@@ -41,6 +45,7 @@ impl FileStore {
         clock: Clock,
     ) -> Result<Self, OpenError> {
         let health = Arc::new(Health::default());
+        let shares = Shares::new(clock.clone());
         let writer = Writer::new(folder.to_owned(), durability, clock, health.clone())?;
         let (sender, calls) = channel();
         let thread = std::thread::Builder::new().name("bagtrack-store".to_owned());
@@ -53,6 +58,7 @@ impl FileStore {
             calls: Some(sender),
             thread: Some(thread),
             health,
+            shares,
             timeout,
         })
     }
@@ -99,6 +105,20 @@ impl SessionStore for FileStore {
         self.call(move |transaction| transaction.create(id, &record))
     }
 
+    fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
+        Box::pin(async move {
+            if self.shares.admit(share, session) {
+                return Ok(true);
+            }
+            let doubtful = self.shares.doubtful(&share.client);
+            let gone = self
+                .call(move |transaction| transaction.gone(&doubtful))
+                .await?;
+            self.shares.remove(&gone);
+            Ok(self.shares.admit(share, session))
+        })
+    }
+
     fn load(&self, id: Uuid) -> StoreFuture<'_, Option<Record>> {
         self.call(move |transaction| transaction.load(id))
     }
@@ -123,7 +143,12 @@ impl SessionStore for FileStore {
     }
 
     fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool> {
-        self.call(move |transaction| transaction.end(name, ttl))
+        Box::pin(async move {
+            let ended = self.call(move |transaction| transaction.end(name, ttl));
+            let ended = ended.await?;
+            self.shares.remove(&[name]);
+            Ok(ended)
+        })
     }
 
     fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {

@@ -21,6 +21,7 @@ mod database;
 mod durability;
 mod row;
 mod rules;
+mod shares;
 mod writer;
 
 pub use calls::FileStore;

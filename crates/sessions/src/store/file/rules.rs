@@ -126,6 +126,18 @@ impl Transaction<'_> {
         Ok(row.filter(|row| row.expires > self.now))
     }
 
+    /// Those of the sessions that have no record.
+    pub(super) fn gone(&mut self, names: &[SessionName]) -> Result<Vec<SessionName>, Fault> {
+        let mut gone = Vec::new();
+        for name in names {
+            let row = self.row(name.id)?;
+            if row.is_none_or(|row| row.incarnation != name.incarnation) {
+                gone.push(*name);
+            }
+        }
+        Ok(gone)
+    }
+
     /// What was read of a session. If it is damaged, the session is lost and dropped.
     fn unless_damaged<T>(
         &mut self,
