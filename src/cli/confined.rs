@@ -42,6 +42,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     use std::os::unix::process::CommandExt;
     let (program, arguments) = args.command.split_first().ok_or("no program")?;
     let path = found(Path::new(program));
+    // Where this cannot be had, `serve` has told so at its start.
     let _ = restrict(path.as_deref().and_then(Path::parent));
     // It returns only where the program cannot be started.
     let _failed = Command::new(program).args(arguments).exec();

@@ -89,9 +89,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
 /// Has ffmpeg started by this program, which gives up its rights before.
 fn confine_decoders(config: &mut Config) {
     match std::env::current_exe() {
-        Ok(program) => {
-            config.limits.ffmpeg_launcher.0 = vec![program.into(), confined::NAME.into()]
-        }
+        Ok(program) => config.limits.ffmpeg_launcher = vec![program.into(), confined::NAME.into()],
         Err(error) => tracing::warn!(%error, "ffmpeg has the rights of the service"),
     }
     if !confined::works() {

@@ -2,7 +2,7 @@
 
 use super::reversed::Reversed;
 use super::start::Start;
-use super::video_info::{Rate, VideoInfo};
+use super::video_info::{FFMPEG, Rate, VideoInfo};
 use bagtrack_cli::frames;
 use bagtrack_ingest::Limits;
 use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
@@ -10,9 +10,6 @@ use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::vec::IntoIter;
-
-/// The program that decodes and encodes videos.
-pub const FFMPEG: &str = "ffmpeg";
 
 /// A frame.
 pub struct FrameFile {

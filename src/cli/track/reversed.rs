@@ -1,7 +1,6 @@
 //! The pictures of a video from one of them back to its first.
 
-use super::frames::FFMPEG;
-use super::video_info::VideoInfo;
+use super::video_info::{FFMPEG, VideoInfo};
 use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
 use std::error::Error;
 use std::path::PathBuf;

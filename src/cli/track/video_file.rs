@@ -1,7 +1,6 @@
 //! A video that is written frame by frame, by an installed ffmpeg.
 
-use super::frames::FFMPEG;
-use super::video_info::Rate;
+use super::video_info::{FFMPEG, Rate};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::Path;
 use std::process::Command;
 
+/// The program that decodes and encodes videos.
+pub const FFMPEG: &str = "ffmpeg";
 /// The program that tells about videos.
 const FFPROBE: &str = "ffprobe";
 /// The first names of formats whose files have an index.

@@ -8,7 +8,6 @@
 pub mod access;
 pub mod base_path;
 pub mod flag_values;
-pub mod launcher;
 pub mod limits;
 pub mod memory_bound;
 pub mod service;

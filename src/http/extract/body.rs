@@ -10,7 +10,7 @@ use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
-use bagtrack_sessions::{BytesFull, Charge};
+use bagtrack_sessions::{BudgetFull, Charge};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;
 use tower_http::timeout::TimeoutError;
@@ -40,7 +40,7 @@ impl<'a> Buffer<'a> {
     ///
     /// # Errors
     /// There is no memory for it.
-    pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), BytesFull> {
+    pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), BudgetFull> {
         let (len, capacity) = (self.bytes.len(), self.bytes.capacity());
         let needed = len + piece.len();
         if needed > capacity {
@@ -104,7 +104,7 @@ pub(super) fn problem(error: &(dyn Error + 'static), max_bytes: usize) -> Proble
                  first part."
             ));
         }
-        if let Some(full) = error.downcast_ref::<BytesFull>() {
+        if let Some(full) = error.downcast_ref::<BudgetFull>() {
             return (*full).into();
         }
         if let Some(error) = error.downcast_ref::<MultipartError>()

@@ -49,7 +49,7 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let launcher = &config.limits.ffmpeg_launcher.0;
+        let launcher = &config.limits.ffmpeg_launcher;
         let mut decoder =
             VideoDecoder::of_bytes(launcher, &config.limits.ffmpeg, video, format, limits)?;
         let stop = decoder.stop();

@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::problem::Problem;
 use bagtrack_ingest::IngestError;
 use bagtrack_sessions::{
-    ActError, BytesFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
+    ActError, BudgetFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
     QuotaExhausted, ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
     TooManySessions, TrackError, WorkPanicked,
 };
@@ -106,11 +106,11 @@ impl From<QueueFull> for Problem {
     }
 }
 
-impl From<BytesFull> for Problem {
-    fn from(full: BytesFull) -> Self {
+impl From<BudgetFull> for Problem {
+    fn from(full: BudgetFull) -> Self {
         match full {
-            BytesFull::All => QueueFull.into(),
-            BytesFull::Client => {
+            BudgetFull::All => QueueFull.into(),
+            BudgetFull::Client => {
                 let detail = "The bodies of this client's requests take as much memory as one client's may. Try again \
                     after the time in `Retry-After`. Nothing was changed.";
                 Self::new(Kind::QuotaExceeded, detail)

@@ -10,7 +10,7 @@ use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
-    Budget, BytesFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
+    Budget, BudgetFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
     SessionQuota, StoreShare, TooManySessions,
 };
 use governor::clock::{Clock, DefaultClock};
@@ -308,7 +308,7 @@ impl SessionQuota for ClientSessions {
         match self.0.held.sessions.left() {
             0 => Err(self
                 .0
-                .refusal(BytesFull::Client, "sessions", self.0.quotas.sessions)),
+                .refusal(BudgetFull::Client, "sessions", self.0.quotas.sessions)),
             _ => Ok(()),
         }
     }
@@ -361,10 +361,10 @@ impl RequestPermit {
 
 impl Account {
     /// Why no session can be opened: the client has its maximum, or too little is left of what all may have.
-    fn refusal(&self, full: BytesFull, what: &'static str, limit: usize) -> OpenError {
+    fn refusal(&self, full: BudgetFull, what: &'static str, limit: usize) -> OpenError {
         match full {
-            BytesFull::Client => QuotaExhausted { what, limit }.into(),
-            BytesFull::All => TooManySessions(self.all.sessions.held()).into(),
+            BudgetFull::Client => QuotaExhausted { what, limit }.into(),
+            BudgetFull::All => TooManySessions(self.all.sessions.held()).into(),
         }
     }
 

@@ -11,7 +11,7 @@ use crate::http::net::least_rate::LeastRate;
 use crate::http::quotas::clients::MessageRate;
 use arrayvec::ArrayVec;
 use bagtrack_sessions::clock::{self, Sleep, sleep_until};
-use bagtrack_sessions::{Budget, BytesFull, Charge};
+use bagtrack_sessions::{Budget, BudgetFull, Charge};
 use bytes::{Buf, BytesMut};
 use governor::clock::{Clock, DefaultClock};
 use std::future::poll_fn;
@@ -158,7 +158,7 @@ impl<S> Fragments<S> {
     ///
     /// # Errors
     /// There is no memory for it.
-    fn begin_fragment(&mut self) -> Result<bool, BytesFull> {
+    fn begin_fragment(&mut self) -> Result<bool, BudgetFull> {
         if self.frame.is_none() {
             self.frame = take_head(&mut self.input);
         }
@@ -268,7 +268,7 @@ impl<S: AsyncRead + Unpin> Fragments<S> {
     }
 
     /// Waits before memory is asked for again. It has the time of the message.
-    fn poll_memory(&mut self, cx: &mut Context<'_>, full: BytesFull) -> Poll<io::Error> {
+    fn poll_memory(&mut self, cx: &mut Context<'_>, full: BudgetFull) -> Poll<io::Error> {
         if self.rate.poll_late(cx).is_ready() {
             return Poll::Ready(io::Error::other(full));
         }

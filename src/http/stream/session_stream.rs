@@ -13,7 +13,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::StreamAnswer;
 use axum::body::Bytes;
 use bagtrack_sessions::clock::{self, interval_at, timeout};
-use bagtrack_sessions::{BytesFull, Charge, ChargedBytes, Estimates};
+use bagtrack_sessions::{BudgetFull, Charge, ChargedBytes, Estimates};
 use futures_util::stream::FusedStream;
 use futures_util::{SinkExt, StreamExt};
 use serde::Serialize;
@@ -259,7 +259,7 @@ impl SessionStream {
 fn unreadable(error: &Error) -> Problem {
     if let Error::Io(error) = error {
         let cause = error.get_ref();
-        if let Some(full) = cause.and_then(|cause| cause.downcast_ref::<BytesFull>()) {
+        if let Some(full) = cause.and_then(|cause| cause.downcast_ref::<BudgetFull>()) {
             return (*full).into();
         }
         if cause.is_some_and(|cause| cause.is::<MessageTooSlow>()) {

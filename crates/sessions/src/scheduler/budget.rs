@@ -21,12 +21,12 @@ struct Inner {
 
 /// Which budget has too little left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Full {
+pub enum BudgetFull {
     /// That of all clients: it is used up, or this client holds as much as is free.
-    #[error("the bytes of all uploads together are used up")]
+    #[error("all clients together hold as much as they may")]
     All,
     /// The client's own.
-    #[error("the client's bytes are used up")]
+    #[error("the client holds as much as it may")]
     Client,
 }
 
@@ -100,10 +100,10 @@ impl Charge {
     ///
     /// # Errors
     /// One of the budgets has too few left. Nothing was taken.
-    pub fn grow(&mut self, count: usize) -> Result<(), Full> {
+    pub fn grow(&mut self, count: usize) -> Result<(), BudgetFull> {
         let (client, free) = (&self.client.0, self.all.left());
         if count > client.most.saturating_sub(self.client.held()) {
-            return Err(Full::Client);
+            return Err(BudgetFull::Client);
         }
         // Whoever is alone may have what is left over.
         let is_alone = self.all.held() <= self.client.held();
@@ -116,7 +116,7 @@ impl Charge {
         for (budget, limit) in levels {
             if !budget.take(count, limit) {
                 taken.iter().for_each(|taken| taken.give_back(count));
-                return Err(Full::All);
+                return Err(BudgetFull::All);
             }
             taken.push(budget);
         }
@@ -152,10 +152,10 @@ mod tests {
         charge.grow(10).unwrap();
         charge.grow(2000).unwrap();
         assert_eq!((all.left(), client.left()), (2086, 990));
-        assert_eq!(charge.grow(2000), Err(Full::Client));
+        assert_eq!(charge.grow(2000), Err(BudgetFull::Client));
         let other = Budget::new(9000);
         let mut second = Charge::new(&all, &other);
-        assert_eq!(second.grow(2087), Err(Full::All));
+        assert_eq!(second.grow(2087), Err(BudgetFull::All));
         assert_eq!(other.left(), 9000, "nothing was charged");
         second.grow(2086).unwrap();
         second.shrink(1000);
