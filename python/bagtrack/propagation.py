@@ -125,21 +125,21 @@ def _of_folder(folder: Path, start: int, backwards: bool) -> Iterator[tuple[int,
 
 def _of_video(video: Path, start: int, backwards: bool) -> Iterator[tuple[int, Frame]]:
     if not backwards:
-        yield from _run(video, start, None)
+        yield from read_video(video, start, None)
         return
     end = start + 1
     size = 0
     while end > 0:
         # The first run is one frame, which tells how many fit into the next ones.
         begin = max(0, end - max(1, _RUN_BYTES // size)) if size else start
-        run = list(_run(video, begin, end))
+        run = list(read_video(video, begin, end))
         if len(run) < end - begin:
             return
         yield from reversed(run)
         size, end = run[0][1].nbytes, begin
 
 
-def _run(video: Path, begin: int, end: Optional[int]) -> Iterator[tuple[int, Frame]]:
+def read_video(video: Path, begin: int, end: Optional[int]) -> Iterator[tuple[int, Frame]]:
     """The frames of a video from `begin` on, up to the one before `end`."""
     cv2 = _opencv()
     capture = cv2.VideoCapture(str(video))

@@ -60,6 +60,18 @@ def read(file: Path) -> np.ndarray:
     return np.ascontiguousarray(np.asarray(image.convert("RGB"))[:, :, ::-1])
 
 
+def as_video(frames: list[np.ndarray], file: Path) -> Path:
+    """Writes a video of Motion JPEGs, for which OpenCV is needed."""
+    import cv2
+
+    size = (frames[0].shape[1], frames[0].shape[0])
+    writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"MJPG"), 25, size)
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
+    return file
+
+
 @contextmanager
 def clock(what: str, frames: int) -> Iterator[None]:
     """Prints how long each frame took; pytest's option -s shows it."""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import bagtrack
-from conftest import ROOT, SEED, Clip, Server
+from conftest import ROOT, SEED, Clip, Server, as_video
 
 cv2 = pytest.importorskip("cv2", reason="the package opencv-python-headless cannot be had", exc_type=ImportError)
 
@@ -28,11 +28,7 @@ def test_a_video_is_followed_in_process_and_with_a_service(
 ) -> None:
     video, tracked = tmp_path / "clip.avi", tmp_path / "tracked.mp4"
     frames = clip.frames()
-    size = (frames[0].shape[1], frames[0].shape[0])
-    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 25, size)
-    for frame in frames:
-        writer.write(frame)
-    writer.release()
+    as_video(frames, video)
 
     options = [video, "--box", ",".join(map(str, clip.box)), "--seed", SEED]
     in_process = lines(*options, "--out", tracked)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import bagtrack
-from conftest import ROOT, SEED, Clip, box_of, run
+from conftest import ROOT, SEED, Clip, as_video, box_of, run
 
 cv2 = pytest.importorskip("cv2", reason="the package opencv-python-headless cannot be had", exc_type=ImportError)
 OTHER = (200.0, 30.0, 40.0, 40.0)
@@ -31,16 +31,6 @@ def rows(answers: object) -> list[tuple[object, ...]]:
 
 def text(box: tuple[float, ...]) -> str:
     return ",".join(map(repr, box))
-
-
-def as_video(clip: Clip, file: Path) -> Path:
-    frames = clip.frames()
-    size = (frames[0].shape[1], frames[0].shape[0])
-    writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"MJPG"), 25, size)
-    for frame in frames:
-        writer.write(frame)
-    writer.release()
-    return file
 
 
 def test_it_gives_the_boxes_of_the_command(clip: Clip) -> None:
@@ -62,7 +52,7 @@ def test_it_goes_backwards_through_folders_sequences_and_videos(clip: Clip, tmp_
     backwards = {"start": start, "backwards": True, "seed": SEED}
     assert rows(bagtrack.propagate(clip.folder, box, **backwards)) == expected
     assert rows(bagtrack.propagate(clip.frames(), box, **backwards)) == expected
-    video = as_video(clip, tmp_path / "clip.avi")
+    video = as_video(clip.frames(), tmp_path / "clip.avi")
     forwards = cv2.VideoCapture(str(video))
     decoded = [forwards.read()[1] for _ in range(len(clip.files))]
     of_arrays = rows(bagtrack.propagate(decoded, box, **backwards))
@@ -100,7 +90,7 @@ def example(name: str, *arguments: object, path: Path | None = None) -> str:
 
 
 def test_many_videos_are_tracked_in_threads_as_one_after_the_other(clip: Clip, tmp_path: Path) -> None:
-    videos = [as_video(clip, tmp_path / f"{name}.avi") for name in "abc"]
+    videos = [as_video(clip.frames(), tmp_path / f"{name}.avi") for name in "abc"]
     arguments = [f"{video}:{text(clip.box)}" for video in videos]
     for threads in (1, 3):
         out = tmp_path / f"threads-{threads}"
@@ -133,14 +123,11 @@ def test_a_detector_is_asked_at_the_start_and_after_a_loss(clip: Clip, tmp_path:
     for file, patch in zip(files, (first, second)):
         np.save(file, patch)
     (tmp_path / "detectors.py").write_text(DETECTOR.format(files=files))
-    size = (frames[0].shape[1], frames[0].shape[0])
-    writer = cv2.VideoWriter(str(tmp_path / "clip.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25, size)
+    # It comes, is followed, goes away for long, and another thing comes.
     nothing = np.full_like(frames[0], 128)
     back = nothing.copy()
     back[100:148, 150:198] = second
-    for frame in [nothing] * 3 + frames + [nothing] * 60 + [back] * 10:
-        writer.write(frame)
-    writer.release()
+    as_video([nothing] * 3 + frames + [nothing] * 60 + [back] * 10, tmp_path / "clip.avi")
     output = example("detect_and_follow.py", tmp_path / "clip.avi", "--detector", "detectors:target", path=tmp_path)
     lines = [line.split() for line in output.splitlines()]
     assert len(lines) == 93

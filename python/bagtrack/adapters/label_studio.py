@@ -18,6 +18,7 @@ import numpy.typing as npt
 from label_studio_ml.model import LabelStudioMLBase
 
 import bagtrack
+from bagtrack.propagation import read_video
 
 KIND = "videorectangle"
 
@@ -87,20 +88,6 @@ class BagTrack(LabelStudioMLBase):  # type: ignore[misc]
 
 def frames(video: str, first: int, count: int) -> Iterator[tuple[int, npt.NDArray[np.uint8], float]]:
     """Number (from 1), pixels and time in seconds of at most `count` frames from `first` on."""
-    capture = cv2.VideoCapture(video)
-    if not capture.isOpened():
-        raise ValueError(f"{video} cannot be read as a video")
-    rate = capture.get(cv2.CAP_PROP_FPS) or 25.0
-    try:
-        for number in range(1, first + count):
-            if number < first:
-                # Seeking by frame numbers is not exact with all codecs.
-                if not capture.grab():
-                    return
-                continue
-            ok, frame = capture.read()
-            if not ok:
-                return
-            yield number, frame.astype(np.uint8, copy=False), (number - 1) / rate
-    finally:
-        capture.release()
+    rate = cv2.VideoCapture(video).get(cv2.CAP_PROP_FPS) or 25.0
+    for number, frame in read_video(Path(video), first - 1, first - 1 + count):
+        yield number + 1, frame, number / rate
