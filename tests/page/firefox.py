@@ -98,7 +98,10 @@ def main():
         downloads = pathlib.Path(folder) / "downloads"
         downloads.mkdir()
         prefs = {"browser.download.folderList": 2, "browser.download.dir": str(downloads)}
-        firefox = Marionette(bin="/usr/bin/firefox-esr", port=free_port(), headless=True, prefs=prefs)
+        log = str(pathlib.Path(folder) / "gecko.log")
+        firefox = Marionette(
+            bin="/usr/bin/firefox-esr", port=free_port(), headless=True, prefs=prefs, gecko_log=log
+        )
         try:
             firefox.start_session()
             print(f"Firefox {firefox.session_capabilities['browserVersion']}")
