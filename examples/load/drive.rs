@@ -79,6 +79,22 @@ impl Driver {
         }
     }
 
+    /// Where the server is.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// The address that opens a session.
+    pub fn opening(&self) -> String {
+        let bagtrack_client::Rect {
+            x,
+            y,
+            width,
+            height,
+        } = self.target;
+        format!("{}/sessions?box={x},{y},{width},{height}", self.url)
+    }
+
     /// A client with so many connections. It sends every request once, so that a failure is seen and each latency is
     /// that of one request; and it takes no snapshots, which would be in some latencies.
     pub fn client(&self, connections: usize) -> Result<Client, ClientError> {

@@ -9,6 +9,8 @@
 //! - the processor time of the server process for a frame against that of decoding and tracking. The speed of a
 //!   shared machine varies, so a measurement has parts, and the two are measured in turns.
 //!
+//! With `--overload TIMES` more frames come than get done, and it prints what becomes of them.
+//!
 //! With `--churn SECONDS` sessions come and go, and it compares the server's memory at the end with that before. With
 //! `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
 //!
@@ -18,6 +20,7 @@ mod churn;
 mod drive;
 mod in_process;
 mod memory;
+mod overload;
 mod process;
 
 use bagtrack_testing::bench_pictures as pictures;
@@ -33,6 +36,9 @@ use tokio::runtime::Runtime;
 
 /// Parts of a measurement.
 const PARTS: u32 = 10;
+
+/// No server here gets through more in a second.
+const MOST_FRAMES: f64 = 2_000.0;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -63,6 +69,10 @@ struct Options {
     /// and do nothing else.
     #[arg(long)]
     churn: Option<u64>,
+    /// So many times the frames that `--sessions` sessions get through, from cameras of ten frames a second, for `--seconds`
+    /// each; and nothing else.
+    #[arg(long, value_delimiter = ',')]
+    overload: Vec<f64>,
     /// The server's binary; otherwise `bagtrack` beside this program's folder.
     #[arg(long)]
     server: Option<PathBuf>,
@@ -83,13 +93,43 @@ fn main() -> Outcome<()> {
 
     // No session ends while others are still being opened, except where that is what is measured.
     let idle = if options.churn.is_some() { "1m" } else { "1d" };
-    let server = Server::start(options.server.clone(), options.sessions, idle)?;
+    let mut flags = vec!["--session-idle", idle];
+    match options.overload.is_empty() {
+        // Many sessions of one client wait for each other.
+        true => flags.extend(["--queue-delay", "0s"]),
+        false => flags.extend(["--trusted-proxies", "127.0.0.1"]),
+    }
+    let room = options
+        .overload
+        .iter()
+        .fold(options.sessions, |most, times| {
+            most.max((times * MOST_FRAMES / 10.0) as u32)
+        });
+    let server = Server::start(options.server.clone(), room, &flags)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
     let driver = Driver::new(server.url(), pictures.clone(), target, preset);
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
+    }
+    if !options.overload.is_empty() {
+        let length = Duration::from_secs(options.seconds);
+        let mut done = Done::new()?;
+        return runtime.block_on(async {
+            let mut clients = driver.open(options.sessions).await?;
+            clients.run(options.frames, None, length, &mut done).await?;
+            clients.close().await?;
+            let knee = done.per_second();
+            println!(
+                "{} sessions, closed loop: {knee:.0} frames a second",
+                options.sessions
+            );
+            for times in &options.overload {
+                overload::run(&driver, knee, *times, length).await?;
+            }
+            Ok(())
+        });
     }
     if let Some(seconds) = options.churn {
         let rate = options.rate.unwrap_or(40.0);

@@ -28,8 +28,8 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts `binary` with room for so many sessions, which expire after `idle`, and waits until it listens.
-    pub fn start(binary: Option<PathBuf>, sessions: u32, idle: &str) -> Outcome<Self> {
+    /// Starts `binary` with room for so many sessions and these flags, and waits until it listens.
+    pub fn start(binary: Option<PathBuf>, sessions: u32, flags: &[&str]) -> Outcome<Self> {
         let binary = binary.unwrap_or_else(|| program("bagtrack"));
         let room = (3 * sessions + 16).to_string();
         let mut child = Command::new(&binary)
@@ -38,7 +38,7 @@ impl Server {
             // All clients have one address.
             .args(["--client-sessions", &room, "--client-requests", &room])
             .args(["--client-connections", &room])
-            .args(["--session-idle", idle])
+            .args(flags)
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()

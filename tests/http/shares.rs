@@ -168,3 +168,55 @@ async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
         "{number}, {slowest:?} of {took:?}"
     );
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.workers = Some(1);
+        config.queue_delay = Duration::from_millis(5);
+    });
+    let app = app.await;
+    let post = async |client: &str, id: &str| {
+        let path = format!("/sessions/{id}/frames");
+        let request = request_as(&app, client, &path, &[]);
+        request.body(pictures::png(1)).send().await.unwrap()
+    };
+    // Each sends its next frame once it has an answer, until one was refused.
+    let flood = async || {
+        let id = open(&app, GREEDY).await;
+        let mut frame = 0;
+        loop {
+            let answer = post(GREEDY, &id).await;
+            if answer.status() != StatusCode::OK {
+                let after = answer.headers()["retry-after"].clone();
+                expect_problem(answer, "queue-full").await;
+                break (id, frame, after);
+            }
+            frame += 1;
+        }
+    };
+    let floods = (0..48).map(|_| Box::pin(flood()));
+    let first_refusal = futures_util::future::select_all(floods);
+    let modest = async {
+        let id = open(&app, MODEST).await;
+        loop {
+            let answer = post(MODEST, &id).await;
+            expect(answer, StatusCode::OK).await;
+        }
+    };
+    let ((id, frame, after), ..) = tokio::select! {
+        refused = first_refusal => refused,
+        () = modest => unreachable!("it ends by a panic only"),
+        () = tokio::time::sleep(Duration::from_secs(60)) => panic!("none is refused"),
+    };
+    assert_eq!(after, "1");
+    let path = format!("/sessions/{id}");
+    let request = app.request(Method::GET, &path, &[]);
+    let view = request
+        .header("x-forwarded-for", GREEDY)
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(expect(view, StatusCode::OK).await["frames"], frame + 1);
+}

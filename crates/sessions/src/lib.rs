@@ -59,7 +59,7 @@ pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
-pub use scheduler::admission::{Admission, QueueFull, WorkPanicked, threads_of};
+pub use scheduler::admission::{Admission, NoOutcome, QueueFull, WorkPanicked, threads_of};
 pub use scheduler::budget::{Budget, BudgetFull, Charge};
 pub use scheduler::charged_bytes::ChargedBytes;
 pub use scheduler::fair_queue::WorkerSlot;

@@ -278,7 +278,7 @@ mod tests {
         let session = insert(&registry);
         let mut locked = session.enter().unwrap().lock().await.unwrap();
         let waiting = session.enter().unwrap();
-        let admission = Admission::new(9, 1).unwrap();
+        let admission = Admission::new(9, 1, Duration::ZERO).unwrap();
         let work = move |_: &mut WorkerSlot| {
             let _state = locked.state();
             panic!("a test panics in the work");

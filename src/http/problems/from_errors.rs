@@ -137,6 +137,11 @@ impl From<Stopped> for Problem {
                 );
                 Self::new(Kind::RequestTooCostly, detail)
             }
+            Stopped::Overload => {
+                let detail = "More frames of this client come than are done, and they wait too long for a worker. Send \
+                    fewer at a time, or try again after the time in `Retry-After`. Nothing was changed.";
+                Self::new(Kind::QueueFull, detail)
+            }
             // Nobody reads the answer to work that was abandoned.
             Stopped::Deadline | Stopped::Abandoned => Self::work_timeout(),
         }

@@ -155,7 +155,8 @@ kinds! {
         cause: "A fault of the service."
         cure: "Report it with the `request_id`: the log has the cause under this id."
     QueueFull: 503 "queue-full" "The service is busy"
-        cause: "More work waits than the service takes. Nothing was changed."
+        cause: "More work waits than the service takes, or the client's frames wait too long for a worker \
+            (`--queue-delay`). Nothing was changed."
         cure: "Try again after `Retry-After`."
     TooManySessions: 503 "too-many-sessions" "The service holds as many sessions as it may"
         cause: "There are `--max-sessions` live sessions, or as many as the memory allows."

@@ -72,7 +72,7 @@ impl AppState {
             settings: settings(&config),
             registry: registry(&config, &clock, store.is_some()),
             store,
-            admission: Admission::new(config.queue, config.worker_count())?,
+            admission: Admission::new(config.queue, config.worker_count(), config.queue_delay)?,
             streams: OpenStreams::default(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             keys: access.snapshots.clone(),

@@ -5,13 +5,13 @@
 
 use super::service::SessionService;
 use crate::clock::{self, timeout};
-use crate::{QueuePermit, Stopped, WorkLimit, WorkMeter, WorkPanicked};
+use crate::{NoOutcome, QueuePermit, Stopped, WorkLimit, WorkMeter, WorkPanicked};
 
 impl SessionService {
     /// Runs `work` on a worker.
     ///
     /// # Errors
-    /// Its time is over, it panicked, or its own error.
+    /// Its time is over, it waited too long for a worker, it panicked, or its own error.
     pub async fn run<T, E, F>(&self, queue: QueuePermit, work: F) -> Result<T, E>
     where
         T: Send + 'static,
@@ -29,7 +29,9 @@ impl SessionService {
             work(&mut limit.start(turn))
         });
         match timeout(self.settings.work_timeout, work).await {
-            Ok(done) => done?,
+            Ok(Ok(done)) => done,
+            Ok(Err(NoOutcome::Overload)) => Err(Stopped::Overload.into()),
+            Ok(Err(NoOutcome::Panicked(panicked))) => Err(panicked.into()),
             Err(_) => Err(Stopped::Deadline.into()),
         }
     }

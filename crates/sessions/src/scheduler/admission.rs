@@ -13,6 +13,7 @@ use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use tokio::sync::{Semaphore, oneshot};
 
 /// The queue is full; try again later.
@@ -31,6 +32,17 @@ impl WorkPanicked {
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
         Self(text.unwrap_or("a value that is not text").to_owned())
     }
+}
+
+/// Why work has no outcome.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NoOutcome {
+    /// It was not begun: the client's requests wait too long for a worker.
+    #[error("the client's requests wait too long")]
+    Overload,
+    /// It panicked.
+    #[error(transparent)]
+    Panicked(#[from] WorkPanicked),
 }
 
 /// Work that waits for a worker. Dropping it drops the work, if no worker has taken it.
@@ -65,16 +77,17 @@ pub struct Admission {
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work.
+    /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work. Where all
+    /// requests of a client wait longer than `delay`, those that wait twice as long are refused; none at zero.
     ///
     /// # Errors
     /// The system gives no threads for the workers.
-    pub fn new(queue: usize, workers: usize) -> io::Result<Self> {
+    pub fn new(queue: usize, workers: usize, delay: Duration) -> io::Result<Self> {
         // Of work on several frames, what has begun may wait between two of them.
         let threads = |class: SizeClass| Workers::new(threads_of(workers), class.niceness());
         Ok(Self {
             queue: Arc::new(Semaphore::new(queue)),
-            workers: FairQueue::new(workers),
+            workers: FairQueue::new(workers, delay),
             threads: Arc::new([threads(SizeClass::Small)?, threads(SizeClass::Large)?]),
         })
     }
@@ -98,11 +111,11 @@ impl Admission {
         self.rejoin(Ticket::new(flow, held))
     }
 
-    /// The same, but waits for a place, in order of arrival.
+    /// The same, but waits for a place, in order of arrival, and then for a worker, however long that takes.
     pub async fn enter_in_order(&self, flow: Flow, held: Reservation) -> QueuePermit {
         let place = self.queue.clone().acquire_owned().await;
         let place = place.expect("the queue is never closed");
-        QueuePermit::new(Ticket::new(flow, held), place)
+        QueuePermit::new(Ticket::new(flow, held), place).waiting()
     }
 
     /// Takes a place in the queue for a request that has left it.
@@ -118,13 +131,13 @@ impl Admission {
     /// dropped before a worker is free, the work is not done; afterwards it keeps its permits until it has ended.
     ///
     /// # Errors
-    /// The work panicked.
-    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, WorkPanicked>
+    /// The work panicked, or it waited too long for a worker.
+    pub async fn run<T, F>(&self, queue: QueuePermit, work: F) -> Result<T, NoOutcome>
     where
         T: Send + 'static,
         F: FnOnce(&mut WorkerSlot) -> T + Send + 'static,
     {
-        let (flow, length, expected) = queue.turn();
+        let asked = queue.asked();
         let span = tracing::Span::current();
         let (send, outcome) = oneshot::channel();
         // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
@@ -148,9 +161,10 @@ impl Admission {
             }));
             Ok(())
         };
-        self.workers.enter(flow, length, expected, Box::new(start));
-        let outcome = outcome.await.expect("all work ends, and says how");
-        outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()))
+        self.workers.enter(asked, Box::new(start));
+        // All work that begins ends, and says how.
+        let outcome = outcome.await.map_err(|_| NoOutcome::Overload)?;
+        outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()).into())
     }
 
     /// Places free in the queue.
@@ -176,7 +190,7 @@ mod tests {
 
     #[tokio::test]
     async fn the_queue_refuses_when_full_and_frees_on_drop() {
-        let admission = Admission::new(1, 1).unwrap();
+        let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let permit = enter(&admission).unwrap();
         assert_eq!(admission.check_place(), Err(QueueFull));
         assert_eq!(enter(&admission).unwrap_err(), QueueFull);
@@ -186,7 +200,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_free_place_goes_to_the_request_that_waited_longest() {
-        let admission = Admission::new(1, 1).unwrap();
+        let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let taken = enter(&admission).unwrap();
         let mut first = Box::pin(admission.enter_in_order(Flow(0), Box::new(())));
         let mut second = Box::pin(admission.enter_in_order(Flow(1), Box::new(())));
@@ -201,7 +215,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_cancelled_request_keeps_its_permits_until_the_work_has_ended() {
-        let admission = Admission::new(1, 1).unwrap();
+        let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let (started_tx, started) = mpsc::channel();
         let (finish, finish_rx) = mpsc::channel::<()>();
         let queue = enter(&admission).unwrap();
@@ -228,7 +242,7 @@ mod tests {
 
     #[tokio::test]
     async fn work_is_never_done_on_the_thread_that_asks_for_it() {
-        let admission = Admission::new(9, 2).unwrap();
+        let admission = Admission::new(9, 2, Duration::ZERO).unwrap();
         let here = std::thread::current().id();
         for _ in 0..20 {
             let queue = enter(&admission).unwrap();
@@ -240,7 +254,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
-        let admission = Admission::new(9, 1).unwrap();
+        let admission = Admission::new(9, 1, Duration::ZERO).unwrap();
         // A thread that starts late would be the one that became idle last.
         while format!("{:?}", admission.threads[0]) != "Workers(9 idle)" {
             tokio::task::yield_now().await;
@@ -268,7 +282,7 @@ mod tests {
 
     #[tokio::test]
     async fn work_whose_client_has_gone_before_it_began_is_not_done() {
-        let admission = Admission::new(2, 1).unwrap();
+        let admission = Admission::new(2, 1, Duration::ZERO).unwrap();
         let (go, wait) = mpsc::channel::<()>();
         let first = enter(&admission).unwrap();
         let mut first = Box::pin(admission.run(first, move |_| wait.recv().unwrap()));
@@ -286,11 +300,12 @@ mod tests {
 
     #[tokio::test]
     async fn a_panic_is_an_error_and_frees_the_permits() {
-        let admission = Admission::new(1, 1).unwrap();
+        let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let queue = enter(&admission).unwrap();
         let result = admission.run(queue, |_| panic!("a test panics")).await;
-        let panicked: Result<(), WorkPanicked> = result;
-        assert_eq!(panicked, Err(WorkPanicked("a test panics".to_owned())));
+        let panicked: Result<(), NoOutcome> = result;
+        let told = WorkPanicked("a test panics".to_owned());
+        assert_eq!(panicked, Err(NoOutcome::Panicked(told)));
         assert_eq!((admission.queue_places(), admission.busy_workers()), (1, 0));
     }
 }

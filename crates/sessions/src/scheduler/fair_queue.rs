@@ -13,7 +13,7 @@
 //! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
 
 use super::cpu_time::thread_cpu_time;
-use super::flows::{Flow, Flows, Held, Job, SizeClass};
+use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -25,6 +25,17 @@ type Give = Box<dyn FnOnce(WorkerSlot) -> Result<(), WorkerSlot> + Send>;
 /// The queue. Clones are the same one.
 #[derive(Clone)]
 pub(super) struct FairQueue(Arc<Mutex<Flows<Give>>>);
+
+/// What a request asks of the queue.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    pub(super) flow: Flow,
+    pub(super) length: Job,
+    /// About what its longest part takes, as far as that is known.
+    pub(super) expected: Duration,
+    /// Whether it is refused rather than answered late.
+    pub(super) may_refuse: bool,
+}
 
 /// A worker, given back when this is dropped.
 #[derive(Debug)]
@@ -43,22 +54,30 @@ pub struct WorkerSlot {
 }
 
 impl FairQueue {
-    /// For so many workers.
-    pub(super) fn new(workers: usize) -> Self {
-        Self(Arc::new(Mutex::new(Flows::new(workers))))
+    /// For so many workers. `delay` is the target of what a flow's requests wait; zero where they may wait for ever.
+    pub(super) fn new(workers: usize, delay: Duration) -> Self {
+        Self(Arc::new(Mutex::new(Flows::new(workers, delay))))
     }
 
-    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. The work takes about
-    /// `expected`, as far as that is known.
-    pub(super) fn enter(&self, flow: Flow, length: Job, expected: Duration, give: Give) {
+    /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. It is dropped where the
+    /// request has waited too long.
+    pub(super) fn enter(&self, asked: Asked, give: Give) {
+        let Asked {
+            flow,
+            length,
+            expected,
+            may_refuse,
+        } = asked;
         let worker = {
             let mut state = self.lock();
             state.forget_idle_flows();
             state.enter(flow, expected);
+            let since = may_refuse.then(|| state.time());
             let Some(worker) = state.worker_for(&state.flows[&flow], length) else {
-                let requests = &mut state.flows.entry(flow).or_default().requests;
-                return requests.push_back((length, give));
+                return state.wait(flow, length, give, since);
             };
+            // It has not waited, which is noted.
+            state.order(flow, since);
             state.serve(flow, length, worker);
             worker
         };
@@ -71,7 +90,13 @@ impl FairQueue {
     pub(super) fn ask(&self, flow: Flow, length: Job) -> oneshot::Receiver<WorkerSlot> {
         let (give, given) = oneshot::channel();
         let give = Box::new(|turn| give.send(turn));
-        self.enter(flow, length, Duration::ZERO, give);
+        let asked = Asked {
+            flow,
+            length,
+            expected: Duration::ZERO,
+            may_refuse: false,
+        };
+        self.enter(asked, give);
         given
     }
 
@@ -94,8 +119,11 @@ impl FairQueue {
             }
             let (give, given) = oneshot::channel();
             let own = state.flows.get_mut(&flow)?;
-            let give: Give = Box::new(|turn| give.send(turn));
-            own.requests.push_front((Job::ResumedBatch(class), give));
+            own.requests.push_front(Request {
+                length: Job::ResumedBatch(class),
+                give: Box::new(|turn| give.send(turn)),
+                since: None,
+            });
             given
         };
         self.hand_on(flow, class, held);
@@ -124,7 +152,13 @@ impl FairQueue {
                     state.release(flow, class, held);
                 }
                 match state.next() {
-                    Some(next) => next,
+                    Some(Next::Served(flow, length, class, give)) => (flow, length, class, give),
+                    Some(Next::Refused(give)) => {
+                        // What waits for it wakes up.
+                        drop(state);
+                        drop(give);
+                        continue;
+                    }
                     None => return,
                 }
             };
@@ -222,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_client_with_one_request_does_not_wait_behind_all_of_another() {
-        let queue = FairQueue::new(1);
+        let queue = FairQueue::new(1, Duration::ZERO);
         let mut first = given(&mut queue.ask(Flow(1), Job::Single));
         first.begin();
         let mut asked: Vec<_> = (0..20).map(|_| queue.ask(Flow(1), Job::Single)).collect();
@@ -235,7 +269,7 @@ mod tests {
 
     #[test]
     fn work_on_many_frames_lets_others_go_between_two_of_them() {
-        let queue = FairQueue::new(1);
+        let queue = FairQueue::new(1, Duration::ZERO);
         let mut long = given(&mut queue.ask(Flow(1), Job::Batch));
         // Nobody waits.
         long.yield_to_others();
@@ -260,7 +294,7 @@ mod tests {
 
     #[test]
     fn work_on_one_frame_keeps_its_worker() {
-        let queue = FairQueue::new(1);
+        let queue = FairQueue::new(1, Duration::ZERO);
         let mut short = given(&mut queue.ask(Flow(1), Job::Single));
         let mut other = queue.ask(Flow(2), Job::Batch);
         // It would wait for ever for the other, which ends on this thread.
@@ -272,7 +306,7 @@ mod tests {
 
     #[test]
     fn quick_work_never_waits_behind_slow_work() {
-        let queue = FairQueue::new(1);
+        let queue = FairQueue::new(1, Duration::ZERO);
         let mut first = given(&mut queue.ask(Flow(1), Job::Single));
         // It took as long as a large picture takes.
         first.queue = None;
@@ -297,7 +331,7 @@ mod tests {
 
     #[test]
     fn requests_whose_clients_have_gone_lose_no_worker() {
-        let queue = FairQueue::new(1);
+        let queue = FairQueue::new(1, Duration::ZERO);
         let turn = given(&mut queue.ask(Flow(1), Job::Single));
         drop(queue.ask(Flow(2), Job::Single));
         drop(turn);

@@ -1,5 +1,6 @@
 //! The requests that wait, in a flow for each client, and which of them is next.
 
+use super::controlled_delay::{ControlledDelay, Order};
 use crate::clock::{self, Instant};
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
@@ -30,6 +31,8 @@ pub(super) struct Flows<G> {
     /// The virtual time: the greatest that a flow of each class had used when it was served.
     now: [Duration; 2],
     pub(super) flows: HashMap<Flow, Waiting<G>>,
+    /// The target of the delay of a flow's requests; zero where they may wait for ever.
+    delay: Duration,
     /// How often a request became the first of its flow.
     firsts: u64,
     started: Instant,
@@ -47,11 +50,30 @@ pub(super) struct Waiting<G> {
     quick: usize,
     /// Requests with several frames that have begun and not ended.
     begun: usize,
-    pub(super) requests: VecDeque<(Job, G)>,
+    pub(super) requests: VecDeque<Request<G>>,
+    delay: ControlledDelay,
     /// Orders flows that have used the same time: those that start level are many.
     since: u64,
     class: SizeClass,
     longest: Faded,
+}
+
+/// A request that waits.
+#[derive(Debug)]
+pub(super) struct Request<G> {
+    pub(super) length: Job,
+    pub(super) give: G,
+    /// When it came, where it may be refused.
+    pub(super) since: Option<Duration>,
+}
+
+/// What becomes of the request whose turn it is.
+#[derive(Debug)]
+pub(super) enum Next<G> {
+    /// It has a worker of this class.
+    Served(Flow, Job, SizeClass, G),
+    /// It has waited too long.
+    Refused(G),
 }
 
 /// The longest time that a worker was held without a break, less what has faded since.
@@ -125,10 +147,11 @@ pub(super) fn max_begun(workers: usize) -> usize {
 }
 
 impl<G> Flows<G> {
-    /// For so many workers of each class.
-    pub(super) fn new(workers: usize) -> Self {
+    /// For so many workers of each class, and this target of the delay.
+    pub(super) fn new(workers: usize, delay: Duration) -> Self {
         Self {
             workers,
+            delay,
             running: [0; 2],
             begun: 0,
             now: [Duration::ZERO; 2],
@@ -145,7 +168,7 @@ impl<G> Flows<G> {
         self.running.iter().sum()
     }
 
-    fn time(&self) -> Duration {
+    pub(super) fn time(&self) -> Duration {
         #[cfg(test)]
         return self.started.elapsed() + self.passed;
         #[cfg(not(test))]
@@ -165,6 +188,29 @@ impl<G> Flows<G> {
             waiting.since = self.firsts;
         }
         waiting
+    }
+
+    /// A request of the flow waits, from now on where it may be refused.
+    pub(super) fn wait(&mut self, flow: Flow, length: Job, give: G, since: Option<Duration>) {
+        let request = Request {
+            length,
+            give,
+            since,
+        };
+        let waiting = self.flows.entry(flow).or_default();
+        waiting.requests.push_back(request);
+    }
+
+    /// Which request of a flow is next, whose oldest came at `since`, if that may be refused. Slow work may wait longer: as
+    /// long as it takes itself.
+    pub(super) fn order(&mut self, flow: Flow, since: Option<Duration>) -> Order {
+        let now = self.time();
+        let waiting = self.flows.get_mut(&flow);
+        let (Some(since), Some(waiting), false) = (since, waiting, self.delay.is_zero()) else {
+            return Order::Oldest;
+        };
+        let target = self.delay.max(waiting.longest.at(now));
+        waiting.delay.order(now.saturating_sub(since), now, target)
     }
 
     /// Notes work of a flow that took so long without a break, or will. Flows of another class have other times, so one
@@ -205,8 +251,8 @@ impl<G> Flows<G> {
 
     /// The claim of the first request of a flow, where it may have a worker.
     fn claim(&self, waiting: &Waiting<G>) -> Option<Claim> {
-        let (length, _) = waiting.requests.front()?;
-        let worker = self.worker_for(waiting, *length)?;
+        let length = waiting.requests.front()?.length;
+        let worker = self.worker_for(waiting, length)?;
         Some((worker != waiting.class, waiting.running, waiting.used))
     }
 
@@ -224,20 +270,31 @@ impl<G> Flows<G> {
         has_better
     }
 
-    pub(super) fn next(&mut self) -> Option<(Flow, Job, SizeClass, G)> {
+    /// The request with the best claim; none where no request may have a worker.
+    pub(super) fn next(&mut self) -> Option<Next<G>> {
         let claims = self.flows.iter().filter_map(|(flow, waiting)| {
             let claim = self.claim(waiting)?;
             Some(((claim, waiting.since), *flow))
         });
         let (_, flow) = claims.min_by_key(|(claim, _)| *claim)?;
         let waiting = &self.flows[&flow];
-        let worker = self.worker_for(waiting, waiting.requests.front()?.0)?;
-        let waiting = self.flows.get_mut(&flow)?;
-        let (length, give) = waiting.requests.pop_front()?;
+        let oldest = waiting.requests.front()?;
+        let worker = self.worker_for(waiting, oldest.length)?;
+        let order = self.order(flow, oldest.since);
+        let requests = &mut self.flows.get_mut(&flow)?.requests;
+        let is_newest = order == Order::Newest && requests.back()?.since.is_some();
+        let request = match is_newest {
+            true => requests.pop_back(),
+            false => requests.pop_front(),
+        };
+        let Request { length, give, .. } = request?;
+        if order == Order::Refuse {
+            return Some(Next::Refused(give));
+        }
         self.firsts += 1;
-        waiting.since = self.firsts;
+        self.flows.get_mut(&flow)?.since = self.firsts;
         self.serve(flow, length, worker);
-        Some((flow, length, worker, give))
+        Some(Next::Served(flow, length, worker, give))
     }
 
     /// Takes a worker for a flow.
@@ -297,6 +354,7 @@ impl<G> Default for Waiting<G> {
             quick: 0,
             begun: 0,
             requests: VecDeque::new(),
+            delay: ControlledDelay::default(),
             since: 0,
             class: SizeClass::Small,
             longest: Faded::default(),
@@ -326,7 +384,7 @@ mod tests {
 
     #[test]
     fn slow_work_is_remembered_in_time_and_no_number_of_quick_works_hides_it() {
-        let mut flows = Flows::<()>::new(1);
+        let mut flows = Flows::<()>::new(1, Duration::ZERO);
         assert_eq!(work(&mut flows, 1, 1_000), SizeClass::Small);
         // Forty works of a fifth of a millisecond once made the flow quick again.
         assert!((0..1_000).all(|_| work(&mut flows, 1, 0) == SizeClass::Large));
@@ -338,7 +396,7 @@ mod tests {
 
     #[test]
     fn a_flow_whose_work_is_announced_as_slow_has_no_quick_worker() {
-        let mut flows = Flows::<()>::new(2);
+        let mut flows = Flows::<()>::new(2, Duration::ZERO);
         let expected = Duration::from_millis(100);
         flows.enter(Flow(1), expected);
         let worker = flows.worker_for(&flows.flows[&Flow(1)], Job::Single);
@@ -347,7 +405,7 @@ mod tests {
 
     #[test]
     fn a_flow_has_one_quick_worker_and_borrows_others_while_nobody_wants_them() {
-        let mut flows = Flows::<u64>::new(3);
+        let mut flows = Flows::<u64>::new(3, Duration::ZERO);
         let mut workers = Vec::new();
         for _ in 0..4 {
             flows.enter(Flow(1), Duration::ZERO);
@@ -369,12 +427,12 @@ mod tests {
         flows.enter(Flow(3), Duration::from_secs(1));
         ask(&mut flows, 3);
         flows.release(Flow(1), SizeClass::Large, Held::default());
-        assert_eq!(flows.next().map(|(flow, ..)| flow), Some(Flow(3)));
+        assert!(matches!(flows.next(), Some(Next::Served(Flow(3), ..))));
     }
 
     #[test]
     fn a_flow_without_a_begun_batch_begins_one_beside_those_of_another() {
-        let mut flows = Flows::<u64>::new(2);
+        let mut flows = Flows::<u64>::new(2, Duration::ZERO);
         let begin = |flows: &mut Flows<u64>, flow| {
             flows.enter(Flow(flow), Duration::ZERO);
             flows.has_place(&flows.flows[&Flow(flow)], Job::Batch)
@@ -391,13 +449,16 @@ mod tests {
 
     /// A request of `flow`, which waits.
     fn ask(flows: &mut Flows<u64>, flow: u64) {
-        let waiting = flows.enter(Flow(flow), Duration::ZERO);
-        waiting.requests.push_back((Job::Single, flow));
+        flows.enter(Flow(flow), Duration::ZERO);
+        let since = Some(flows.time());
+        flows.wait(Flow(flow), Job::Single, flow, since);
     }
 
     /// The flow that is served next. Its work takes a millisecond.
     fn served(flows: &mut Flows<u64>) -> u64 {
-        let (flow, _, class, request) = flows.next().expect("a request waits");
+        let Some(Next::Served(flow, _, class, request)) = flows.next() else {
+            panic!("a request waits, and none is refused");
+        };
         let time = Duration::from_millis(1);
         let held = Held {
             time,
@@ -411,7 +472,7 @@ mod tests {
     #[test]
     fn a_flow_with_one_request_is_not_overtaken_by_those_that_come_after_it() {
         for first in 0..20 {
-            let mut flows = Flows::new(1);
+            let mut flows = Flows::new(1, Duration::ZERO);
             ask(&mut flows, first);
             (20..40).for_each(|flow| ask(&mut flows, flow));
             assert_eq!(served(&mut flows), first);
@@ -420,7 +481,7 @@ mod tests {
 
     #[test]
     fn a_client_that_uses_less_than_its_share_is_served_before_those_that_always_have_work() {
-        let mut flows = Flows::new(1);
+        let mut flows = Flows::new(1, Duration::ZERO);
         (1..=5).for_each(|flow| ask(&mut flows, flow));
         for turn in 0..1_000 {
             // A sixth of the requests would be its share.
@@ -434,8 +495,42 @@ mod tests {
     }
 
     #[test]
+    fn a_flow_with_too_many_requests_answers_the_newest_and_refuses_the_oldest() {
+        const TURN: Duration = Duration::from_millis(5);
+        let mut flows = Flows::<(u64, u32)>::new(1, Duration::from_millis(75));
+        let (mut refused, mut waited) = (Vec::new(), Vec::new());
+        for turn in 0..400 {
+            flows.passed += TURN;
+            // Of one twice as many come as there is time for, of the other few.
+            let other = (turn % 4 == 0).then_some(2);
+            for flow in [1, 1].into_iter().chain(other) {
+                flows.enter(Flow(flow), Duration::ZERO);
+                let since = Some(flows.time());
+                flows.wait(Flow(flow), Job::Single, (flow, turn), since);
+            }
+            loop {
+                match flows.next().expect("requests wait") {
+                    Next::Refused(request) => refused.push((request, turn)),
+                    Next::Served(flow, _, class, (_, since)) => {
+                        flows.release(flow, class, Held::default());
+                        waited.push(turn - since);
+                        break;
+                    }
+                }
+            }
+        }
+        assert_eq!(waited.len(), 400, "none for want of time");
+        assert!(refused.iter().all(|((flow, _), _)| *flow == 1));
+        let (_, first) = refused[0];
+        assert!(first >= 100, "a burst of half a second is worked off");
+        let waited = &mut waited[200..];
+        waited.sort_unstable();
+        assert!(waited[100] <= 2 && waited[199] <= 30, "{waited:?}");
+    }
+
+    #[test]
     fn a_client_that_was_idle_for_long_goes_first_for_a_moment_only() {
-        let mut flows = Flows::new(1);
+        let mut flows = Flows::new(1, Duration::ZERO);
         ask(&mut flows, 1);
         for _ in 0..1_000 {
             assert_eq!(served(&mut flows), 1);

@@ -1,5 +1,6 @@
 //! A request's place in the queue, and what it is to the workers.
 
+use super::fair_queue::Asked;
 use super::flows::{Flow, Job};
 use super::work_limit::CpuSpent;
 use std::any::Any;
@@ -29,6 +30,7 @@ pub struct Ticket {
     flow: Flow,
     length: Job,
     expected: Duration,
+    may_refuse: bool,
     cpu_share: u32,
     spent: CpuSpent,
     _held: Arc<Reservation>,
@@ -41,6 +43,7 @@ impl Ticket {
             flow,
             length: Job::Single,
             expected: Duration::ZERO,
+            may_refuse: true,
             cpu_share: 1,
             spent: CpuSpent::default(),
             _held: Arc::new(held),
@@ -57,16 +60,21 @@ impl QueuePermit {
         }
     }
 
-    /// Whose turn the request's work is done in, how much work it is, and how long its longest part takes, as far as
-    /// that is known.
-    pub(super) fn turn(&self) -> (Flow, Job, Duration) {
-        let Ticket {
-            flow,
-            length,
-            expected,
-            ..
-        } = self.request;
-        (flow, length, expected)
+    /// What the request asks of the workers. Work on several frames may wait: others go between.
+    pub(super) fn asked(&self) -> Asked {
+        let request = &self.request;
+        Asked {
+            flow: request.flow,
+            length: request.length,
+            expected: request.expected,
+            may_refuse: request.may_refuse && request.length == Job::Single,
+        }
+    }
+
+    /// For a client that sends no more before it has an answer: it waits for a worker, however long that takes.
+    pub(super) fn waiting(mut self) -> Self {
+        self.request.may_refuse = false;
+        self
     }
 
     /// For work on frames of at most so many pixels, whose files have at most so many bytes.

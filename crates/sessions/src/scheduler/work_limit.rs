@@ -16,6 +16,9 @@ pub enum Stopped {
     /// Nobody waits for the answer any more.
     #[error("the client has gone")]
     Abandoned,
+    /// It was not begun: the client's requests wait too long for a worker.
+    #[error("the client's requests wait too long")]
+    Overload,
     /// The time of the request is over.
     #[error("the deadline has passed")]
     Deadline,
@@ -149,7 +152,10 @@ mod tests {
 
     #[tokio::test]
     async fn each_limit_stops_the_work() {
-        let mut turn = FairQueue::new(1).ask(Flow(0), Job::Single).await.unwrap();
+        let mut turn = FairQueue::new(1, std::time::Duration::ZERO)
+            .ask(Flow(0), Job::Single)
+            .await
+            .unwrap();
         let soon = || clock::now() + LONG;
         let limit = WorkLimit::new(soon(), LONG, CpuSpent::default());
         let client = limit.abandon_on_drop();

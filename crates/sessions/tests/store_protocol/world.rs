@@ -104,7 +104,7 @@ impl Replica {
             },
             registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
             store: Some(Arc::new(store.clone())),
-            admission: Admission::new(64, 1).unwrap(),
+            admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
             streams: OpenStreams::default(),
             opened: IdempotencyStore::new(64),
             keys: Arc::new(MacKeys::new("bagtrack tests of stores", &["secret"])),

@@ -35,6 +35,8 @@ impl TestApplication {
         let mut config = Config {
             listen: "127.0.0.1:0".parse().unwrap(),
             workers: Some(2),
+            // A loaded machine refuses nothing.
+            queue_delay: Duration::from_secs(10),
             body_timeout: Duration::from_secs(60),
             work_timeout: Duration::from_secs(60),
             shutdown_delay: Duration::ZERO,

@@ -1,0 +1,92 @@
+//! When a client's requests wait too long: controlled delay with the newest first (Maurer, *Fail at Scale*, 2015, after
+//! CoDel, RFC 8289).
+//!
+//! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So while
+//! even the least wait of an interval was above the target, the newest request goes first, which is answered in time, and
+//! one that has waited twice the target is refused.
+
+use std::time::Duration;
+
+/// In which a queue has to be short once. A burst of this length is worked off in order.
+const INTERVAL: Duration = Duration::from_millis(500);
+
+/// How long the oldest request of a flow waits.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ControlledDelay {
+    /// When this interval ends.
+    until: Duration,
+    /// The least wait in it.
+    least: Duration,
+    is_overloaded: bool,
+}
+
+/// Which request of a flow is next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    /// The oldest.
+    Oldest,
+    /// The newest.
+    Newest,
+    /// None yet: the oldest is refused.
+    Refuse,
+}
+
+impl ControlledDelay {
+    /// Notes how long the oldest request `waited` when its flow's turn comes, `now`.
+    pub(super) fn order(&mut self, waited: Duration, now: Duration, target: Duration) -> Order {
+        if now < self.until {
+            self.least = self.least.min(waited);
+        } else {
+            // Of an interval that ended long ago nothing is left.
+            let is_recent = now < self.until + INTERVAL;
+            self.is_overloaded = is_recent && self.least > target;
+            (self.until, self.least) = (now + INTERVAL, waited);
+        }
+        match self.is_overloaded {
+            false => Order::Oldest,
+            true if waited > 2 * target => Order::Refuse,
+            true => Order::Newest,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TARGET: Duration = Duration::from_millis(75);
+    const LATE: Duration = Duration::from_millis(160);
+
+    /// What is next each ten milliseconds while the oldest has waited so long: the same all the time.
+    fn order(delay: &mut ControlledDelay, from: u64, to: u64, waited: Duration) -> Order {
+        let mut moments = (from..to).step_by(10).map(Duration::from_millis);
+        let mut order = || Some(delay.order(waited, moments.next()?, TARGET));
+        let first = order().expect("a moment");
+        while let Some(other) = order() {
+            assert_eq!(other, first);
+        }
+        first
+    }
+
+    #[test]
+    fn a_burst_is_worked_off_and_a_queue_that_stays_is_cut() {
+        let mut delay = ControlledDelay::default();
+        assert_eq!(order(&mut delay, 10_000, 10_490, LATE), Order::Oldest);
+        // The queue was short once.
+        assert_eq!(order(&mut delay, 10_490, 10_500, TARGET), Order::Oldest);
+        assert_eq!(order(&mut delay, 10_500, 11_000, LATE), Order::Oldest);
+        assert_eq!(order(&mut delay, 11_000, 11_500, LATE), Order::Refuse);
+        assert_eq!(order(&mut delay, 11_500, 12_000, 2 * TARGET), Order::Newest);
+    }
+
+    #[test]
+    fn it_ends_once_the_queue_is_short_or_was_empty() {
+        let mut delay = ControlledDelay::default();
+        order(&mut delay, 0, 500, LATE);
+        assert_eq!(order(&mut delay, 500, 990, LATE), Order::Refuse);
+        let mut after_a_pause = delay;
+        assert_eq!(order(&mut after_a_pause, 5_000, 5_500, LATE), Order::Oldest);
+        assert_eq!(order(&mut delay, 990, 1_000, Duration::ZERO), Order::Newest);
+        assert_eq!(order(&mut delay, 1_000, 1_500, LATE), Order::Oldest);
+    }
+}
