@@ -94,8 +94,10 @@ export class LocalFollower {
 
   /** @param {Uint8Array<ArrayBuffer>} saved */
   async restore(saved) {
-    this.session = await this.client.restore(saved);
-    return this.session.frame;
+    const session = await this.client.restore(saved);
+    this.session?.end().catch(() => undefined);
+    this.session = session;
+    return session.frame;
   }
 
   /** @param {Picture} picture
@@ -163,6 +165,7 @@ export class ServiceFollower {
   /** @param {Uint8Array<ArrayBuffer>} saved */
   async restore(saved) {
     const session = await this.client.restore(saved);
+    this.leave();
     this.connect(session);
     return session.frame;
   }
@@ -243,8 +246,12 @@ export class ServiceFollower {
   }
 
   end() {
-    const { session } = this;
     this.isOver = true;
+    this.leave();
+  }
+
+  leave() {
+    const { session } = this;
     this.session = undefined;
     this.stream?.close();
     // One that cannot be ended expires.

@@ -70,6 +70,9 @@ export class Session {
     this.kept = new Kept(origin);
     /** @type {Promise<unknown>} The requests before. */
     this.before = Promise.resolve();
+    /** @type {Promise<unknown>} The snapshot that was asked for last, by the way, is here. */
+    this.taking = Promise.resolve();
+    this.isEnded = false;
     /** @type {FrameStream | undefined} */
     this.open = undefined;
     this.isDraining = headers.get("draining") === "true";
@@ -157,6 +160,9 @@ export class Session {
   /** Ends the session. */
   async end() {
     this.kept = new Kept();
+    this.isEnded = true;
+    // Asked for after the end, it would be missed, and a page's console would say so.
+    await this.taking;
     try {
       await this.call("DELETE", "");
     } catch (error) {
@@ -252,14 +258,13 @@ export class Session {
   /** A snapshot of now or later; nothing where there is none for the moment.
    * @returns {Promise<import("./kept.js").Origin | undefined>} */
   async takeOrigin() {
+    if (this.isEnded) return undefined;
     const { transport } = this.client;
     const { id, frame } = this;
-    try {
-      const taken = await transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {});
-      return { frame, request: restoring(await taken.arrayBuffer()) };
-    } catch {
-      return undefined;
-    }
+    const taken = transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {}).catch(() => undefined);
+    this.taking = taken;
+    const response = await taken;
+    return response && { frame, request: restoring(await response.arrayBuffer()) };
   }
 
   /** Takes a snapshot; without it the older one and more frames are kept. */

@@ -271,6 +271,7 @@ export class FrameStream {
     if (code > OF_STATUS) return this.refusedFor(this.reason(code - OF_STATUS));
     this.breakLine();
     await pause(this.wait);
+    if (this.isEnded) return;
     this.wait = Math.min(2 * this.wait, LONGEST_PAUSE);
     // A page is not told why a stream cannot be opened; this call tells.
     const { transport } = this.session.client;
@@ -312,7 +313,10 @@ export class FrameStream {
     if (this.isEnded) return;
     this.isEnded = true;
     this.isUp = false;
-    this.socket?.close();
+    const { socket } = this;
+    // Answers that are under way are not taken any more.
+    this.socket = undefined;
+    socket?.close();
     this.session.hold(undefined);
     const left = this.waiting.splice(0);
     // The service may have these: they count, so a post or the next stream sends them again before its own.

@@ -44,7 +44,7 @@ class Checks:
             if not any(part in text for part in allowed):
                 self.faults.append(text)
 
-        page.on("console", lambda message: message.type == "error" and fault(f"console: {message.text}"))
+        page.on("console", lambda message: message.type == "error" and fault(f"console: {message.text} ({message.location.get('url')})"))
         page.on("pageerror", lambda error: fault(f"script: {error}"))
         own = ("http://127.0.0.1", "ws://127.0.0.1", url, url.replace("http", "ws"), "blob:", "data:")
         page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))

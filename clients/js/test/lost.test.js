@@ -166,3 +166,41 @@ test("what cannot be opened again is a problem: without snapshots, with another 
     await service.stop();
   }
 });
+
+test("a session ends after the snapshot that is under way, not before it", async () => {
+  const service = await startService([], SECRET);
+  const { fetch } = globalThis;
+  const asked = /** @type {string[]} */ ([]);
+  const statuses = /** @type {number[]} */ ([]);
+  let release = () => undefined;
+  let isHeld = (/** @type {unknown} */ _) => undefined;
+  const held = new Promise((resolve) => (isHeld = resolve));
+  const released = new Promise((resolve) => (release = () => resolve(undefined)));
+  globalThis.fetch = async (url, options) => {
+    asked.push(`${options?.method} ${String(url).split("/").at(-1)}`);
+    if (String(url).endsWith("/snapshot")) {
+      isHeld(undefined);
+      await released;
+    }
+    const response = await fetch(url, options);
+    statuses.push(response.status);
+    return response;
+  };
+  try {
+    const session = await open(service.url, 3);
+    const stream = session.stream();
+    for (const frame of clip.frames.slice(1, 4)) await stream.track(frame);
+    await held;
+    stream.close();
+    const ending = session.end();
+    await new Promise(setImmediate);
+    assert.equal(asked.at(-1), "GET snapshot");
+    release();
+    await ending;
+    assert.equal(asked.at(-1), `DELETE ${session.id}`);
+    assert.deepEqual(statuses.filter((status) => status >= 400), []);
+  } finally {
+    globalThis.fetch = fetch;
+    await service.stop();
+  }
+});

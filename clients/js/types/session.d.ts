@@ -58,6 +58,9 @@ export declare class Session {
     kept: Kept;
     /** @type {Promise<unknown>} The requests before. */
     before: Promise<unknown>;
+    /** @type {Promise<unknown>} The snapshot that was asked for last, by the way, is here. */
+    taking: Promise<unknown>;
+    isEnded: boolean;
     /** @type {FrameStream | undefined} */
     open: FrameStream | undefined;
     /**
