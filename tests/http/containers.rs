@@ -14,17 +14,14 @@ fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
     rest.1.split(after).next().unwrap().trim().trim_matches('"')
 }
 
-/// The settings of the program in a file of compose or Kubernetes that are plain values.
+/// The settings of the program in a file of compose or of the Helm chart that are plain values.
 fn settings(text: &str) -> Vec<(String, String)> {
     let lines = text
         .lines()
         .map(str::trim)
         .filter(|line| !line.starts_with('#'));
     let pairs = lines.filter_map(|line| {
-        let (name, value) = match line.strip_prefix("- {name: ") {
-            Some(rest) => rest.trim_end_matches('}').split_once(", value: ")?,
-            None => line.split_once(": ")?,
-        };
+        let (name, value) = line.split_once(": ")?;
         let is_number = value.trim_matches('"').parse::<u64>().is_ok();
         let is_setting = name.starts_with("BAGTRACK_") && is_number;
         is_setting.then(|| (name.to_owned(), value.trim_matches('"').to_owned()))
@@ -72,7 +69,7 @@ fn what_the_program_promises_fits_into_its_container_and_an_alert_comes_before_t
             "g",
         ),
         (
-            "kubernetes/deployment.yaml",
+            "../deploy/helm/values.yaml",
             "requests: {cpu: ",
             "limits: {memory: ",
             "Gi",
@@ -101,5 +98,20 @@ fn the_container_of_https_has_the_limits_of_the_one_without() {
     assert!(text.contains("file: compose.yaml\n      service: bagtrack\n"));
     for bound in ["BAGTRACK_MAX_", "mem_limit", "cpus"] {
         assert!(!text.contains(bound), "{bound} is set again");
+    }
+}
+
+/// ffmpeg writes what it reads of an MP4 or WebM to `/tmp`, where nothing can be written in a container whose files cannot.
+#[test]
+fn a_read_only_container_has_room_for_videos() {
+    let docker = Path::new(env!("CARGO_MANIFEST_DIR")).join("docker");
+    for file in ["compose.yaml", "compose.replicas.yaml"] {
+        let text = std::fs::read_to_string(docker.join(file)).unwrap();
+        assert!(text.contains("read_only: true"), "{file}");
+        let room = between(&text, "tmpfs: [\"/tmp:size=", "\"]");
+        let bodies = settings(&text)
+            .into_iter()
+            .find(|(name, _)| name == "BAGTRACK_MAX_UPLOAD_BYTES");
+        assert_eq!(bodies.expect("a bound of bodies").1, room, "{file}");
     }
 }

@@ -38,6 +38,7 @@ mod page;
 mod problem_page;
 mod problems;
 mod process;
+mod propagation;
 mod provoke;
 mod quotas;
 mod raw;

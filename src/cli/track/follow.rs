@@ -4,9 +4,9 @@ use super::drawn::{Destination, Drawn};
 use super::frames::{FrameFile, Frames};
 use super::interrupt::Interrupt;
 use super::rows::Rows;
-use super::selection::Selection;
 use super::targets::Targets;
 use crate::cli::formats::Row;
+use bagtrack_sessions::Selection;
 use bagtrack_tracker::{Params, Rect};
 use indicatif::ProgressBar;
 use std::error::Error;
@@ -25,7 +25,7 @@ pub struct Job {
     /// How many frames are tracked after the first one, at most.
     pub count: Option<u64>,
     /// Which boxes are written.
-    pub selection: Selection,
+    pub selection: Selection<Row>,
     /// Where boxes go.
     pub rows: Rows,
     /// Goes on by a step a frame.
@@ -103,17 +103,17 @@ impl Job {
         if let Some(drawn) = drawn {
             drawn.add(frame, &estimates)?;
         }
-        let rows = estimates
-            .into_iter()
-            .enumerate()
-            .map(|(target, estimate)| Row {
+        let answers = estimates.into_iter().enumerate();
+        let rows = self.selection.take(answers.map(|(target, estimate)| {
+            let row = Row {
                 frame: frame.index,
                 time: frame.time,
                 file: frame.file.clone(),
                 target,
                 estimate,
-            });
-        let rows = self.selection.take(rows.collect());
+            };
+            (estimate, row)
+        }));
         match write(&mut self.rows, &rows)? {
             Then::GoOn if self.selection.has_ended() => Ok(Then::Stop),
             then => Ok(then),

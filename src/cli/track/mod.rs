@@ -12,7 +12,6 @@ mod frames;
 mod interrupt;
 mod reversed;
 mod rows;
-mod selection;
 mod start;
 mod targets;
 mod video_file;
@@ -20,14 +19,13 @@ mod video_info;
 
 use super::formats::{Columns, Format};
 use bagtrack_cli::{BOXES, ParamFlags, progress, read_boxes};
-use bagtrack_sessions::MAX_TARGETS;
+use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
 use drawn::Destination;
 use follow::Job;
 use frames::{Direction, Frames};
 use interrupt::Interrupt;
 use rows::Rows;
-use selection::Selection;
 use start::Start;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -58,8 +56,8 @@ pub struct Args {
     /// Ends when all targets are lost. A target's last row is the one in which it is lost.
     #[arg(long)]
     until_lost: bool,
-    /// Writes only key frames: between two of them straight lines give every edge of every box to within a pixel. They
-    /// are written at the end. Where a target is lost, the run of lost frames has a key frame at each of its ends.
+    /// Writes only key frames: between two of them straight lines give every edge of every box to within a pixel. Where a
+    /// target is lost, the run of lost frames has a key frame at each of its ends.
     #[arg(long)]
     keyframes: bool,
     #[command(flatten)]

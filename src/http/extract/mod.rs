@@ -33,3 +33,4 @@ pub mod texts;
 pub mod uploaded;
 pub mod video_frames;
 pub mod video_place;
+pub mod video_range;

@@ -80,6 +80,11 @@ impl VideoFrames {
         })
     }
 
+    /// Decodes no more. The place stays taken until this is dropped.
+    pub fn end(&mut self) {
+        self.pictures.close();
+    }
+
     /// The next frame, as a JPEG file; none after the last.
     pub async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
         let next = timeout(self.patience, self.pictures.recv()).await;

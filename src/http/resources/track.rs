@@ -4,11 +4,14 @@ use super::track_video::{Track, VideoTrack};
 use crate::http::auth::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{FrameCount, Seed, Settings, TargetNumber};
+use crate::http::extract::settings::{
+    FrameCount, FrameNumber, Seed, Settings, Switch, TargetNumber,
+};
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::{Upload, admit};
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
+use crate::http::extract::video_range::{RangeFrames, VideoRange};
 use crate::http::openapi::example_frames;
 use crate::http::openapi::params_schema::ParametersText;
 use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
@@ -24,7 +27,7 @@ use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Request, State};
 use axum::response::{IntoResponse, Response};
 use bagtrack_ingest::video::VideoFormat;
-use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, TrackFrom, TrackedAway};
+use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, Selection, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -56,6 +59,26 @@ pub struct TrackSettings {
     #[serde(rename = "parameters")]
     #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
     params: Option<ParamOverrides>,
+    /// Of a video, the frame in which the boxes hold, counted from 0. Those before it are passed over.
+    #[param(value_type = FrameNumber, inline, required = false)]
+    start: Option<FrameNumber>,
+    /// Of a video, track at most so many frames after the first one.
+    #[param(value_type = FrameNumber, inline, required = false)]
+    count: Option<FrameNumber>,
+    /// Of a video, track from `start` back to frame 0. The frames in between are kept as JPEG files in the memory for
+    /// uploads; where they do not fit, `count` makes them fewer.
+    #[param(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    backwards: Switch,
+    /// Of a video, end when every target has been lost.
+    #[param(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    until_lost: Switch,
+    /// Of a video, answer only key frames: between two of them straight lines give every edge of every box to within a
+    /// pixel. Of several targets, the key frames of each.
+    #[param(value_type = bool, required = false, default = false)]
+    #[serde(default)]
+    keyframes: Switch,
 }
 
 impl Settings for TrackSettings {
@@ -87,7 +110,9 @@ pub struct Tracked {
 ///
 /// A video and a box are tracked to the video's end, where the service has an `ffmpeg`: a line of JSON for each frame
 /// (`application/x-ndjson`), as soon as it is tracked, the first one being the box. Where the rest cannot be tracked,
-/// the last line is a problem document.
+/// the last line is a problem document. `start`, `count`, `backwards`, `until_lost` and `keyframes` propagate the boxes
+/// from one frame through those after it, or before it; `frame` is then the number in the video. The boxes are those of
+/// `bagtrack track` with these options and the same seed.
 ///
 /// `curl -N --data-binary @clip.mp4 'http://localhost:8080/track?box=10,20,30,40'`
 ///
@@ -178,16 +203,37 @@ async fn track_video(
         return Err(Problem::malformed(detail));
     }
     let video = request.upload.files.swap_remove(0);
-    let (boxes, params) = begin(request.upload.settings)?;
+    let settings = request.upload.settings;
+    let range = range(&settings)?;
+    let (until_lost, keyframes) = (settings.until_lost.0, settings.keyframes.0);
+    let (boxes, params) = begin(settings)?;
     let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let targets = boxes.as_slice().len();
+    let pictures = VideoFrames::decode(&state, video, format, place)?;
     let frames = VideoTrack {
-        queue: queue.for_frames(boxes.as_slice().len()),
-        frames: VideoFrames::decode(&state, video, format, place)?,
+        queue: queue.for_frames(targets),
+        frames: RangeFrames::new(pictures, range, state.charge(&request.client)),
         client: request.client,
         track: Track::Start(boxes, params),
+        selection: Selection::new(targets, until_lost, keyframes),
+        end: None,
         state: state.clone(),
     };
     ndjson::respond(state, request.instance, frames).await
+}
+
+/// Which frames of a video are tracked.
+fn range(settings: &TrackSettings) -> Result<VideoRange, Problem> {
+    let backwards = settings.backwards.0;
+    if backwards && settings.start.is_none() {
+        let detail = "`backwards` goes from `start` to frame 0: give `start`, a frame's number.";
+        return Err(Problem::malformed(detail));
+    }
+    Ok(VideoRange {
+        start: settings.start.map_or(0, |number| number.0),
+        count: settings.count.map_or(u64::MAX, |number| number.0),
+        backwards,
+    })
 }
 
 /// What a new track begins with.
@@ -201,10 +247,23 @@ fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
     Ok((boxes, Box::new(params)))
 }
 
+/// Frames that are no video are all tracked, in their order.
+fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
+    let switches = [settings.backwards, settings.until_lost, settings.keyframes];
+    let is_given = settings.start.is_some() || settings.count.is_some();
+    match is_given || switches.contains(&Switch(true)) {
+        true => Err(Problem::malformed(
+            "`start`, `count`, `backwards`, `until_lost` and `keyframes` are for a video.",
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Where the track stands, and the frames.
 fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Problem> {
     let (settings, files) = (upload.settings, upload.files);
     let Some(snapshot) = upload.snapshot else {
+        check_no_range(&settings)?;
         let (boxes, params) = begin(settings)?;
         return Ok((TrackFrom::Start(boxes, params), files));
     };

@@ -87,6 +87,12 @@ impl Answer {
         self.warnings = warnings;
         self
     }
+
+    /// As the answer to the frame of this number.
+    pub fn numbered(mut self, frame: u64) -> Self {
+        self.frame = frame;
+        self
+    }
 }
 
 impl From<&Estimates> for Answer {
