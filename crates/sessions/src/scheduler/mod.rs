@@ -12,6 +12,7 @@ pub(crate) mod charged_bytes;
 mod cpu_time;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;
+mod places;
 pub(crate) mod queue_permit;
 pub(crate) mod work_limit;
 mod workers;
