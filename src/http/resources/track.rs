@@ -182,7 +182,7 @@ async fn track_video(
     let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let frames = VideoTrack {
         queue: queue.for_frames(boxes.as_slice().len()),
-        frames: VideoFrames::decode(&state, video, format, place)?,
+        frames: VideoFrames::decode(&state, video, format, place).await?,
         client: request.client,
         track: Track::Start(boxes, params),
         state: state.clone(),
