@@ -43,12 +43,14 @@ const MAX_HEALTH: Duration = Duration::from_millis(250);
 /// How long the service may take to give back all that was held, from the end of the attackers.
 const GIVEN_BACK: Duration = Duration::from_secs(60);
 /// What is held, by the names of its metrics.
-const HELD: [&str; 5] = [
+const HELD: [&str; 7] = [
     "bagtrack_requests_inside",
     "bagtrack_workers_busy",
     "bagtrack_upload_bytes",
     "bagtrack_videos",
     "bagtrack_sessions",
+    "bagtrack_session_bytes",
+    "bagtrack_streams",
 ];
 
 pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
@@ -148,7 +150,7 @@ pub async fn attackers(target: &Target, options: &Options) -> Outcome<()> {
         let seed = options.seed.wrapping_mul(1_000).wrapping_add(number);
         clients.spawn(async move {
             let mut client = RandomClient {
-                address: format!("198.51.100.{number}"),
+                address: address_of(number),
                 random: StdRng::seed_from_u64(seed),
                 sessions: Vec::new(),
                 target,
@@ -163,6 +165,14 @@ pub async fn attackers(target: &Target, options: &Options) -> Outcome<()> {
     }
     clients.join_all().await;
     Ok(())
+}
+
+/// Every third attacker is one of the same IPv6 network, the others have nothing in common.
+fn address_of(number: u64) -> String {
+    match number % 3 {
+        0 => format!("2001:db8:0:{number:x}::1"),
+        _ => format!("198.51.100.{number}"),
+    }
 }
 
 struct RandomClient {

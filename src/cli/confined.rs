@@ -1,7 +1,7 @@
 //! `bagtrack confined PROGRAM …`: gives up rights, then becomes the program. `serve` starts ffmpeg so.
 //!
-//! Landlock leaves it the system's programs and libraries to read, and `/tmp` for files of its own; a filter of system
-//! calls leaves it no sockets, and no way to look into other processes. Both hold for all that it starts, and cannot be
+//! Landlock leaves it the system's programs and libraries to read, and nothing to write; a filter of system calls leaves it
+//! no sockets, and no way to look into other processes. What it works on comes as its standard input. Both hold for all that it starts, and cannot be
 //! taken back. Where the system has none of them it runs without, which `serve` tells at its start.
 
 use std::error::Error;
@@ -26,8 +26,6 @@ const READABLE: [&str; 10] = [
     "/etc/ld.so.cache",
     "/dev/null",
 ];
-/// Where ffmpeg keeps what it has read, to go back in it.
-const TEMPORARY: &str = "/tmp";
 
 /// The program and its arguments.
 #[derive(Debug, clap::Args)]
@@ -96,16 +94,13 @@ fn restrict_files(folder: Option<&Path>) -> Result<(), Box<dyn Error>> {
         Scope, path_beneath_rules,
     };
     let abi = ABI::V6;
-    let temporary =
-        AccessFs::MakeReg | AccessFs::RemoveFile | AccessFs::ReadFile | AccessFs::WriteFile;
     let readable = READABLE.iter().map(Path::new).chain(folder);
     let rules = Ruleset::default()
         .handle_access(AccessFs::from_all(abi))?
         .handle_access(AccessNet::from_all(abi))?
         .scope(Scope::from_all(abi))?
         .create()?
-        .add_rules(path_beneath_rules(readable, AccessFs::from_read(abi)))?
-        .add_rules(path_beneath_rules([TEMPORARY], temporary))?;
+        .add_rules(path_beneath_rules(readable, AccessFs::from_read(abi)))?;
     match rules.restrict_self()?.ruleset {
         RulesetStatus::NotEnforced => Err("the kernel has no Landlock".into()),
         RulesetStatus::FullyEnforced | RulesetStatus::PartiallyEnforced => Ok(()),

@@ -10,6 +10,7 @@ use super::memory_limit;
 use super::open_files;
 use super::signals::{self, Reloaded, Signals};
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
+use bagtrack_ingest::video::Launcher;
 use std::error::Error;
 use std::net::SocketAddr;
 
@@ -88,11 +89,15 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
 
 /// Has ffmpeg started by this program, which gives up its rights before.
 fn confine_decoders(config: &mut Config) {
+    let hides_files = confined::works();
     match std::env::current_exe() {
-        Ok(program) => config.limits.ffmpeg_launcher = vec![program.into(), confined::NAME.into()],
+        Ok(program) => {
+            let words = vec![program.into(), confined::NAME.into()];
+            config.limits.ffmpeg_launcher = Launcher { words, hides_files };
+        }
         Err(error) => tracing::warn!(%error, "ffmpeg has the rights of the service"),
     }
-    if !confined::works() {
+    if !hides_files {
         tracing::warn!(
             "Landlock or seccomp is not to be had here: ffmpeg has more rights than it needs"
         );

@@ -31,6 +31,7 @@ mod log;
 mod manners;
 mod metrics;
 mod mistakes;
+mod multer;
 mod openapi;
 mod openapi_examples;
 mod origins;

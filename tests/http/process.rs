@@ -61,9 +61,13 @@ impl Service {
         format!("http://{}{path}", self.address)
     }
 
+    pub fn process_id(&self) -> u32 {
+        self.process.id().expect("it runs")
+    }
+
     pub fn signal(&self, signal: Signal) {
-        let id = self.process.id().expect("it runs");
-        let id = Pid::from_raw(i32::try_from(id).unwrap()).unwrap();
+        let id = i32::try_from(self.process_id()).unwrap();
+        let id = Pid::from_raw(id).unwrap();
         kill_process(id, signal).unwrap();
     }
 

@@ -2,7 +2,10 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
+use crate::metrics::{metrics, value};
 use crate::pictures;
+use crate::raw::RawConnection;
+use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::Config;
 use image::{GrayImage, ImageFormat, Luma};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
@@ -65,6 +68,254 @@ async fn one_client_with_costly_sessions_leaves_memory_for_those_of_others() {
     assert!(detail.contains("bytes of sessions"), "{detail}");
     assert!(opened >= 2, "{opened}");
     expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
+    let id = open(&app, MODEST).await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+}
+
+/// How many dear sessions a client gets until it is refused, and what it is told then.
+async fn open_all(app: &TestApplication, client: &str) -> (usize, Response) {
+    let mut opened = 0;
+    loop {
+        let answer = open_dear(app, client).await;
+        if answer.status() != StatusCode::CREATED {
+            return (opened, answer);
+        }
+        opened += 1;
+    }
+}
+
+#[tokio::test]
+async fn the_share_of_sessions_shrinks_with_each_client_and_the_next_one_still_opens_some() {
+    // The defaults, but for more sessions than memory for dear ones.
+    let app = TestApplication::start_with(behind_a_proxy).await;
+    let mut shares = Vec::new();
+    for client in 1..=6 {
+        let (opened, refused) = open_all(&app, &format!("198.51.100.{client}")).await;
+        // Three have their quarters, and those after them half of what is left.
+        let slug = match client {
+            1..=3 => "quota-exceeded",
+            _ => "too-many-sessions",
+        };
+        expect_problem(refused, slug).await;
+        shares.push(opened);
+    }
+    println!("{shares:?}");
+    assert_eq!(shares[0], shares[1]);
+    assert_eq!(shares[0], shares[2]);
+    assert!(shares[3] < shares[2], "{shares:?}");
+    for (before, after) in shares[3..].iter().zip(&shares[4..]) {
+        assert!(*after >= 1 && after * 2 <= before + 1, "{shares:?}");
+    }
+    expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
+    let id = open(&app, MODEST).await;
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+}
+
+/// Bytes of a body that is held, and of the memory for all of them.
+const HELD: usize = 1 << 20;
+const UPLOADS: usize = 8 * HELD;
+
+async fn small_uploads() -> TestApplication {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.max_body_bytes = HELD;
+        config.max_upload_bytes = UPLOADS;
+        config.body_timeout = Duration::from_secs(20);
+    });
+    app.await
+}
+
+async fn upload_bytes(app: &TestApplication) -> usize {
+    value(&metrics(app).await, "bagtrack_upload_bytes", &[]) as usize
+}
+
+/// Sends a body but for its last byte; nothing where it is refused, what holds its memory otherwise.
+async fn hold_body(app: &TestApplication, client: &str) -> Option<RawConnection> {
+    let before = upload_bytes(app).await;
+    let lines = format!("X-Forwarded-For: {client}\r\nContent-Length: {HELD}");
+    let mut body = RawConnection::hold_with(app.address, "POST", "/sessions", &lines).await;
+    // It may be refused before all of it has come.
+    let _ = body.try_send(vec![7; HELD - 1]).await;
+    loop {
+        tokio::select! {
+            answer = body.read_answer() => {
+                assert!(answer.starts_with("HTTP/1.1 503") || answer.starts_with("HTTP/1.1 429"), "{answer}");
+                return None;
+            }
+            held = upload_bytes(app) => if held >= before + HELD {
+                return Some(body);
+            },
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_others_upload() {
+    for network in [
+        // Of 64 bits, of 56, and of 48.
+        |client: u16| format!("2001:db8:1:2::{client:x}"),
+        |client: u16| format!("2001:db8:1:{client:x}::1"),
+        |client: u16| format!("2001:db8:1:{client:x}00::1"),
+    ] {
+        let app = small_uploads().await;
+        let mut held = Vec::new();
+        for client in 1..=6 {
+            held.extend(hold_body(&app, &network(client)).await);
+        }
+        // One client may hold a quarter, and a network no more than is free.
+        let of_one_client = network(1).split("::").next() == network(2).split("::").next();
+        let most = if of_one_client { 2 } else { 4 };
+        assert_eq!(held.len(), most, "{}", network(1));
+        let mut picture = pictures::png(0);
+        picture.resize(HELD, 0);
+        for other in [MODEST, "2001:db8:2::1"] {
+            let request = request_as(&app, other, "/sessions", &[("box", BOX)]);
+            let opened = request.body(picture.clone()).send().await.unwrap();
+            expect(opened, StatusCode::CREATED).await;
+        }
+        drop(held);
+        let freed = async { while upload_bytes(&app).await > 0 {} };
+        tokio::time::timeout(Duration::from_secs(60), freed)
+            .await
+            .expect("all is given back");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_share_of_the_memory_for_bodies_shrinks_and_the_next_client_uploads() {
+    let app = small_uploads().await;
+    let mut shares = Vec::new();
+    let mut held = Vec::new();
+    for client in 1..=5 {
+        let before = held.len();
+        for _ in 0..3 {
+            held.extend(hold_body(&app, &format!("198.51.100.{client}")).await);
+        }
+        shares.push(held.len() - before);
+    }
+    assert_eq!(shares, [2, 2, 2, 1, 0]);
+    // A frame of usual size still goes through, whoever sends it.
+    let id = open(&app, MODEST).await;
+    let post = request_as(&app, MODEST, &format!("/sessions/{id}/frames"), &[]);
+    let answer = post.body(pictures::png(1)).send().await.unwrap();
+    expect(answer, StatusCode::OK).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_deadline() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.max_body_bytes = HELD;
+        config.max_upload_bytes = UPLOADS;
+        config.body_timeout = Duration::from_secs(3);
+    });
+    let app = app.await;
+    let mut streams = Vec::new();
+    for client in 1..=4 {
+        let address = format!("2001:db8:1:{client}::1");
+        for _ in 0..4 {
+            let id = open(&app, &address).await;
+            let headers = [("x-forwarded-for", address.as_str())];
+            let stream = StreamClient::try_open(app.address, &id, "", &headers).await;
+            streams.push(stream.unwrap_or_else(|refused| panic!("{refused:?}")));
+        }
+    }
+    let began = Instant::now();
+    for stream in &mut streams {
+        // A binary message of 250,000 bytes, masked with zeros, of which the last thousand never come.
+        stream
+            .send_raw(&[0x82, 0xFF, 0, 0, 0, 0, 0, 3, 0xD0, 0x90, 0, 0, 0, 0])
+            .await;
+        stream.send_raw(&vec![0; 249_000]).await;
+    }
+    // All of them would take 8 MB.
+    let held = async { while upload_bytes(&app).await < UPLOADS / 2 - HELD / 2 {} };
+    tokio::time::timeout(Duration::from_secs(60), held)
+        .await
+        .expect("the messages are charged");
+    let mut picture = pictures::png(0);
+    picture.resize(HELD, 0);
+    let request = request_as(&app, MODEST, "/sessions", &[("box", BOX)]);
+    let opened = request.body(picture).send().await.unwrap();
+    expect(opened, StatusCode::CREATED).await;
+    assert!(upload_bytes(&app).await <= UPLOADS / 2);
+    let mut ends = Vec::new();
+    for mut stream in streams {
+        ends.push(loop {
+            if let Received::Closed(code) = stream.receive().await {
+                break code;
+            }
+        });
+    }
+    let took = began.elapsed();
+    println!("{ends:?} after {took:?}");
+    // In the time of a message its rest did not come, or there was no memory for that.
+    assert!(
+        ends.iter().all(|code| [4408, 4503].contains(code)),
+        "{ends:?}"
+    );
+    assert!(took < Duration::from_secs(30), "{took:?}");
+    let freed = async { while upload_bytes(&app).await > 0 {} };
+    tokio::time::timeout(Duration::from_secs(60), freed)
+        .await
+        .expect("all is given back");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn clients_that_fill_the_queue_leave_a_place_to_one_that_has_none() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        (config.queue, config.workers) = (4, Some(1));
+        config.max_frames = heavy::FRAMES;
+    });
+    let app = app.await;
+    let id = open(&app, MODEST).await;
+    let mut long = tokio::task::JoinSet::new();
+    for client in 1..=4 {
+        let post = heavy::post(&app, &heavy::open(&app).await, heavy::FRAMES);
+        let client = format!("198.51.100.{client}");
+        long.spawn(post.header("x-forwarded-for", client).send());
+    }
+    let inside =
+        async { while value(&metrics(&app).await, "bagtrack_requests_inside", &[]) < 4.0 {} };
+    tokio::time::timeout(Duration::from_secs(60), inside)
+        .await
+        .expect("they take all places");
+    for t in 1..=3 {
+        let post = request_as(&app, MODEST, &format!("/sessions/{id}/frames"), &[]);
+        let answer = post.body(pictures::png(t)).send().await.unwrap();
+        // It once was 503.
+        expect(answer, StatusCode::OK).await;
+    }
+    let second = heavy::post(&app, &heavy::open(&app).await, 2);
+    let second = second.header("x-forwarded-for", "198.51.100.1").send();
+    expect_problem(second.await.unwrap(), "queue-full").await;
+    assert!(long.try_join_next().is_none(), "the long posts go on");
+}
+
+#[tokio::test]
+async fn the_share_of_streams_shrinks_and_the_next_client_opens_one() {
+    let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        config.max_connections = 32;
+    });
+    let app = app.await;
+    let mut streams = Vec::new();
+    let mut shares = Vec::new();
+    for client in 1..=5 {
+        let address = format!("198.51.100.{client}");
+        let before = streams.len();
+        for _ in 0..9 {
+            let id = open(&app, &address).await;
+            let headers = [("x-forwarded-for", address.as_str())];
+            match StreamClient::try_open(app.address, &id, "", &headers).await {
+                Ok(stream) => streams.push(stream),
+                Err(refused) => assert_eq!(refused.status(), 429),
+            }
+        }
+        shares.push(streams.len() - before);
+    }
+    assert_eq!(shares, [8, 8, 8, 4, 2]);
     let id = open(&app, MODEST).await;
     expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
 }

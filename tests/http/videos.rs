@@ -292,6 +292,20 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
         code == Some(1) && said.contains("Permission denied"),
         "{said}"
     );
+    // Nor does it read or write where all may.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "text").unwrap();
+    let (code, said) = run(&["cat", file.to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (code, said) = run(&["touch", folder.path().join("other").to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
     let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
     assert!(said.contains("Operation not permitted"), "{said}");
     assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
@@ -310,7 +324,7 @@ async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so(
         let created = create.body(pictures::png(0)).send().await.unwrap();
         let created = expect(created, reqwest::StatusCode::CREATED).await;
         let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
-        // Its index is at the end, so the decoder goes back in a file of its own.
+        // Its index is at the end, so the decoder goes back in it.
         let post = service.client.post(service.url(&url)).body(video("mp4"));
         let answer = post.send().await.unwrap();
         assert_eq!(answer.status(), status);

@@ -46,6 +46,14 @@ async fn sessions_that_left_memory_count_in_the_store_for_all_replicas() {
     assert_eq!(again.status(), StatusCode::CREATED);
 }
 
+/// What `/readyz` says with status 200.
+async fn readiness(client: &Client, replica: &Replica) -> String {
+    let answer = client.get(replica.url("/readyz")).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let ready: serde_json::Value = answer.json().await.unwrap();
+    ready["status"].as_str().unwrap().to_owned()
+}
+
 #[tokio::test]
 #[ignore = "needs redis"]
 async fn a_store_that_is_nearly_full_takes_frames_and_no_new_session() {
@@ -82,8 +90,10 @@ async fn a_store_that_is_nearly_full_takes_frames_and_no_new_session() {
             .unwrap()
             .contains("bagtrack_store_full 1")
     );
-    assert_eq!(replica.readiness().await, StatusCode::OK);
+    // All replicas share the store: were it 503, the balancer would send the frames nowhere.
+    assert_eq!(readiness(&client, &replica).await, "store-full");
     redis.ask(&["config", "set", "maxmemory", "0"]);
     let opened = open(&client, &replica, "198.51.100.1").await;
     assert_eq!(opened.status(), StatusCode::CREATED);
+    assert_eq!(readiness(&client, &replica).await, "ok");
 }

@@ -52,6 +52,9 @@ impl<'a> Png<'a> {
                     let [w3, w2, w1, w0, h3, h2, h1, h0] = *sides;
                     let side = u32::from_be_bytes;
                     png.size = (side([w3, w2, w1, w0]), side([h3, h2, h1, h0]));
+                    if png.size.0 == 0 || png.size.1 == 0 {
+                        return Err("its width or its height is 0");
+                    }
                 }
                 b"IDAT" => saw_pixels = true,
                 b"eXIf" if !saw_pixels => png.exif = png.exif.or(Some(data)),

@@ -1,5 +1,5 @@
-//! Timing on a shared machine: compared actions take turns, the median is reported, and time is the thread's processor
-//! time, which excludes other processes.
+//! Timing on a shared machine: compared actions take turns, the median is reported, and time is the thread's or a
+//! process's processor time, which excludes other processes.
 
 use rustix::time::{ClockId, Timespec, clock_gettime};
 
@@ -37,4 +37,16 @@ pub fn cycles(rounds: usize, period: usize, mut actions: Vec<Action<'_>>) -> Vec
 fn seconds() -> f64 {
     let Timespec { tv_sec, tv_nsec } = clock_gettime(ClockId::ThreadCPUTime);
     tv_sec as f64 + tv_nsec as f64 * 1e-9
+}
+
+/// Seconds of processor time that the threads of a process have used, in hundredths (Linux only).
+pub fn of_process(id: u32) -> f64 {
+    let path = format!("/proc/{id}/stat");
+    let stat = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    // The name of the program comes second, in brackets; user and system time are the 12th and 13th field behind it.
+    let (_, fields) = stat.rsplit_once(") ").expect("the name is in brackets");
+    let ticks = fields.split(' ').skip(11).take(2);
+    let ticks: u64 = ticks.filter_map(|field| field.parse::<u64>().ok()).sum();
+    // Linux tells them in hundredths of a second on every machine.
+    ticks as f64 / 100.0
 }

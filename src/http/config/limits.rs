@@ -1,8 +1,8 @@
 //! The settings that bound what one request, one connection and one client may take.
 
 use super::settings::{moment, positive, positive_share, settings};
+use bagtrack_ingest::video::Launcher;
 use ipnet::IpNet;
-use std::ffi::OsString;
 use std::time::Duration;
 
 /// In place of the name of the program that decodes videos: there is none.
@@ -50,8 +50,7 @@ settings! {
         trusted_proxies: Vec<IpNet> = Vec::new();
     }
     by_code {
-        /// A program that gives up rights and becomes the one that decodes videos, with its own arguments before that
-        /// one's name; no words where that is started by itself. The program `bagtrack` starts itself so.
-        ffmpeg_launcher: Vec<OsString>;
+        /// What starts the program that decodes videos, with fewer rights. The program `bagtrack` starts itself so.
+        ffmpeg_launcher: Launcher;
     }
 }

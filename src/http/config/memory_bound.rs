@@ -70,7 +70,11 @@ impl MemoryBound {
             },
             videos: match config.limits.ffmpeg.as_str() {
                 OFF => 0,
-                _ => count(config.video_places()) * MAX_DECODER_MEMORY,
+                // Each has its video as a file in memory.
+                _ => {
+                    count(config.video_places())
+                        * (MAX_DECODER_MEMORY + count(config.max_body_bytes))
+                }
             },
         }
     }

@@ -1,7 +1,8 @@
 //! Multipart uploads: `frame` parts are files, and `snapshot` is one where a route takes it; all others are settings.
 //!
-//! The parser looks through all that it has for the next part whenever a piece comes. So it gets a piece only when it can
-//! do nothing with what it has, and the head of a part is bounded: a body costs time in proportion to its bytes.
+//! The parser looks through all that it has for the next part whenever a piece comes (docs/upstream/multer.md). So small
+//! pieces are gathered, it gets them only when it can do nothing with what it has, and the head of a part is bounded: a
+//! body costs time in proportion to its bytes.
 
 use super::body::{self, Buffer};
 use super::misnamed;
@@ -13,6 +14,7 @@ use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
 use bagtrack_sessions::Charge;
+use bytes::BytesMut;
 use http_body::Frame;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -21,6 +23,9 @@ use std::task::{Context, Poll};
 
 /// Most bytes of a part's head, and of what stands before the first part.
 pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
+
+/// Pieces of fewer bytes are gathered, as far as they have come.
+const ENOUGH_BYTES: usize = 8 << 10;
 
 /// The head of a part does not end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -44,10 +49,34 @@ impl Progress {
     }
 }
 
-/// A body that comes in single pieces.
+/// A body that comes step by step, small pieces together.
 struct Stepwise {
     body: Body,
+    has_ended: bool,
     progress: Arc<Progress>,
+}
+
+impl Stepwise {
+    /// What has come, up to [`ENOUGH_BYTES`] or one piece; nothing at the end.
+    fn poll_gathered(&mut self, cx: &mut Context<'_>) -> Poll<Option<Result<Bytes, axum::Error>>> {
+        let mut gathered = BytesMut::new();
+        while !self.has_ended && gathered.len() < ENOUGH_BYTES {
+            match Pin::new(&mut self.body).poll_frame(cx)? {
+                // Trailers mean nothing here.
+                Poll::Ready(Some(frame)) => match frame.into_data() {
+                    Ok(piece) if gathered.is_empty() && piece.len() >= ENOUGH_BYTES => {
+                        return Poll::Ready(Some(Ok(piece)));
+                    }
+                    Ok(piece) => gathered.extend_from_slice(&piece),
+                    Err(_) => {}
+                },
+                Poll::Ready(None) => self.has_ended = true,
+                Poll::Pending if gathered.is_empty() => return Poll::Pending,
+                Poll::Pending => break,
+            }
+        }
+        Poll::Ready((!gathered.is_empty()).then(|| Ok(gathered.freeze())))
+    }
 }
 
 impl HttpBody for Stepwise {
@@ -65,21 +94,12 @@ impl HttpBody for Stepwise {
         if self.progress.kept.load(Ordering::Relaxed) > MAX_HEAD_BYTES {
             return Poll::Ready(Some(Err(axum::Error::new(HeadTooLong))));
         }
-        let polled = Pin::new(&mut self.body).poll_frame(cx);
-        if let Poll::Ready(Some(Ok(frame))) = &polled {
-            let bytes = frame.data_ref().map_or(0, Bytes::len);
-            self.progress.kept.fetch_add(bytes, Ordering::Relaxed);
+        let polled = self.poll_gathered(cx);
+        if let Poll::Ready(Some(Ok(bytes))) = &polled {
+            self.progress.kept.fetch_add(bytes.len(), Ordering::Relaxed);
             self.progress.may_go_on.store(true, Ordering::Relaxed);
         }
-        polled
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> http_body::SizeHint {
-        self.body.size_hint()
+        polled.map_ok(Frame::data)
     }
 }
 
@@ -95,7 +115,11 @@ pub(super) async fn read<S: Settings>(
     let progress = Arc::new(Progress::default());
     let request = request.map(|body| {
         let progress = progress.clone();
-        Body::new(Stepwise { body, progress })
+        Body::new(Stepwise {
+            body,
+            has_ended: false,
+            progress,
+        })
     });
     let failed = |error: MultipartError| body::problem(&error, max_bytes);
     let mut multipart = Multipart::from_request(request, &()).await.map_err(|_| {

@@ -31,9 +31,10 @@ impl<Q: FromRequestParts<AppState, Rejection = Problem> + Send> FromRequestParts
         let path = SessionPath::from_request_parts(parts, state).await?;
         let session = path.find(state).await?;
         let admission = &state.service.admission;
-        admission.check_place()?;
         let client = Client::of(parts);
-        let request = state.clients.account(&client).request()?;
+        let account = state.clients.account(&client);
+        admission.check_place(account.flow())?;
+        let request = account.request()?;
         let queue = admission.enter(request.flow(), Box::new(request))?;
         Ok(Self {
             query,

@@ -181,8 +181,9 @@ pub fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> 
     if length.is_some_and(|length| length > max as u64) {
         return Err(Problem::body_too_large(max));
     }
-    state.service.admission.check_place()?;
-    state.clients.account(&Client::of(parts)).request()
+    let account = state.clients.account(&Client::of(parts));
+    state.service.admission.check_place(account.flow())?;
+    account.request()
 }
 
 /// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.

@@ -32,7 +32,7 @@ impl VideoFrames {
     ///
     /// # Errors
     /// There is no program for it.
-    pub fn decode(
+    pub async fn decode(
         state: &AppState,
         video: Bytes,
         format: VideoFormat,
@@ -49,9 +49,14 @@ impl VideoFrames {
         if config.limits.ffmpeg == OFF {
             return Err(no_decoder());
         }
-        let launcher = &config.limits.ffmpeg_launcher;
-        let mut decoder =
-            VideoDecoder::of_bytes(launcher, &config.limits.ffmpeg, video, format, limits)?;
+        let (launcher, program) = (
+            config.limits.ffmpeg_launcher.clone(),
+            config.limits.ffmpeg.clone(),
+        );
+        // The bytes are copied, and a process is started.
+        let begin = move || VideoDecoder::of_bytes(&launcher, &program, video, format, limits);
+        let begun = tokio::task::spawn_blocking(begin).await;
+        let mut decoder = begun.map_err(|error| Problem::internal(Arc::new(error)))??;
         let stop = decoder.stop();
         let (send, pictures) = mpsc::channel(MAX_WAITING);
         let reading = move || {

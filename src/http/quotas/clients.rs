@@ -62,6 +62,7 @@ impl Quotas {
             sessions: of_client(self.sessions, networks, |held| &held.sessions),
             session_bytes: of_client(self.session_bytes, networks, |held| &held.session_bytes),
             upload_bytes: of_client(self.upload_bytes, networks, |held| &held.upload_bytes),
+            streams: of_client(self.streams, networks, |held| &held.streams),
         }
     }
 }
@@ -87,7 +88,6 @@ pub struct Account {
     /// They are known as long as one of their clients is.
     _networks: Vec<Arc<Holdings>>,
     requests: Arc<Semaphore>,
-    streams: Arc<Semaphore>,
     videos: Arc<Semaphore>,
     messages: Arc<MessageRate>,
     frames: Option<FrameRate>,
@@ -228,7 +228,6 @@ impl Account {
             held,
             _networks: networks,
             requests: permits(quotas.requests),
-            streams: permits(quotas.streams),
             videos: permits(1),
             messages: Arc::new(MessageRate::direct(
                 Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
@@ -272,10 +271,16 @@ impl Account {
     /// Takes a place for a stream.
     ///
     /// # Errors
-    /// The client has as many as it may.
-    pub fn stream(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        let permit = self.streams.clone().try_acquire_owned();
-        permit.map_err(|_| Problem::quota_exceeded("streams", self.quotas.streams))
+    /// The client has as many as it may, or as are left to others.
+    pub fn stream(&self) -> Result<Charge, Problem> {
+        let mut place = Charge::new(&self.all.streams, &self.held.streams);
+        let limit = |full| match full {
+            BudgetFull::Client => self.quotas.streams,
+            BudgetFull::All => self.held.streams.held(),
+        };
+        let taken = place.grow(1).map_err(limit);
+        taken.map_err(|most| Problem::quota_exceeded("streams", most))?;
+        Ok(place)
     }
 
     /// How many frames of WebSockets the client may send.

@@ -12,6 +12,8 @@ pub struct Holdings {
     pub session_bytes: Budget,
     /// Bytes of bodies that have come, and of answers that are not taken.
     pub upload_bytes: Budget,
+    /// Streams, each of which has a connection.
+    pub streams: Budget,
 }
 
 impl Holdings {
@@ -23,12 +25,18 @@ impl Holdings {
             sessions: of_memory(config.max_sessions),
             session_bytes: of_memory(config.session_bytes()),
             upload_bytes: Budget::new(config.max_upload_bytes),
+            streams: Budget::new(config.max_connections),
         }
     }
 
     /// Whether nothing is held.
     pub(super) fn is_empty(&self) -> bool {
-        let budgets = [&self.sessions, &self.session_bytes, &self.upload_bytes];
+        let budgets = [
+            &self.sessions,
+            &self.session_bytes,
+            &self.upload_bytes,
+            &self.streams,
+        ];
         budgets.iter().all(|budget| budget.held() == 0)
     }
 
@@ -39,6 +47,7 @@ impl Holdings {
             sessions: budget(),
             session_bytes: budget(),
             upload_bytes: budget(),
+            streams: budget(),
         }
     }
 }

@@ -53,7 +53,7 @@ pub async fn respond_to_video(
     let video = request.upload.files.swap_remove(0);
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
-    let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place)?);
+    let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place).await?);
     respond_to(state, request, source).await
 }
 

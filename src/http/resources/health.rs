@@ -11,12 +11,15 @@ use serde::Serialize;
 /// The service runs.
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 pub struct Health {
-    /// Always `ok`.
+    /// `ok`; or `store-full` from `/readyz` while the store of sessions takes frames and no new sessions.
     #[schema(example = "ok")]
     status: &'static str,
 }
 
 const OK: Json<Health> = Json(Health { status: "ok" });
+const STORE_FULL: Json<Health> = Json(Health {
+    status: "store-full",
+});
 
 /// Whether the process runs
 ///
@@ -34,6 +37,9 @@ pub async fn live() -> Json<Health> {
 /// A load balancer should send none while this answers 503: the service was asked to end, its queue or its memory for
 /// bodies is full, or the store of its sessions gives no answer or takes no writes. What was full counts as full until
 /// half of it is free.
+///
+/// A store that is nearly full is no reason: all replicas share it, and it takes the frames of the sessions that it has.
+/// The answer is 200 then, with the status `store-full`.
 #[utoipa::path(
     get, path = "/readyz", tag = "service", operation_id = "getReadiness", security(()),
     responses((status = 200, description = "It does", body = Health))
@@ -55,6 +61,15 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     match (queue, uploads) {
         (true, _) => Err(Problem::saturated("The queue is full.")),
         (_, true) => Err(Problem::saturated("The memory for bodies is used up.")),
+        (false, false)
+            if state
+                .service
+                .store
+                .as_ref()
+                .is_some_and(|store| store.is_full()) =>
+        {
+            Ok(STORE_FULL)
+        }
         (false, false) => Ok(OK),
     }
 }

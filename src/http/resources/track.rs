@@ -209,7 +209,7 @@ async fn track_video(
     let (boxes, params) = begin(settings)?;
     let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let targets = boxes.as_slice().len();
-    let pictures = VideoFrames::decode(&state, video, format, place)?;
+    let pictures = VideoFrames::decode(&state, video, format, place).await?;
     let frames = VideoTrack {
         queue: queue.for_frames(targets),
         frames: RangeFrames::new(pictures, range, state.charge(&request.client)),

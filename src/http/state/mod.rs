@@ -118,10 +118,9 @@ impl AppState {
     /// Sets the metrics that are values of a moment.
     pub fn measure(&self) {
         let (config, admission) = (&self.config, &self.service.admission);
-        let queued = config.queue.saturating_sub(admission.queue_places());
         let workers = config.worker_count();
         let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
-        let is_draining = usize::from(self.is_draining());
+        let (held, is_draining) = (self.clients.all(), usize::from(self.is_draining()));
         let videos = config
             .video_places()
             .saturating_sub(self.videos.available_permits());
@@ -135,7 +134,7 @@ impl AppState {
             (
                 "bagtrack_requests_inside",
                 "Requests with a place in the queue.",
-                queued,
+                admission.requests_inside(),
             ),
             (
                 "bagtrack_workers_busy",
@@ -149,6 +148,12 @@ impl AppState {
                 self.uploads.held(),
             ),
             ("bagtrack_videos", "Videos that are decoded.", videos),
+            (
+                "bagtrack_session_bytes",
+                "Bytes that the states of sessions in memory may take.",
+                held.session_bytes.held(),
+            ),
+            ("bagtrack_streams", "Open streams.", held.streams.held()),
             (
                 "bagtrack_draining",
                 "1 while the service is about to end.",

@@ -21,7 +21,6 @@ use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::OwnedSemaphorePermit;
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 /// Time for a client to answer the close.
@@ -45,7 +44,7 @@ pub struct SessionStream {
     /// The connection that it took over.
     pub connection: ConnectionHold,
     /// The place among the client's streams.
-    pub permit: OwnedSemaphorePermit,
+    pub permit: Charge,
     /// Where the session stands.
     pub stand: Stand,
     /// What names the request that opened it, for problems.

@@ -14,20 +14,33 @@ pub(super) const NOT_STARTED: i32 = 127;
 /// Most processor time in seconds.
 #[cfg(target_os = "linux")]
 const MAX_CPU: u64 = 300;
-/// Most bytes of a file that it writes: what it keeps of its input, to go back in it.
+/// Most bytes of a file that it writes: what it keeps of a pipe, to go back in it.
 #[cfg(target_os = "linux")]
 const MAX_FILE: u64 = 1 << 30;
 #[cfg(target_os = "linux")]
 const MAX_FILES: u64 = 64;
 
-/// Starts the program with pipes; `launcher` and its arguments, where there is one, restrict themselves and become it. It
-/// gets nothing of the environment, which may have secrets, but the path.
+/// What starts the decoder: a program with its own arguments before the decoder's name, which gives up rights and becomes
+/// it. Without words the decoder is started by itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Launcher {
+    /// The program and its arguments.
+    pub words: Vec<OsString>,
+    /// Whether the decoder can open no file then but the system's programs and libraries, and write none at all. It gets
+    /// the video as a file without a name, and may read files; otherwise it gets a pipe, and may only keep what it has
+    /// read from that.
+    pub hides_files: bool,
+}
+
+/// Starts the program with this input, and pipes for what it says. It gets nothing of the environment, which may have
+/// secrets, but the path.
 pub(super) fn start<A: AsRef<OsStr>>(
-    launcher: &[OsString],
+    launcher: &Launcher,
     program: &str,
     arguments: impl IntoIterator<Item = A>,
+    input: Stdio,
 ) -> Result<Child, VideoError> {
-    let mut words = launcher.iter().map(OsString::as_os_str);
+    let mut words = launcher.words.iter().map(OsString::as_os_str);
     let mut command = match words.next() {
         Some(first) => {
             let mut command = Command::new(first);
@@ -43,7 +56,7 @@ pub(super) fn start<A: AsRef<OsStr>>(
     // Ctrl-C goes to the whole group of the terminal. Whoever wants the pictures decides when this ends.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let pipes = command.stdin(input).stdout(Stdio::piped());
     let child = pipes.stderr(Stdio::piped()).spawn();
     let child = child.map_err(|source| VideoError::NoProgram {
         program: program.to_owned(),
@@ -77,3 +90,19 @@ fn limit(child: &Child) {
 /// Elsewhere a process cannot be limited from outside.
 #[cfg(not(target_os = "linux"))]
 fn limit(_child: &Child) {}
+
+/// A file of these bytes that has no name; none where the system has no such files.
+#[cfg(target_os = "linux")]
+pub(super) fn nameless(bytes: &[u8]) -> Option<Stdio> {
+    use rustix::fs::{MemfdFlags, memfd_create};
+    use std::io::Write;
+    let mut file = std::fs::File::from(memfd_create("video", MemfdFlags::CLOEXEC).ok()?);
+    file.write_all(bytes).ok()?;
+    Some(file.into())
+}
+
+/// Elsewhere there are none.
+#[cfg(not(target_os = "linux"))]
+pub(super) fn nameless(_bytes: &[u8]) -> Option<Stdio> {
+    None
+}

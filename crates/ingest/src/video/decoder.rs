@@ -1,13 +1,12 @@
 //! A video being decoded: the process, and the threads that feed it and hear what it says.
 
-use super::child;
+use super::child::{self, Launcher};
 use super::error::VideoError;
 use super::parts;
 use super::sniff::VideoFormat;
-use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdout};
+use std::process::{Child, ChildStdout, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
@@ -15,6 +14,8 @@ use std::thread::{self, JoinHandle};
 const FORMATS: &str = "mov,matroska,gif,mjpeg";
 /// The codecs of these, by the names of their decoders.
 const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg,gif";
+/// The file without a name that is the program's input, which it can go back in.
+const NAMELESS: &str = "file:/proc/self/fd/0";
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
 /// Most bytes of a line of what the program says.
@@ -54,26 +55,37 @@ impl Drop for Stop {
 }
 
 impl VideoDecoder {
-    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words.
+    /// Begins to decode these bytes with this program, which `launcher` starts where it has any words. It may take as long as
+    /// copying the bytes.
     ///
     /// # Errors
     /// The program cannot be started.
     pub fn of_bytes(
-        launcher: &[OsString],
+        launcher: &Launcher,
         program: &str,
         bytes: impl AsRef<[u8]> + Send + 'static,
         format: VideoFormat,
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
-        // MP4 files may have their index at the end. The cache makes it possible to go back in a pipe.
-        let mut input = vec!["-protocol_whitelist", "cache,pipe"];
-        input.extend(["-format_whitelist", FORMATS]);
-        input.extend(["-codec_whitelist", CODECS]);
-        match format {
-            VideoFormat::Container => input.extend(["-i", "cache:pipe:0"]),
-            VideoFormat::MotionJpeg => input.extend(["-f", "mjpeg", "-i", "pipe:0"]),
+        let is_container = format == VideoFormat::Container;
+        let file = match launcher.hides_files && is_container {
+            true => child::nameless(bytes.as_ref()),
+            false => None,
+        };
+        // MP4 files may have their index at the end. Without a file the cache makes it possible to go back in a pipe.
+        let (protocols, source) = match (is_container, &file) {
+            (false, _) => ("pipe", &["-f", "mjpeg", "-i", "pipe:0"][..]),
+            (true, Some(_)) => ("file", &["-i", NAMELESS][..]),
+            (true, None) => ("cache,pipe", &["-i", "cache:pipe:0"][..]),
+        };
+        let mut input = vec!["-protocol_whitelist", protocols];
+        input.extend(["-format_whitelist", FORMATS, "-codec_whitelist", CODECS]);
+        input.extend(source);
+        let decoder = (launcher, program);
+        match file {
+            Some(file) => Self::start(decoder, &input, file, limits),
+            None => Self::start_fed(decoder, &input, bytes, limits),
         }
-        Self::start((launcher, program), &input, bytes, limits)
     }
 
     /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown `from`
@@ -94,13 +106,31 @@ impl VideoDecoder {
             input.extend(["-ss", seconds]);
         }
         input.extend(["-i", &url]);
-        Self::start((&[], program), &input, [], limits)
+        let decoder = (&Launcher::default(), program);
+        Self::start(decoder, &input, Stdio::null(), limits)
+    }
+
+    /// Starts the program with a pipe that these bytes come through.
+    fn start_fed(
+        decoder: (&Launcher, &str),
+        input: &[&str],
+        bytes: impl AsRef<[u8]> + Send + 'static,
+        limits: VideoLimits,
+    ) -> Result<Self, VideoError> {
+        let decoder = Self::start(decoder, input, Stdio::piped(), limits)?;
+        let stdin = lock(&decoder.child).stdin.take();
+        let mut stdin = stdin.expect("the command says that it is a pipe");
+        // It does not outlive the process. A program that has seen enough closes its input.
+        thread::spawn(move || {
+            let _ = stdin.write_all(bytes.as_ref());
+        });
+        Ok(decoder)
     }
 
     fn start(
-        (launcher, program): (&[OsString], &str),
+        (launcher, program): (&Launcher, &str),
         input: &[&str],
-        bytes: impl AsRef<[u8]> + Send + 'static,
+        stdin: Stdio,
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
         let pixels = limits.max_pixels.to_string();
@@ -135,17 +165,13 @@ impl VideoDecoder {
             &output,
         ]
         .concat();
-        let mut child = child::start(launcher, program, arguments)?;
+        let mut child = child::start(launcher, program, arguments, stdin)?;
         let piped = "the command says that it is a pipe";
-        let (mut stdin, stdout, stderr) = (
-            child.stdin.take().expect(piped),
+        let (stdout, stderr) = (
             child.stdout.take().expect(piped),
             child.stderr.take().expect(piped),
         );
-        // Neither thread outlives the process. A program that has seen enough closes its input.
-        thread::spawn(move || {
-            let _ = stdin.write_all(bytes.as_ref());
-        });
+        // The thread does not outlive the process.
         let said = Said::default();
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));

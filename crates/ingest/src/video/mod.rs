@@ -4,8 +4,8 @@
 //! of uploaded frames.
 //!
 //! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads one
-//! pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor time, files
-//! and priority are limited (on Linux). It ends when its pictures are no longer wanted.
+//! file or pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor time,
+//! files and priority are limited (on Linux). It ends when its pictures are no longer wanted.
 //!
 //! What it says is damage: from the next picture on nothing is given, since nobody knows which picture of the video that
 //! would be.
@@ -18,7 +18,7 @@ mod error;
 mod parts;
 mod sniff;
 
-pub use child::MAX_MEMORY as MAX_DECODER_MEMORY;
+pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
 pub use error::VideoError;
 pub use sniff::{VideoFormat, video_format};

@@ -1,6 +1,6 @@
 //! Ingest of damaged and hostile bytes: an error that says what is wrong, never a panic, never a large bill.
 
-use bagtrack_ingest::{IngestError, Limits, decode};
+use bagtrack_ingest::{IngestError, Limits, decode, inspect};
 use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, encode, jpeg};
 use image::{DynamicImage, ImageFormat};
 use proptest::prelude::*;
@@ -207,6 +207,35 @@ fn arithmetic_and_lossless_jpegs_are_a_typed_error() {
             matches!(result, Err(IngestError::Damaged { format: "JPEG", .. })),
             "{result:?}"
         );
+    }
+}
+
+#[test]
+fn a_picture_without_height_or_width_is_a_typed_error() {
+    let image: DynamicImage = color(32, 32).into();
+    let png = encode(&image, ImageFormat::Png);
+    let jpeg = jpeg(&color(32, 32), BASELINE, None);
+    let of_jpeg = segment(&jpeg, 0xC0) + 5;
+    // Height and width of two bytes each behind the marker, the length and the precision; width and height of four.
+    for (format, file, sides) in [
+        (
+            "JPEG",
+            &jpeg,
+            [of_jpeg..of_jpeg + 2, of_jpeg + 2..of_jpeg + 4],
+        ),
+        ("PNG", &png, [16..20, 20..24]),
+    ] {
+        for side in sides {
+            let mut none = file.clone();
+            none[side.clone()].fill(0);
+            // One of a JPEG once went on to the tracker's arithmetic, and panicked there.
+            let result = inspect(&none, &SMALL).map(|file| file.size());
+            assert!(
+                matches!(result, Err(IngestError::Damaged { .. })),
+                "{format} {side:?}: {result:?}"
+            );
+            assert!(decode(&none, &SMALL).is_err(), "{format} {side:?}");
+        }
     }
 }
 

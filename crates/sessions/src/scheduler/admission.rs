@@ -7,6 +7,7 @@
 
 use super::fair_queue::{FairQueue, WorkerSlot};
 use super::flows::{Flow, SizeClass, max_begun};
+use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
 use super::workers::Workers;
 use std::any::Any;
@@ -14,7 +15,7 @@ use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::oneshot;
 
 /// The queue is full; try again later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -71,14 +72,15 @@ pub fn threads_of(workers: usize) -> usize {
 /// A queue before the workers. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
-    queue: Arc<Semaphore>,
+    queue: Arc<Places>,
     workers: FairQueue,
     threads: Arc<[Workers; 2]>,
 }
 
 impl Admission {
-    /// At most `queue` requests at a time, at most `workers` quick ones and as many slow ones of them at work. Where all
-    /// requests of a client wait longer than `delay`, those that wait twice as long are refused; none at zero.
+    /// At most `queue` requests at a time, and one of each client that has none there; at most `workers` quick ones and as
+    /// many slow ones of them at work. Where all requests of a client wait longer than `delay`, those that wait twice as
+    /// long are refused; none at zero.
     ///
     /// # Errors
     /// The system gives no threads for the workers.
@@ -86,45 +88,44 @@ impl Admission {
         // Of work on several frames, what has begun may wait between two of them.
         let threads = |class: SizeClass| Workers::new(threads_of(workers), class.niceness());
         Ok(Self {
-            queue: Arc::new(Semaphore::new(queue)),
+            queue: Places::new(queue),
             workers: FairQueue::new(workers, delay),
             threads: Arc::new([threads(SizeClass::Small)?, threads(SizeClass::Large)?]),
         })
     }
 
-    /// Whether there is a place in the queue now. It may be gone when it is asked for.
+    /// Whether there is a place in the queue for a client now. It may be gone when it is asked for.
     ///
     /// # Errors
     /// There is none.
-    pub fn check_place(&self) -> Result<(), QueueFull> {
-        match self.queue.available_permits() {
-            0 => Err(QueueFull),
-            _ => Ok(()),
+    pub fn check_place(&self, flow: Flow) -> Result<(), QueueFull> {
+        match self.queue.has_place(flow) {
+            true => Ok(()),
+            false => Err(QueueFull),
         }
     }
 
     /// Takes a place in the queue for a client's request, which holds `held` until its work has ended.
     ///
     /// # Errors
-    /// All places are taken.
+    /// All places are taken, and the client has one of them.
     pub fn enter(&self, flow: Flow, held: Reservation) -> Result<QueuePermit, QueueFull> {
         self.rejoin(Ticket::new(flow, held))
     }
 
     /// The same, but waits for a place, in order of arrival, and then for a worker, however long that takes.
     pub async fn enter_in_order(&self, flow: Flow, held: Reservation) -> QueuePermit {
-        let place = self.queue.clone().acquire_owned().await;
-        let place = place.expect("the queue is never closed");
+        let place = self.queue.take_in_order(flow).await;
         QueuePermit::new(Ticket::new(flow, held), place).waiting()
     }
 
     /// Takes a place in the queue for a request that has left it.
     ///
     /// # Errors
-    /// All places are taken.
+    /// All places are taken, and the client has one of them.
     pub fn rejoin(&self, request: Ticket) -> Result<QueuePermit, QueueFull> {
-        let place = self.queue.clone().try_acquire_owned();
-        Ok(QueuePermit::new(request, place.map_err(|_| QueueFull)?))
+        let place = self.queue.take(request.flow()).ok_or(QueueFull)?;
+        Ok(QueuePermit::new(request, place))
     }
 
     /// Waits for a worker and runs `work` on its thread, with the turn that it may give up for a while. If the future is
@@ -167,9 +168,14 @@ impl Admission {
         outcome.map_err(|panic| WorkPanicked::of(panic.as_ref()).into())
     }
 
-    /// Places free in the queue.
+    /// Places free in the queue, for whoever comes.
     pub fn queue_places(&self) -> usize {
-        self.queue.available_permits()
+        self.queue.free()
+    }
+
+    /// Requests with a place in the queue.
+    pub fn requests_inside(&self) -> usize {
+        self.queue.len()
     }
 
     /// Workers that have work.
@@ -192,7 +198,7 @@ mod tests {
     async fn the_queue_refuses_when_full_and_frees_on_drop() {
         let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let permit = enter(&admission).unwrap();
-        assert_eq!(admission.check_place(), Err(QueueFull));
+        assert_eq!(admission.check_place(Flow(0)), Err(QueueFull));
         assert_eq!(enter(&admission).unwrap_err(), QueueFull);
         drop(permit);
         assert!(enter(&admission).is_ok());
@@ -202,12 +208,15 @@ mod tests {
     async fn a_free_place_goes_to_the_request_that_waited_longest() {
         let admission = Admission::new(1, 1, Duration::ZERO).unwrap();
         let taken = enter(&admission).unwrap();
+        // Each client has one.
+        let _spare = admission.enter_in_order(Flow(1), Box::new(())).await;
         let mut first = Box::pin(admission.enter_in_order(Flow(0), Box::new(())));
         let mut second = Box::pin(admission.enter_in_order(Flow(1), Box::new(())));
         assert!(futures_util::poll!(&mut first).is_pending());
         assert!(futures_util::poll!(&mut second).is_pending());
         drop(taken);
-        assert_eq!(enter(&admission).unwrap_err(), QueueFull, "others wait");
+        let barging = admission.enter(Flow(1), Box::new(()));
+        assert_eq!(barging.unwrap_err(), QueueFull, "others wait");
         assert!(futures_util::poll!(&mut second).is_pending());
         drop(first.await);
         assert_eq!(second.await.flow(), Flow(1));

@@ -14,6 +14,7 @@ mod controlled_delay;
 mod cpu_time;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;
+mod places;
 pub(crate) mod queue_permit;
 pub(crate) mod work_limit;
 mod workers;

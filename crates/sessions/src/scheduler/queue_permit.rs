@@ -2,11 +2,11 @@
 
 use super::fair_queue::Asked;
 use super::flows::{Flow, Job};
+use super::places::Place;
 use super::work_limit::CpuSpent;
 use std::any::Any;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::OwnedSemaphorePermit;
 
 /// Least processor time of decoding a picture, for each of its pixels and for each byte of its file. Most pictures take a
 /// few times as much: those that are surely slow are known before they begin.
@@ -20,7 +20,7 @@ pub type Reservation = Box<dyn Any + Send + Sync>;
 #[derive(Debug, Clone)]
 pub struct QueuePermit {
     // The place is free before what is held.
-    _place: Arc<OwnedSemaphorePermit>,
+    _place: Arc<Place>,
     request: Ticket,
 }
 
@@ -49,11 +49,16 @@ impl Ticket {
             _held: Arc::new(held),
         }
     }
+
+    /// Whose turn the request's work is done in.
+    pub(super) fn flow(&self) -> Flow {
+        self.flow
+    }
 }
 
 impl QueuePermit {
     /// The place of this request.
-    pub(super) fn new(request: Ticket, place: OwnedSemaphorePermit) -> Self {
+    pub(super) fn new(request: Ticket, place: Place) -> Self {
         Self {
             _place: Arc::new(place),
             request,
