@@ -106,6 +106,13 @@ def drag(page, box):
     page.mouse.up()
 
 
+def begin_at(page, time, frame):
+    """Moves the bar under the first picture, and waits for the frame."""
+    moved = "(bar, at) => { bar.value = String(at); bar.dispatchEvent(new Event('input')); }"
+    page.locator("#begin-at").evaluate(moved, time + 0.005)
+    page.locator("#begin-time").filter(has_text=f"frame {frame}").wait_for()
+
+
 def frames(page, count):
     """Waits until the page has shown so many. Its policy forbids to evaluate texts in it."""
     late = time.monotonic() + TO_THE_END / 1000

@@ -19,6 +19,7 @@ import urllib.parse
 
 import files
 import local
+import sources
 import studio
 from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
 from clips import Clips
@@ -321,6 +322,7 @@ ALL = [
     busy_service,
     *files.ALL,
     *local.ALL,
+    *sources.ALL,
     *studio.ALL,
 ]
 

@@ -6,9 +6,11 @@ import re
 import xml.etree.ElementTree
 import zipfile
 
-from browser import choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+from browser import FRAMES_A_SECOND, begin_at, choose, drag, frames, near, numbers, rows, said, saved, to_the_end
 
 CORRECTED = 100
+KEY = 40
+"""Where one begins in the middle."""
 
 
 def to_frame(page, frame):
@@ -133,4 +135,28 @@ def objects_with_the_service(checks):
     objects_in(checks, "there")
 
 
-ALL = [objects_in_the_page, objects_with_the_service]
+def tracked_backwards(checks):
+    """From a key frame in the middle to the beginning: frames before the first box are fetched, those after are kept."""
+    page = checks.page(where="here")
+    truth = checks.clips["card"]["truth"]
+    choose(page, "card")
+    begin_at(page, KEY / FRAMES_A_SECOND, KEY)
+    drag(page, truth[KEY])
+    frames(page, 10)
+    page.locator("#stop").click()
+    before = rows(page)
+    page.locator("#timeline").focus()
+    page.keyboard.press("Home")
+    shown(page, KEY)
+    page.locator("#backwards").click()
+    said(page, f"Followed {KEY} frames backwards")
+    table = rows(page)
+    assert [int(row["frame"]) for row in table] == list(range(KEY + len(before)))
+    assert values(table[KEY:]) == values(before), "frames after the key frame have changed"
+    close = near(table[:KEY], truth)
+    print(f"  {close} of {KEY} frames within 10 px, backwards")
+    assert close >= 0.9 * KEY
+    page.context.close()
+
+
+ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards]
