@@ -4,11 +4,13 @@ import { button, get, input } from "./dom.js";
 import { offerSaving } from "./saving.js";
 import { offerSources } from "./sources.js";
 import { Page } from "./page.js";
+import { playWelcome } from "./welcome.js";
 
 const page = new Page();
 
 offerSources((open) => page.choose(open), () => false);
 offerSaving(page);
+playWelcome();
 
 get("draw").addEventListener("click", () => page.editing.drawing.arm(!page.editing.drawing.isArmed));
 get("pause").addEventListener("click", () => page.pause(page.state !== "paused"));

@@ -21,6 +21,7 @@ import files
 import local
 import sources
 import studio
+import welcome
 from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
 from clips import Clips
 from playwright.sync_api import sync_playwright
@@ -309,6 +310,7 @@ def busy_service(checks):
 
 ALL = [
     weight_and_first_picture,
+    *welcome.ALL,
     sample_by_mouse,
     lost_and_found,
     broken_line,

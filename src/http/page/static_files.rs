@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 51] = [
+const FILES: [File; 54] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -76,12 +76,15 @@ const FILES: [File; 51] = [
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
     file!("saving.js", SCRIPT),
+    file!("scene.js", SCRIPT),
     file!("seen.js", SCRIPT),
     file!("source.js", SCRIPT),
     file!("sources.js", SCRIPT),
     file!("stage.js", SCRIPT),
     file!("stills.js", SCRIPT),
     file!("timeline.js", SCRIPT),
+    file!("welcome-rows.js", SCRIPT),
+    file!("welcome.js", SCRIPT),
     file!("zip.js", SCRIPT),
     client_file!("js/backoff.js"),
     client_file!("js/bag.js"),
