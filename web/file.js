@@ -94,7 +94,9 @@ export class VideoFile {
    * @param {number} [frame] Its number, where it is known. */
   async goTo(time, frame) {
     this.learned ??= await learnRate(this.video);
-    const shown = await this.playback.seek(Math.min(time, this.duration));
+    // The times of rows are rounded, perhaps to before the frame.
+    const sought = frame === undefined ? time : time + BEFORE;
+    const shown = await this.playback.seek(Math.min(sought, this.duration));
     const shownTime = shown?.mediaTime ?? time;
     return this.begin(frame ?? Math.round((shownTime - this.firstTime) * this.learned), shownTime, shown);
   }

@@ -1,6 +1,7 @@
 // What the buttons do.
 
 import { button, get, input } from "./dom.js";
+import { Keeping } from "./keeping.js";
 import { offerSaving } from "./saving.js";
 import { offerSources } from "./sources.js";
 import { Page } from "./page.js";
@@ -8,7 +9,14 @@ import { playWelcome } from "./welcome.js";
 
 const page = new Page();
 
-offerSources((open) => page.choose(open), () => false);
+const keeping = new Keeping(page);
+
+page.changed = () => keeping.changed();
+keeping.begin();
+offerSources(
+  (open) => page.choose(open),
+  (files) => keeping.take(files),
+);
 offerSaving(page);
 playWelcome();
 
@@ -53,6 +61,6 @@ get("key-form").addEventListener("submit", (event) => {
   page.again?.();
 });
 addEventListener("beforeunload", (event) => {
-  if (page.isUnsaved) event.preventDefault();
+  if (page.isUnsaved && !keeping.isSafe) event.preventDefault();
 });
 for (const host of document.querySelectorAll(".host")) host.textContent = new URL(".", location.href).href.slice(0, -1);

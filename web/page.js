@@ -2,7 +2,6 @@
 
 import { Beginning } from "./begin.js";
 import { shownIn } from "./boxes.js";
-import { Camera } from "./camera.js";
 import { button, canvas, get, input } from "./dom.js";
 import { DRAW, Editing, TAP } from "./editing.js";
 import { Client, LocalClient, Problem } from "./js/bagtrack.js";
@@ -156,7 +155,7 @@ export class Page {
 
   /** Shows what the camera sees, until a box is drawn. */
   preview() {
-    if (this.run?.source instanceof Camera) this.run.source.preview((image) => this.stage.show(image));
+    this.run?.source.preview?.((image) => this.stage.show(image));
   }
 
   /**
@@ -243,6 +242,7 @@ export class Page {
     if (!isPaused) this.leave();
     this.repaint();
     this.run?.pause(isPaused);
+    if (!isPaused) this.run?.wake?.().catch((error) => this.fail(error));
   }
 
   /** Takes no more frames.

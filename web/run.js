@@ -63,6 +63,8 @@ export class Run {
     this.underWay = [];
     /** @type {Drawn | undefined} */
     this.drawn = undefined;
+    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back. */
+    this.wake = undefined;
     /** Whether earlier frames are tracked anew. */
     this.isRedoing = false;
   }

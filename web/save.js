@@ -1,5 +1,6 @@
 // Saving results: one function a format. Boxes are in the video's own pixels, and in all formats but MOT count from 0.
 
+import { projectOf } from "./project.js";
 import { zip } from "./zip.js";
 
 /** @typedef {import("./run.js").Run} Run */
@@ -155,6 +156,7 @@ export const FORMATS = {
   coco: { make: coco, ending: "coco.json" },
   yolo: { make: yolo, ending: "yolo.zip" },
   cvat: { make: cvat, ending: "cvat.xml" },
+  project: { make: (run) => json(projectOf(run)), ending: "bagtrack.json" },
 };
 
 /**

@@ -22,7 +22,9 @@
  * @property {(time: number, frame?: number) => Promise<Picture>} [goTo] Begins at a time, and gives its frame.
  * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.
  * @property {() => void} [close] Gives up what `at` needs.
- * @property {Blob[]} [files] What can be kept of it, so that it can be opened again.
+ * @property {(show: (image: HTMLCanvasElement) => void) => void} [preview] Shows what is seen, until `first` is called.
+ * @property {boolean} [isAbsent] Whether its pictures are empty: the video of a project is not at hand.
+ * @property {File[]} [files] What can be kept of it, so that it can be opened again.
  */
 
 const QUALITY = 0.85;

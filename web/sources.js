@@ -1,17 +1,18 @@
 // What one opens: buttons, files that are chosen, dropped or pasted, folders.
 
-import { openCamera } from "./camera.js";
 import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
-import { openFile } from "./file.js";
-import { isImage, openImages } from "./images.js";
+
+/** What opens files and the camera is loaded when one is about to choose. */
+const modules = () => Promise.all([import("./file.js"), import("./images.js"), import("./camera.js")]);
 
 /** @typedef {import("./source.js").Source} Source */
 
 /** Opens what files are: one video, or images.
  * @param {File[]} files
  * @returns {Promise<Source>} */
-export function openFiles(files) {
+export async function openFiles(files) {
+  const [{ openFile }, { isImage, openImages }] = await modules();
   const video = files.find((file) => file.type.startsWith("video/"));
   if (!video && files.some(isImage)) return openImages(files);
   return openFile(video ?? files[0], get("stage"));
@@ -52,8 +53,13 @@ export function offerSources(choose, take) {
   const open = (/** @type {File[]} */ files) => {
     if (files.length > 0 && !take(files)) choose(() => openFiles(files));
   };
+  for (const kind of ["pointerover", "focusin", "dragenter"]) {
+    addEventListener(kind, () => modules().catch(() => undefined), { once: true });
+  }
   for (const clip of ["card", "leaves"]) get(clip).addEventListener("click", () => choose(() => openClip(clip)));
-  get("camera").addEventListener("click", () => choose(() => openCamera(get("stage"))));
+  get("camera").addEventListener("click", () => {
+    choose(async () => (await modules())[2].openCamera(get("stage")));
+  });
   for (const id of ["file", "folder"]) {
     input(id).addEventListener("change", () => {
       open([...(input(id).files ?? [])]);

@@ -49,8 +49,8 @@ class Checks:
         own = ("http://127.0.0.1", "ws://127.0.0.1", url, url.replace("http", "ws"), "blob:", "data:")
         page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))
         if self.from_disk:
-            page.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
-            page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
+            context.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
+            context.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
         page.goto(url + "/")
         said(page, "Nothing is uploaded")
         page.locator(f"#{where}").evaluate("button => button.click()")

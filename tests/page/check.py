@@ -18,6 +18,7 @@ import time
 import urllib.parse
 
 import files
+import kept
 import local
 import sources
 import studio
@@ -324,6 +325,7 @@ ALL = [
     busy_service,
     *files.ALL,
     *local.ALL,
+    *kept.ALL,
     *sources.ALL,
     *studio.ALL,
 ]

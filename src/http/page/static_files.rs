@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 54] = [
+const FILES: [File; 57] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -65,6 +65,8 @@ const FILES: [File; 54] = [
     file!("frames.js", SCRIPT),
     file!("gaps.js", SCRIPT),
     file!("images.js", SCRIPT),
+    file!("keeping.js", SCRIPT),
+    file!("kept.js", SCRIPT),
     file!("list.js", SCRIPT),
     file!("matroska.js", SCRIPT),
     file!("message.js", SCRIPT),
@@ -72,6 +74,7 @@ const FILES: [File; 54] = [
     file!("page.js", SCRIPT),
     file!("playback.js", SCRIPT),
     file!("problems.js", SCRIPT),
+    file!("project.js", SCRIPT),
     file!("recording.js", SCRIPT),
     file!("run.js", SCRIPT),
     file!("save.js", SCRIPT),
