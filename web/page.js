@@ -78,6 +78,7 @@ export class Page {
       control.disabled = !has(control.dataset.on);
     }
     get("begin").hidden = state !== "first" || !this.run?.source.goTo;
+    get("hand-over").hidden = !this.run?.isLocal;
     button("pause").textContent = state === "paused" ? "Go on" : "Pause";
     if (!this.seen.hasShown) get("seen").hidden = true;
   }
@@ -138,6 +139,7 @@ export class Page {
     this.isUnsaved = false;
     this.editing.drawing.arm(false);
     this.seen.reset();
+    get("handed").replaceChildren();
     this.editing.add(false);
     this.leave();
   }

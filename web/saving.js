@@ -6,7 +6,7 @@ import { words } from "./problems.js";
 /** @typedef {import("./run.js").Run} Run */
 /** @typedef {import("./page.js").Page} Page */
 
-const modules = () => Promise.all([import("./save.js"), import("./recording.js")]);
+const modules = () => Promise.all([import("./save.js"), import("./recording.js"), import("./handover.js")]);
 
 /** @param {Page} page */
 export function offerSaving(page) {
@@ -23,6 +23,7 @@ export function offerSaving(page) {
       page.say(words(error, page.hasKey), true);
     }
   });
+  button("hand-over").addEventListener("click", () => giveAway(page));
   button("save-video").addEventListener("click", () => saveVideo(page));
   if (typeof VideoEncoder === "undefined") {
     button("save-video").textContent = "Video (Matroska)";
@@ -53,4 +54,35 @@ async function saveVideo(page) {
   }
   own.textContent = label;
   own.disabled = false;
+}
+
+/** Hands the objects over to the service, and shows their sessions.
+ * @param {Page} page */
+async function giveAway(page) {
+  const { run } = page;
+  if (!run) return;
+  page.again = () => giveAway(page);
+  button("hand-over").disabled = true;
+  try {
+    const handed = await (await modules())[2].handOver(run, page.client);
+    const links = handed.map(({ name, id }) => {
+      const link = document.createElement("a");
+      link.href = `sessions/${id}`;
+      link.textContent = name;
+      const item = document.createElement("li");
+      item.append(link, ` ${id}`);
+      return item;
+    });
+    get("handed").replaceChildren(...links);
+    const isWhole = handed.every((it) => it.isWhole);
+    page.say(
+      isWhole
+        ? "The service has the sessions, with all that was learned."
+        : "The service takes no states of other trackers (it was started without --unsigned-snapshots): it got the last " +
+            "frame and its boxes instead.",
+    );
+  } catch (error) {
+    page.fail(error);
+  }
+  button("hand-over").disabled = false;
 }

@@ -7,6 +7,7 @@ import xml.etree.ElementTree
 import zipfile
 
 from browser import FRAMES_A_SECOND, begin_at, choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+from service import Service
 
 CORRECTED = 100
 KEY = 40
@@ -127,6 +128,17 @@ def check_exports(page, table):
     same(boxes, 0.011)
 
 
+    [task] = json.loads(saved(page, "#save-label-studio"))
+    found = {}
+    for region in task["annotations"][0]["result"]:
+        assert region["type"] == "videorectangle" and region["value"]["framesCount"] == 150, region
+        for box in region["value"]["sequence"]:
+            scaled = [box["x"] * 4.8, box["y"] * 3.6, box["width"] * 4.8, box["height"] * 3.6]
+            found[box["frame"] - 1, int(region["id"].split("-")[1]) - 1] = scaled
+    assert task["data"] == {"video": "card"} and len(found) == len(table)
+    same(found, 0.01)
+
+
 def objects_in_the_page(checks):
     objects_in(checks, "here")
 
@@ -159,4 +171,25 @@ def tracked_backwards(checks):
     page.context.close()
 
 
-ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards]
+def saved_to_the_service(checks):
+    """A session of the page goes on in the service: whole where it takes such states, else from its last frame."""
+    for flags, says, whole in ((["--unsigned-snapshots"], "all that was learned", True), ([], "--unsigned-snapshots", False)):
+        service = Service(checks.program, *flags)
+        page = checks.page(url=service.url, where="here", allowed=("422",))
+        choose(page, "card")
+        drag(page, checks.clips["card"]["truth"][0])
+        frames(page, 20)
+        page.locator("#stop").click()
+        table = rows(page)
+        page.locator("#hand-over").click()
+        said(page, says)
+        session = page.locator("#handed a").get_attribute("href")
+        view = service.call("GET", f"/{session}")
+        assert view["frames"] == (len(table) if whole else 1), (view, len(table))
+        box = [view["answer"]["box"][side] for side in ("x", "y", "width", "height")]
+        assert max(abs(one - other) for one, other in zip(box, numbers(table[-1]))) <= 0.02, (box, table[-1])
+        page.context.close()
+        service.stop()
+
+
+ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards, saved_to_the_service]

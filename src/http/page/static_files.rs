@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 57] = [
+const FILES: [File; 58] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -64,6 +64,7 @@ const FILES: [File; 57] = [
     file!("follower.js", SCRIPT),
     file!("frames.js", SCRIPT),
     file!("gaps.js", SCRIPT),
+    file!("handover.js", SCRIPT),
     file!("images.js", SCRIPT),
     file!("keeping.js", SCRIPT),
     file!("kept.js", SCRIPT),
