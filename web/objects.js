@@ -48,6 +48,17 @@ export class FollowedObject {
     if (this.frames.length % SAVE_EVERY === 0) this.save();
   }
 
+  /** Has a row that the session at work knows nothing of.
+   * @param {Row} row */
+  set(row) {
+    this.rows.set(row.frame, row);
+  }
+
+  /** Brings the rows into the order of the frames. */
+  sort() {
+    this.rows = new Map([...this.rows].sort(([one], [other]) => one - other));
+  }
+
   async save() {
     const { frames } = this;
     // Without it one goes on from an older one.

@@ -1,5 +1,7 @@
 // The video with its boxes, made from the frames that were tracked: each is in it once, at its time.
 
+import { shownIn } from "./boxes.js";
+import { close } from "./frames.js";
 import { matroska } from "./matroska.js";
 import { encoded } from "./source.js";
 import { paintBox } from "./stage.js";
@@ -33,14 +35,18 @@ export const extension = encodes ? "webm" : "mkv";
 async function draw(run, write, tell) {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d");
-  const drawn = [...run.frames].sort(([one], [other]) => one - other);
-  for (const [index, [frame, { blob, time }]] of drawn.entries()) {
-    const image = await createImageBitmap(blob);
+  const drawn = run.frames.shown;
+  let begun = 0;
+  for (const [index, frame] of drawn.entries()) {
+    const picture = await run.frames.at(frame);
+    if (!picture) continue;
+    const { image, time } = picture;
+    if (index === 0) begun = time;
     if (index === 0) [canvas.width, canvas.height] = [image.width, image.height].map((side) => side - (side % 2));
     context?.drawImage(image, 0, 0);
-    for (const object of run.shownIn(frame, image)) if (context) paintBox(context, object);
-    image.close();
-    await write(canvas, Math.round((time - drawn[0][1].time) * 1000), index);
+    for (const object of shownIn(run, frame, image)) if (context) paintBox(context, object);
+    close(picture);
+    await write(canvas, Math.round((time - begun) * 1000), index);
     tell(index + 1, drawn.length);
   }
   return canvas;

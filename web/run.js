@@ -1,6 +1,8 @@
 // One run: a source of frames, the objects that are followed through them, and the answers.
 
+import { rowOf } from "./boxes.js";
 import { LocalFollower, ServiceFollower, WINDOW } from "./follower.js";
+import { Frames, close } from "./frames.js";
 import { LocalClient } from "./js/bagtrack.js";
 import { FollowedObject } from "./objects.js";
 
@@ -25,8 +27,6 @@ import { FollowedObject } from "./objects.js";
 
 /** Answers that the rate is taken over. */
 const RATE_OVER = 30;
-/** Most bytes of frames that are kept. */
-const MOST_KEPT = 512 << 20;
 
 export class Run {
   /**
@@ -47,9 +47,7 @@ export class Run {
     this.chosen = undefined;
     /** How many there were. */
     this.count = 0;
-    /** @type {Map<number, {blob: Blob, time: number}>} The last frames, by their numbers in the video. */
-    this.frames = new Map();
-    this.bytes = 0;
+    this.frames = new Frames(source);
     /** How many frames were tracked. */
     this.tracked = 1;
     /** @type {number[]} */
@@ -65,8 +63,14 @@ export class Run {
     this.underWay = [];
     /** @type {Drawn | undefined} */
     this.drawn = undefined;
+    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back. */
+    this.wake = undefined;
     /** Whether earlier frames are tracked anew. */
     this.isRedoing = false;
+  }
+
+  get isLocal() {
+    return this.client instanceof LocalClient;
   }
 
   /** Frames that were not tracked. */
@@ -83,15 +87,17 @@ export class Run {
    * @param {Box} box */
   async begin(box) {
     await this.add(box);
-    if (this.isOver) return;
-    const started = this.source.start(
-      (picture) => this.deliver(picture),
-      () => {
-        this.hasAll = true;
-        this.checkEnd();
-      },
-    );
-    started.catch((error) => this.fail(error));
+    if (!this.isOver) this.play();
+  }
+
+  /** Takes the frames after the last one. */
+  play() {
+    this.isResting = false;
+    const end = () => {
+      this.hasAll = true;
+      this.checkEnd();
+    };
+    this.source.start((picture) => this.deliver(picture), end).catch((error) => this.fail(error));
   }
 
   /** Follows another object, from the picture that was answered last.
@@ -101,7 +107,7 @@ export class Run {
     const answer = await object.follower.open(this.picture, box);
     if (this.isOver) return object.follower.end();
     this.take(object);
-    this.keep(this.picture);
+    this.frames.keep(this.picture);
     this.note(object, answer, this.picture, true);
     this.told.answer(this.picture, answer);
   }
@@ -163,9 +169,9 @@ export class Run {
   }
 
   /** @param {Picture} picture */
-  skip({ image }) {
+  skip(picture) {
     this.passedOver += 1;
-    if ("close" in image) image.close();
+    close(picture);
   }
 
   throttle() {
@@ -182,17 +188,17 @@ export class Run {
     const now = performance.now();
     this.trip = now - at;
     this.answeredAt = [...this.answeredAt, now].slice(-RATE_OVER);
-    const before = this.picture.image;
+    const before = this.picture;
     this.picture = picture;
     this.tracked += 1;
-    this.keep(picture);
+    this.frames.keep(picture);
     objects.forEach((object, index) => {
       const answer = answers[index];
       if (answer && this.objects.includes(object)) this.note(object, answer, picture, false);
     });
     this.told.answer(picture, this.chosen && answers[objects.indexOf(this.chosen)]);
     // It is not shown any more.
-    if (before !== picture.image && "close" in before) before.close();
+    if (before.image !== picture.image) close(before);
     this.sendDrawn();
     this.checkEnd();
   }
@@ -203,50 +209,8 @@ export class Run {
    * @param {Picture} picture
    * @param {boolean} corrected
    */
-  note(object, { box, score, status }, picture, corrected) {
-    const { frame, time } = picture;
-    object.note({ frame, time: Number(time.toFixed(3)), box: this.inOwnPixels(box, picture), score, status, corrected });
-  }
-
-  /** A box of the uploaded frame in the video's own pixels.
-   * @param {Box} box
-   * @param {Picture} picture */
-  inOwnPixels(box, { image }) {
-    return scaled(box, this.source.size, image);
-  }
-
-  /** Keeps a frame. The oldest ones go where there are too many.
-   * @param {Picture} picture */
-  keep({ frame, blob, time }) {
-    this.bytes += blob.size - (this.frames.get(frame)?.blob.size ?? 0);
-    this.frames.set(frame, { blob, time });
-    for (const [oldest, kept] of this.frames) {
-      if (this.bytes <= MOST_KEPT) break;
-      this.frames.delete(oldest);
-      this.bytes -= kept.blob.size;
-    }
-  }
-
-  /** A frame that is kept.
-   * @param {number} frame
-   * @returns {Promise<Picture | undefined>} */
-  async kept(frame) {
-    const kept = this.frames.get(frame);
-    return kept && { ...kept, frame, image: await createImageBitmap(kept.blob) };
-  }
-
-  /** What is shown of the objects in a frame.
-   * @param {number} frame
-   * @param {{width: number, height: number}} image
-   * @returns {import("./stage.js").Shown[]} */
-  shownIn(frame, image) {
-    const isNamed = this.objects.length > 1;
-    return this.objects.flatMap(({ rows, name, color, isShown }) => {
-      const row = rows.get(frame);
-      if (!row || !isShown) return [];
-      const box = scaled(row.box, image, this.source.size);
-      return [{ box, color, name: isNamed ? name : "", isLost: row.status === "lost" }];
-    });
+  note(object, answer, picture, corrected) {
+    object.note(rowOf(answer, picture, this.source.size, corrected));
   }
 
   /** Frames a second, of the last answers. */
@@ -292,37 +256,17 @@ export class Run {
     this.checkEnd();
   }
 
-  /**
-   * Follows an object anew, from a box in an earlier frame up to the last one.
-   * @param {FollowedObject | undefined} known Nothing for a new one.
-   * @param {number} frame
-   * @param {Box} box
-   * @param {(frame: number) => void} tell Is told of each frame.
-   */
-  async redo(known, frame, box, tell) {
+  /** Tracks frames again while no other ones are tracked.
+   * @param {() => Promise<void>} track */
+  async alone(track) {
     this.isRedoing = true;
     this.throttle();
-    const object = known ?? this.newObject();
     try {
       while (this.underWay.length > 0) await new Promise(requestAnimationFrame);
-      const from = await object.goBackBefore(frame, this.follower());
-      object.forgetFrom(frame);
-      for (const number of [...this.frames.keys()].sort((a, b) => a - b)) {
-        if (this.isOver || number < (from === undefined ? frame : from + 1)) continue;
-        const picture = /** @type {Picture} */ (await this.kept(number));
-        const isDrawn = number === frame;
-        const isFirst = isDrawn && from === undefined;
-        const { follower } = object;
-        const answer = await (isFirst ? follower.open(picture, box) : follower.track(picture, isDrawn ? { box } : {}));
-        if (!this.objects.includes(object)) this.take(object);
-        if (answer && number >= frame) this.note(object, answer, picture, isDrawn);
-        else if (answer) object.frames.push(number);
-        if ("close" in picture.image) picture.image.close();
-        tell(number);
-      }
-      if (this.isResting) object.follower.end();
+      await track();
     } finally {
       this.isRedoing = false;
+      if (this.isResting && !this.isLocal) this.objects.forEach(({ follower }) => follower.end());
       this.throttle();
     }
     this.checkEnd();
@@ -343,24 +287,14 @@ export class Run {
   stop() {
     this.isOver = true;
     this.rest();
+    this.objects.forEach(({ follower }) => follower.end());
+    this.source.close?.();
   }
 
-  /** Takes no more frames. Those that are kept can be tracked anew. */
+  /** Takes no more frames. Those that are kept can be tracked anew, and the sessions be handed over. */
   rest() {
     this.isResting = true;
     this.source.stop();
-    this.objects.forEach(({ follower }) => follower.end());
+    if (!this.isLocal) this.objects.forEach(({ follower }) => follower.end());
   }
-}
-
-/** A box in pixels of another size of the same picture.
- * @param {Box} box
- * @param {{width: number, height: number}} to
- * @param {{width: number, height: number}} from */
-export function scaled(box, to, from) {
-  if (to.width === from.width && to.height === from.height) return box;
-  const [across, down] = [to.width / from.width, to.height / from.height];
-  const rounded = (/** @type {number} */ value) => Number(value.toFixed(2));
-  const [x, y] = [rounded(box.x * across), rounded(box.y * down)];
-  return { x, y, width: rounded(box.width * across), height: rounded(box.height * down) };
 }

@@ -1,5 +1,6 @@
 // Saving results: one function a format. Boxes are in the video's own pixels, and in all formats but MOT count from 0.
 
+import { projectOf } from "./project.js";
 import { zip } from "./zip.js";
 
 /** @typedef {import("./run.js").Run} Run */
@@ -147,6 +148,37 @@ ${tracks.join("\n")}
   return new Blob([document], { type: "application/xml" });
 }
 
+/** Label Studio: a task with a video, and a region of it for each object. Frames count from 1, boxes are in percent.
+ * @param {Run} run */
+function labelStudio(run) {
+  const { width, height } = run.source.size;
+  const last = Math.max(...tracked(run));
+  const rate = run.source.rate ?? 25;
+  const result = run.objects.map(({ number, name, rows }) => ({
+    id: `object-${number + 1}`,
+    type: "videorectangle",
+    from_name: "box",
+    to_name: "video",
+    value: {
+      framesCount: last + 1,
+      duration: Number(((last + 1) / rate).toFixed(3)),
+      labels: [name],
+      sequence: [...rows.values()].map(({ frame, time, box, status }) => ({
+        frame: frame + 1,
+        time,
+        // After a key frame that is not enabled the region is not shown.
+        enabled: status !== "lost",
+        rotation: 0,
+        x: (100 * box.x) / width,
+        y: (100 * box.y) / height,
+        width: (100 * box.width) / width,
+        height: (100 * box.height) / height,
+      })),
+    },
+  }));
+  return json([{ data: { video: run.source.name }, annotations: [{ result }] }]);
+}
+
 /** @type {Record<string, {make: (run: Run) => Blob, ending: string}>} */
 export const FORMATS = {
   csv: { make: csv, ending: "csv" },
@@ -155,6 +187,8 @@ export const FORMATS = {
   coco: { make: coco, ending: "coco.json" },
   yolo: { make: yolo, ending: "yolo.zip" },
   cvat: { make: cvat, ending: "cvat.xml" },
+  "label-studio": { make: labelStudio, ending: "label-studio.json" },
+  project: { make: (run) => json(projectOf(run)), ending: "bagtrack.json" },
 };
 
 /**

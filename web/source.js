@@ -17,12 +17,19 @@
  * @property {(deliver: (picture: Picture) => void, end: () => void) => Promise<void>} start Delivers the frames after
  *   it. Fails where they cannot be had.
  * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
- * @property {() => void} stop
+ * @property {() => void} stop Takes no more frames.
+ * @property {number} [duration] Seconds, where one may begin anywhere.
+ * @property {(time: number, frame?: number) => Promise<Picture>} [goTo] Begins at a time, and gives its frame.
+ * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.
+ * @property {() => void} [close] Gives up what `at` needs.
+ * @property {(show: (image: HTMLCanvasElement) => void) => void} [preview] Shows what is seen, until `first` is called.
+ * @property {boolean} [isAbsent] Whether its pictures are empty: the video of a project is not at hand.
+ * @property {File[]} [files] What can be kept of it, so that it can be opened again.
  */
 
 const QUALITY = 0.85;
 /** Longest side of an uploaded frame in pixels: the tracker needs no more. */
-const LONGEST_SIDE = 960;
+export const LONGEST_SIDE = 960;
 
 /** A video element at a place of the page: what browsers do not show they may not decode.
  * @param {HTMLElement} place */
@@ -51,11 +58,19 @@ export function loaded(video) {
  * @param {CanvasImageSource} [shown] The frame, where it is at hand.
  * @param {HTMLCanvasElement} [canvas] Where to, if not onto a new one. */
 export function drawFrame(video, shown = video, canvas = document.createElement("canvas")) {
-  const scale = Math.min(1, LONGEST_SIDE / Math.max(video.videoWidth, video.videoHeight));
-  const [width, height] = [video.videoWidth, video.videoHeight].map((side) => Math.max(1, Math.round(side * scale)));
+  return drawScaled(shown, { width: video.videoWidth, height: video.videoHeight }, canvas);
+}
+
+/** Draws an image of this size as large as it is uploaded.
+ * @param {CanvasImageSource} image
+ * @param {{width: number, height: number}} size
+ * @param {HTMLCanvasElement} [canvas] */
+export function drawScaled(image, size, canvas = document.createElement("canvas")) {
+  const scale = Math.min(1, LONGEST_SIDE / Math.max(size.width, size.height));
+  const [width, height] = [size.width, size.height].map((side) => Math.max(1, Math.round(side * scale)));
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;
-  canvas.getContext("2d", { willReadFrequently: true })?.drawImage(shown, 0, 0, width, height);
+  canvas.getContext("2d", { willReadFrequently: true })?.drawImage(image, 0, 0, width, height);
   return canvas;
 }
 

@@ -49,8 +49,8 @@ class Checks:
         own = ("http://127.0.0.1", "ws://127.0.0.1", url, url.replace("http", "ws"), "blob:", "data:")
         page.on("request", lambda request: request.url.startswith(own) or fault(f"request to {request.url}"))
         if self.from_disk:
-            page.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
-            page.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
+            context.route("**/page/**", lambda route: route.fulfill(path=on_disk(route.request.url)))
+            context.route(url + "/", lambda route: route.fulfill(path=WEB / "index.html"))
         page.goto(url + "/")
         said(page, "Nothing is uploaded")
         page.locator(f"#{where}").evaluate("button => button.click()")
@@ -104,6 +104,13 @@ def drag(page, box):
     page.mouse.move((left + right) / 2, bottom)
     page.mouse.move(right, bottom)
     page.mouse.up()
+
+
+def begin_at(page, time, frame):
+    """Moves the bar under the first picture, and waits for the frame."""
+    moved = "(bar, at) => { bar.value = String(at); bar.dispatchEvent(new Event('input')); }"
+    page.locator("#begin-at").evaluate(moved, time + 0.005)
+    page.locator("#begin-time").filter(has_text=f"frame {frame}").wait_for()
 
 
 def frames(page, count):

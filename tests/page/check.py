@@ -18,8 +18,11 @@ import time
 import urllib.parse
 
 import files
+import kept
 import local
+import sources
 import studio
+import welcome
 from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
 from clips import Clips
 from playwright.sync_api import sync_playwright
@@ -308,6 +311,7 @@ def busy_service(checks):
 
 ALL = [
     weight_and_first_picture,
+    *welcome.ALL,
     sample_by_mouse,
     lost_and_found,
     broken_line,
@@ -321,6 +325,8 @@ ALL = [
     busy_service,
     *files.ALL,
     *local.ALL,
+    *kept.ALL,
+    *sources.ALL,
     *studio.ALL,
 ]
 

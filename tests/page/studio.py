@@ -6,9 +6,12 @@ import re
 import xml.etree.ElementTree
 import zipfile
 
-from browser import choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+from browser import FRAMES_A_SECOND, begin_at, choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+from service import Service
 
 CORRECTED = 100
+KEY = 40
+"""Where one begins in the middle."""
 
 
 def to_frame(page, frame):
@@ -125,6 +128,17 @@ def check_exports(page, table):
     same(boxes, 0.011)
 
 
+    [task] = json.loads(saved(page, "#save-label-studio"))
+    found = {}
+    for region in task["annotations"][0]["result"]:
+        assert region["type"] == "videorectangle" and region["value"]["framesCount"] == 150, region
+        for box in region["value"]["sequence"]:
+            scaled = [box["x"] * 4.8, box["y"] * 3.6, box["width"] * 4.8, box["height"] * 3.6]
+            found[box["frame"] - 1, int(region["id"].split("-")[1]) - 1] = scaled
+    assert task["data"] == {"video": "card"} and len(found) == len(table)
+    same(found, 0.01)
+
+
 def objects_in_the_page(checks):
     objects_in(checks, "here")
 
@@ -133,4 +147,49 @@ def objects_with_the_service(checks):
     objects_in(checks, "there")
 
 
-ALL = [objects_in_the_page, objects_with_the_service]
+def tracked_backwards(checks):
+    """From a key frame in the middle to the beginning: frames before the first box are fetched, those after are kept."""
+    page = checks.page(where="here")
+    truth = checks.clips["card"]["truth"]
+    choose(page, "card")
+    begin_at(page, KEY / FRAMES_A_SECOND, KEY)
+    drag(page, truth[KEY])
+    frames(page, 10)
+    page.locator("#stop").click()
+    before = rows(page)
+    page.locator("#timeline").focus()
+    page.keyboard.press("Home")
+    shown(page, KEY)
+    page.locator("#backwards").click()
+    said(page, f"Followed {KEY} frames backwards")
+    table = rows(page)
+    assert [int(row["frame"]) for row in table] == list(range(KEY + len(before)))
+    assert values(table[KEY:]) == values(before), "frames after the key frame have changed"
+    close = near(table[:KEY], truth)
+    print(f"  {close} of {KEY} frames within 10 px, backwards")
+    assert close >= 0.9 * KEY
+    page.context.close()
+
+
+def saved_to_the_service(checks):
+    """A session of the page goes on in the service: whole where it takes such states, else from its last frame."""
+    for flags, says, whole in ((["--unsigned-snapshots"], "all that was learned", True), ([], "--unsigned-snapshots", False)):
+        service = Service(checks.program, *flags)
+        page = checks.page(url=service.url, where="here", allowed=("422",))
+        choose(page, "card")
+        drag(page, checks.clips["card"]["truth"][0])
+        frames(page, 20)
+        page.locator("#stop").click()
+        table = rows(page)
+        page.locator("#hand-over").click()
+        said(page, says)
+        session = page.locator("#handed a").get_attribute("href")
+        view = service.call("GET", f"/{session}")
+        assert view["frames"] == (len(table) if whole else 1), (view, len(table))
+        box = [view["answer"]["box"][side] for side in ("x", "y", "width", "height")]
+        assert max(abs(one - other) for one, other in zip(box, numbers(table[-1]))) <= 0.02, (box, table[-1])
+        page.context.close()
+        service.stop()
+
+
+ALL = [objects_in_the_page, objects_with_the_service, tracked_backwards, saved_to_the_service]

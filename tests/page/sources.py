@@ -1,0 +1,76 @@
+"""What one opens: a folder of images, files that are dropped or pasted, a file from its middle."""
+
+import base64
+
+from browser import DRAW, begin_at, distance, drag, rows, said, to_the_end
+from clips import FRAMES, H264, VP8
+from files import check_rows, choose_file, sent_box, times_of
+
+COUNT = 20
+"""Images of a folder."""
+BEGUN = 1.0
+"""Where a file is begun, in seconds."""
+
+
+def folder_of_images(checks):
+    """The images are tracked in the order of their numbers, though their names are not padded."""
+    folder = checks.files.folder / "walk"
+    folder.mkdir(exist_ok=True)
+    for index in range(COUNT):
+        (folder / f"image{index}.jpg").write_bytes(checks.service.bytes(f"/sample/card/{3 * index}.jpg"))
+    (folder / "notes.txt").write_text("no image")
+    page = checks.page(where="here")
+    page.locator("#folder").set_input_files(folder)
+    said(page, DRAW)
+    truth = checks.clips["card"]["truth"][::3]
+    drag(page, truth[0])
+    to_the_end(page)
+    table = rows(page)
+    assert [int(row["frame"]) for row in table] == list(range(COUNT))
+    assert table[0]["video"] == "walk", table[0]
+    close = sum(distance(row, truth[int(row["frame"])]) <= 10 for row in table)
+    assert close >= 0.9 * COUNT, close
+    page.context.close()
+
+
+HANDED = """([kind, name, type, content]) => {
+    const bytes = Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0));
+    const data = new DataTransfer();
+    data.items.add(new File([bytes], name, { type }));
+    const event = kind === "paste"
+        ? new ClipboardEvent("paste", { clipboardData: data, bubbles: true })
+        : new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true });
+    document.body.dispatchEvent(event);
+}"""
+
+
+def dropped_and_pasted(checks):
+    path = checks.files.file("clip.webm", 25, VP8)
+    content = base64.b64encode(path.read_bytes()).decode()
+    for kind in ("drop", "paste"):
+        page = checks.page(where="here")
+        page.evaluate(HANDED, [kind, path.name, "video/webm", content])
+        said(page, DRAW)
+        page.context.close()
+
+
+def begun_in_the_middle(checks):
+    """A file is begun at a later frame. Its rows have the numbers and times of the file."""
+    for path, rate in ((checks.files.file("clip.mp4", 30, H264), 30), (checks.files.file("clip.webm", 25, VP8), 25)):
+        page = checks.page(where="here")
+        choose_file(page, path)
+        first = round(BEGUN * rate)
+        begin_at(page, BEGUN, first)
+        drag(page, sent_box(checks.files.truth[first]))
+        to_the_end(page)
+        table = rows(page)
+        assert [int(row["frame"]) for row in table] == list(range(first, FRAMES)), [row["frame"] for row in table]
+        off = [row["time"] for row, time in zip(table, times_of(path)[first:]) if abs(float(row["time"]) - time) > 0.0015]
+        assert not off, off
+        close = sum(distance(row, checks.files.truth[int(row["frame"])]) <= 10 for row in table)
+        print(f"  {path.name} from frame {first}: {close} of {len(table)} within 10 px")
+        assert close >= 0.9 * len(table)
+        page.context.close()
+
+
+ALL = [folder_of_images, dropped_and_pasted, begun_in_the_middle]

@@ -1,0 +1,59 @@
+// Where to begin in a source: a bar under its first frame, until a box is drawn.
+
+import { get, input } from "./dom.js";
+
+export class Beginning {
+  /** @param {import("./page.js").Page} page */
+  constructor(page) {
+    this.page = page;
+    /** @type {Promise<unknown>} The source is where it was sent before. */
+    this.going = Promise.resolve();
+    this.wanted = 0;
+    const bar = input("begin-at");
+    bar.addEventListener("input", () => this.goTo(bar.valueAsNumber));
+  }
+
+  /** Is at the beginning of a source. */
+  reset() {
+    input("begin-at").max = String(this.page.run?.source.duration ?? 0);
+    input("begin-at").value = "0";
+    this.tell(0, 0);
+  }
+
+  /** @param {number} time
+   * @param {number} [frame] */
+  tell(time, frame) {
+    const number = frame === undefined ? "" : `, frame ${frame}`;
+    const text = `${time.toFixed(2)} s of ${(this.page.run?.source.duration ?? 0).toFixed(2)} s${number}`;
+    get("begin-time").textContent = text;
+    input("begin-at").setAttribute("aria-valuetext", text);
+  }
+
+  /** A frame further, or back.
+   * @param {number} by */
+  step(by) {
+    const bar = input("begin-at");
+    const time = Math.min(Math.max(0, bar.valueAsNumber + by / (this.page.run?.source.rate ?? 25)), Number(bar.max));
+    bar.value = String(time);
+    this.goTo(time);
+  }
+
+  /** @param {number} time */
+  goTo(time) {
+    const { page } = this;
+    const { run } = page;
+    const wanted = (this.wanted += 1);
+    this.tell(time);
+    const isWanted = () => wanted === this.wanted && page.state === "first" && run === page.run;
+    // The source goes to one time after the other. Those that are overtaken are passed over.
+    this.going = this.going.then(async () => {
+      if (!run?.source.goTo || !isWanted()) return;
+      const picture = await run.source.goTo(time);
+      run.picture = picture;
+      if (run !== page.run) return;
+      page.stage.show(picture.image);
+      if (isWanted()) this.tell(time, picture.frame);
+    });
+    this.going = this.going.catch((error) => page.fail(error));
+  }
+}

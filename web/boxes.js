@@ -1,0 +1,40 @@
+// Boxes in the pixels that they are meant in: the video's own, or those that are tracked and shown.
+
+/** @typedef {import("./js/bagtrack.js").Box} Box */
+
+/** A box in pixels of another size of the same picture.
+ * @param {Box} box
+ * @param {{width: number, height: number}} to
+ * @param {{width: number, height: number}} from */
+export function scaled(box, to, from) {
+  if (to.width === from.width && to.height === from.height) return box;
+  const [across, down] = [to.width / from.width, to.height / from.height];
+  const rounded = (/** @type {number} */ value) => Number(value.toFixed(2));
+  const [x, y] = [rounded(box.x * across), rounded(box.y * down)];
+  return { x, y, width: rounded(box.width * across), height: rounded(box.height * down) };
+}
+
+/** What an answer tells of a frame, in the video's own pixels.
+ * @param {import("./js/bagtrack.js").StreamAnswer} answer
+ * @param {import("./source.js").Picture} picture
+ * @param {{width: number, height: number}} size Of the video.
+ * @param {boolean} corrected
+ * @returns {import("./objects.js").Row} */
+export function rowOf({ box, score, status }, { frame, time, image }, size, corrected) {
+  return { frame, time: Number(time.toFixed(3)), box: scaled(box, size, image), score, status, corrected };
+}
+
+/** What is shown of the objects in a frame.
+ * @param {import("./run.js").Run} run
+ * @param {number} frame
+ * @param {{width: number, height: number}} image
+ * @returns {import("./stage.js").Shown[]} */
+export function shownIn({ objects, source }, frame, image) {
+  const isNamed = objects.length > 1;
+  return objects.flatMap(({ rows, name, color, isShown }) => {
+    const row = rows.get(frame);
+    if (!row || !isShown) return [];
+    const box = scaled(row.box, image, source.size);
+    return [{ box, color, name: isNamed ? name : "", isLost: row.status === "lost" }];
+  });
+}

@@ -1,0 +1,161 @@
+// What one does to objects: draw their boxes, correct them in any frame, track them again, name and delete them.
+
+import { trackBack, trackOn } from "./again.js";
+import { BoxDrawing } from "./box.js";
+import { canvas, get } from "./dom.js";
+import { ObjectList } from "./list.js";
+import { FOLLOWING } from "./message.js";
+import { MOST_OBJECTS } from "./objects.js";
+import { words } from "./problems.js";
+
+/**
+ * @typedef {import("./js/bagtrack.js").Box} Box
+ * @typedef {import("./objects.js").FollowedObject} FollowedObject
+ * @typedef {import("./run.js").Run} Run
+ */
+
+export const DRAW = "Draw a box around what to follow.";
+export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
+const ADD = "Draw a box around the object to add.";
+
+export class Editing {
+  /** @param {import("./page.js").Page} page */
+  constructor(page) {
+    this.page = page;
+    /** Whether the next box is that of a new object. */
+    this.isAdding = false;
+    this.drawing = this.makeDrawing();
+    this.list = this.makeList();
+  }
+
+  makeDrawing() {
+    return new BoxDrawing(canvas("picture"), {
+      start: () => this.startDrawing(),
+      change: (box) => {
+        this.page.stage.draw(box);
+        if (box) return;
+        if (this.page.hasRows) this.page.run?.pause(this.page.state === "paused");
+        else this.page.preview();
+      },
+      finish: (box) => this.drawn(box),
+      tap: () => {
+        if (this.page.run && !this.page.run.isOver) this.page.say(`${TAP}${this.page.hasRows ? "Then draw the box anew." : DRAW}`);
+      },
+      arm(isArmed) {
+        get("picture").classList.toggle("armed", isArmed);
+        get("draw").setAttribute("aria-pressed", String(isArmed));
+      },
+    });
+  }
+
+  startDrawing() {
+    const { run } = this.page;
+    if (!run || run.isOver || run.isRedoing || this.page.state === "opening") return false;
+    if (this.page.hasRows) run.pause(true);
+    else if (run.source.isLive) {
+      const frozen = (this.page.frozen = run.source.first());
+      frozen.then(({ image }) => this.page.state === "first" && this.page.stage.show(image)).catch((error) => this.page.fail(error));
+    }
+    return true;
+  }
+
+  /** A box was drawn: the first one, a correction, or that of a new object.
+   * @param {Box} box */
+  drawn(box) {
+    this.page.stage.draw(undefined);
+    const { run } = this.page;
+    if (!run) return;
+    if (this.page.state === "first") return void this.page.follow(run, box);
+    const object = this.isAdding ? undefined : run.chosen;
+    this.add(false);
+    if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
+    run.draw(box, object);
+    run.pause(this.page.state === "paused");
+    this.page.say(object ? "The box is corrected." : "Following another object.");
+  }
+
+  /** Follows an object anew from an earlier frame on.
+   * @param {Run} run
+   * @param {FollowedObject | undefined} object
+   * @param {number} frame
+   * @param {Box} box */
+  trackOn(run, object, frame, box) {
+    const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
+    return this.tracksAgain(run, async () => {
+      await trackOn(run, object, frame, box, tell);
+      return `Followed anew from frame ${frame}.`;
+    });
+  }
+
+  /** Follows the chosen object backwards from the frame that is shown. */
+  async trackBack() {
+    const { run, shown } = this.page;
+    if (!run?.chosen || !shown || run.isRedoing || run.isOver) return;
+    this.page.pause(true);
+    const { chosen } = run;
+    await this.tracksAgain(run, async () => {
+      const count = await trackBack(run, chosen, shown.frame, (at) => this.page.say(`Following backwards: frame ${at}.`));
+      return count > 0 ? `Followed ${count} frames backwards.` : "There is no frame before it, or a box was drawn there.";
+    });
+  }
+
+  /**
+   * @param {Run} run
+   * @param {() => Promise<string>} track Says what it did.
+   */
+  async tracksAgain(run, track) {
+    this.page.isUnsaved = true;
+    try {
+      const done = await track();
+      if (run !== this.page.run) return;
+      this.page.say(done);
+      this.page.repaint();
+      this.page.changed();
+    } catch (error) {
+      if (run === this.page.run) this.page.say(words(error, this.page.hasKey), true);
+    }
+  }
+
+  /** Makes the next box that of a new object, or not.
+   * @param {boolean} isOn */
+  add(isOn) {
+    this.isAdding = isOn;
+    get("add").setAttribute("aria-pressed", String(isOn));
+  }
+
+  toggleAdding() {
+    const { run } = this.page;
+    if (!run || run.isOver) return;
+    if (run.objects.length >= MOST_OBJECTS) return this.page.say(`No more than ${MOST_OBJECTS} objects are followed.`);
+    this.add(!this.isAdding);
+    if (this.isAdding) this.drawing.arm(true);
+    this.page.say(this.isAdding ? ADD : FOLLOWING);
+  }
+
+  makeList() {
+    return new ObjectList(get("list"), {
+      choose: (object) => {
+        if (this.page.run) this.page.run.chosen = object;
+        this.page.repaint();
+      },
+      remove: (object) => {
+        this.page.run?.remove(object);
+        this.page.isUnsaved = true;
+        this.page.repaint();
+        this.page.changed();
+      },
+      doubt: (object) => {
+        if (!this.page.run) return;
+        this.page.run.chosen = object;
+        const frame = object.nextDoubtful(this.page.shown?.frame ?? 0);
+        if (frame === undefined) this.page.say(`${object.name} is tracked in all frames.`);
+        else this.page.seek(frame);
+        this.page.repaint();
+      },
+      change: () => {
+        this.page.repaint();
+        this.page.changed();
+      },
+    });
+  }
+}

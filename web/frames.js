@@ -1,0 +1,68 @@
+// The frames that were tracked: their times, and the pictures of as many as memory allows.
+
+/** @typedef {import("./source.js").Picture} Picture */
+
+/** Most bytes of pictures. */
+const MOST_BYTES = 512 << 20;
+
+export class Frames {
+  /** @param {import("./source.js").Source} source */
+  constructor(source) {
+    this.source = source;
+    /** @type {Map<number, number>} Seconds from the beginning of the video, by numbers in the video. */
+    this.times = new Map();
+    /** @type {Map<number, Blob>} */
+    this.blobs = new Map();
+    this.bytes = 0;
+  }
+
+  /** All numbers, ascending. */
+  get numbers() {
+    return [...this.times.keys()].sort((one, other) => one - other);
+  }
+
+  /** The numbers of those whose pictures can be had. */
+  get shown() {
+    return this.source.at ? this.numbers : this.numbers.filter((frame) => this.blobs.has(frame));
+  }
+
+  /** Keeps a frame. The oldest pictures go where there are too many.
+   * @param {Picture} picture */
+  keep({ frame, blob, time }) {
+    this.times.set(frame, time);
+    this.bytes += blob.size - (this.blobs.get(frame)?.size ?? 0);
+    this.blobs.set(frame, blob);
+    for (const [oldest, kept] of this.blobs) {
+      if (this.bytes <= MOST_BYTES) break;
+      this.blobs.delete(oldest);
+      this.bytes -= kept.size;
+    }
+  }
+
+  /** Its picture; nothing where it is not to be had.
+   * @param {number} frame
+   * @returns {Promise<Picture | undefined>} */
+  async at(frame) {
+    const [time, blob] = [this.times.get(frame), this.blobs.get(frame)];
+    if (time === undefined) return undefined;
+    if (blob) return { blob, time, frame, image: await createImageBitmap(blob) };
+    return this.source.at?.(frame, time);
+  }
+
+  /** The one before a frame: one that was tracked, or one of the source.
+   * @param {number} frame
+   * @returns {Promise<Picture | undefined>} */
+  async before(frame) {
+    const { numbers, source } = this;
+    const known = numbers.filter((number) => number < frame).pop();
+    if (known !== undefined) return this.at(known);
+    const time = this.times.get(frame);
+    if (frame < 1 || !source.at || !source.rate || time === undefined) return undefined;
+    return source.at(frame - 1, Math.max(0, time - 1 / source.rate));
+  }
+}
+
+/** @param {Picture} picture */
+export function close({ image }) {
+  if ("close" in image) image.close();
+}

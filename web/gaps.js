@@ -1,0 +1,126 @@
+// The times between two frames that a file has told of: whether there is another frame in one, and which.
+
+import { SAME, isTimeOf } from "./playback.js";
+import { drawFrame } from "./source.js";
+
+/** A time between two frames of so many intervals is one that another frame may be in. */
+const GAP = 1.5;
+const SLOWEST = 0.25;
+/** What is looked at before a frame lies so far before it, in seconds. */
+export const BEFORE = 0.002;
+/** Most passes over a gap with frames in it. After the first one they are gone to, one by one. */
+const MOST_PASSES = 6;
+/** A gap that cannot be looked into, and is the same at so many passes, belongs to the file. */
+export const SAME_PASSES = 2;
+/** Most frames that are gone to. */
+const MOST_BETWEEN = 12;
+/** Some browsers go to the next key frame where it is near: then the way back begins so many seconds earlier. */
+const LEADS = [0, 0.5, 1.5, 5];
+
+export class Gaps {
+  /** @param {import("./file.js").VideoFile} file */
+  constructor(file) {
+    this.file = file;
+    /** A time between two frames that was looked into, and what came of it. */
+    this.gap = { from: -1, to: -1, isOfTheFile: false, passes: 0, same: 0 };
+  }
+
+  /** Whether there may be a frame in between.
+   * @param {number} from
+   * @param {number} to
+   * @param {number} steps How many frames the browser has shown. */
+  mayPassOver(from, to, steps) {
+    const isLong = to - from > this.file.interval * GAP;
+    // The first interval has nothing to be compared with.
+    const isSuspect = this.file.interval === Infinity || isLong || (steps > 1 && to - from > this.file.interval * 1.1);
+    const { gap } = this;
+    return isSuspect && !(gap.isOfTheFile && gap.from === from && Math.abs(gap.to - to) < SAME);
+  }
+
+  /** Looks for a frame between the one that was taken last and this one.
+   * @param {number} to
+   * @param {number} steps */
+  async lookInto(to, steps) {
+    const { video, last } = this.file;
+    video.pause();
+    const sought = to - BEFORE;
+    const shown = await this.file.playback.seek(sought);
+    if (this.file.isStopped) return;
+    const gap = this.countPass(to, steps);
+    const isTold = isTimeOf(shown, sought);
+    const found = this.between(shown, sought);
+    gap.isOfTheFile = isTold ? found === undefined : gap.same >= SAME_PASSES;
+    if (gap.isOfTheFile) return isTold ? this.goOnFrom(shown) : this.resume();
+    this.file.sinceGap = 0;
+    video.playbackRate = Math.max(SLOWEST, video.playbackRate / 2);
+    const isNext = found !== undefined && found - last.time <= this.file.interval * GAP;
+    if (found !== undefined && (isNext || (gap.passes > 1 && gap.passes < MOST_PASSES))) {
+      // Where there is room for one frame only, there is no other one.
+      const frames = await this.goBack({ image: drawFrame(video), time: found }, isNext);
+      for (const { image, time } of frames) this.file.take(image, time, undefined);
+      return frames.length === 1 && isNext ? this.goOnFrom(shown) : this.resume();
+    }
+    if (gap.passes >= MOST_PASSES) {
+      gap.isOfTheFile = true;
+      const missing = Math.max(1, Math.round((to - last.time) / this.file.interval) - 1);
+      this.file.skipped += missing;
+      last.frame += missing;
+    }
+    await this.resume();
+  }
+
+  /** Plays on from the frame that is shown, which was taken.
+   * @param {VideoFrameCallbackMetadata | undefined} shown */
+  goOnFrom(shown) {
+    this.file.last.shown = shown?.presentedFrames;
+    this.file.adjust();
+  }
+
+  /** Plays on from the frame that was taken last, or from one before it. */
+  async resume() {
+    const { last } = this.file;
+    for (const lead of LEADS) {
+      const shown = await this.file.playback.seek(Math.max(0, last.time - lead));
+      last.shown = shown?.presentedFrames;
+      if (this.file.isStopped || (shown && shown.mediaTime <= last.time + SAME)) break;
+    }
+    this.file.adjust();
+  }
+
+  /**
+   * Goes from a frame to those before it, down to the one that was taken last.
+   * @param {{image: HTMLCanvasElement, time: number}} frame
+   * @param {boolean} isNext Whether there is none before it.
+   */
+  async goBack(frame, isNext) {
+    const frames = [frame];
+    while (!isNext && frames.length < MOST_BETWEEN) {
+      const { time } = frames[0];
+      const sought = time - BEFORE;
+      const before = this.between(await this.file.playback.seek(sought), sought);
+      if (before === undefined || this.file.isStopped) break;
+      frames.unshift({ image: drawFrame(this.file.video), time: before });
+    }
+    return frames;
+  }
+
+  /**
+   * The time of the frame that is shown after a seek; nothing where it is not told, or not after the last one.
+   * @param {VideoFrameCallbackMetadata | undefined} shown
+   * @param {number} sought
+   */
+  between(shown, sought) {
+    return isTimeOf(shown, sought) && shown.mediaTime > this.file.last.time + SAME ? shown.mediaTime : undefined;
+  }
+
+  /** Counts how often a gap was looked into, and how often it was the same one.
+   * @param {number} to
+   * @param {number} steps */
+  countPass(to, steps) {
+    const from = this.file.last.time;
+    const { passes, same } = this.gap.from === from ? this.gap : { passes: 0, same: 0 };
+    const isSame = steps <= 1 && (passes === 0 || Math.abs(this.gap.to - to) < SAME);
+    this.gap = { from, to, isOfTheFile: false, passes: passes + 1, same: isSame ? same + 1 : 0 };
+    return this.gap;
+  }
+}

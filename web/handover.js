@@ -1,0 +1,54 @@
+// Handing over to the service what was tracked in the page, so that others can go on with it.
+
+import { scaled } from "./boxes.js";
+import { Problem } from "./js/bagtrack.js";
+
+/**
+ * @typedef {import("./run.js").Run} Run
+ *
+ * @typedef {object} Handed
+ * @property {string} name Of the object.
+ * @property {string} id Of its session.
+ * @property {boolean} isWhole Whether the session has all that the tracker has learned; else the last frame and its box.
+ */
+
+/**
+ * @param {Run} run
+ * @param {import("./js/bagtrack.js").Client} client
+ * @returns {Promise<Handed[]>}
+ */
+export async function handOver(run, client) {
+  const handed = [];
+  for (const object of run.objects) {
+    const whole = await restored(object, client);
+    const session = whole ?? (await openedAnew(run, object, client));
+    if (session) handed.push({ name: object.name, id: session.id, isWhole: whole !== undefined });
+  }
+  return handed;
+}
+
+/** A session with the tracker's state; nothing where the service does not take it, or where there is none.
+ * @param {import("./objects.js").FollowedObject} object
+ * @param {import("./js/bagtrack.js").Client} client */
+async function restored(object, client) {
+  const state = await Promise.resolve()
+    .then(() => object.follower.save())
+    .catch(() => undefined);
+  if (!state) return undefined;
+  try {
+    return await client.restore(state);
+  } catch (problem) {
+    if (problem instanceof Problem && problem.slug === "invalid-snapshot") return undefined;
+    throw problem;
+  }
+}
+
+/**
+ * @param {Run} run
+ * @param {import("./objects.js").FollowedObject} object
+ * @param {import("./js/bagtrack.js").Client} client */
+async function openedAnew(run, object, client) {
+  const row = [...object.rows.values()].pop();
+  const picture = row && (await run.frames.at(row.frame));
+  return picture && client.open(picture.blob, scaled(row.box, picture.image, run.source.size));
+}

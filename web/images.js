@@ -1,0 +1,45 @@
+// Images as the frames of a video, in the order of their names.
+
+import { LONGEST_SIDE, drawScaled, encoded } from "./source.js";
+import { Stills } from "./stills.js";
+
+/** Images have no times of their own. */
+const FRAMES_A_SECOND = 25;
+const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif)$/i;
+
+/** Whether a file is an image that a browser may show.
+ * @param {File} file */
+export const isImage = (file) => file.type.startsWith("image/") || IMAGE.test(file.name);
+
+/** @param {File} file */
+const pathOf = (file) => file.webkitRelativePath || file.name;
+
+/** @param {File[]} files Images, all of one size. */
+export async function openImages(files) {
+  const order = new Intl.Collator("en", { numeric: true });
+  const images = files.filter(isImage).sort((one, other) => order.compare(pathOf(one), pathOf(other)));
+  if (images.length === 0) throw new DOMException("", "NotSupportedError");
+  const folder = pathOf(images[0]).split("/").slice(0, -1).pop();
+  /** @type {{width: number, height: number} | undefined} */
+  let size;
+  const source = new Stills(folder || images[0].name, FRAMES_A_SECOND, async (index) => images[index]);
+  const picture = source.picture.bind(source);
+  source.picture = async (index) => {
+    const shown = await picture(index).catch(() => undefined);
+    if (!shown) throw new Error(`${images[index].name} is not an image that this browser can read.`);
+    const { width, height } = shown.image;
+    size ??= { width, height };
+    if (width !== size.width || height !== size.height) {
+      const { name } = images[index];
+      throw new Error(`${name} has ${width} x ${height} pixels, the first image ${size.width} x ${size.height}.`);
+    }
+    if (Math.max(width, height) <= LONGEST_SIDE) return shown;
+    const image = drawScaled(shown.image, size);
+    return { ...shown, image, blob: await encoded(image) };
+  };
+  source.count = images.length;
+  await source.first();
+  source.size = size ?? source.size;
+  source.files = images;
+  return source;
+}

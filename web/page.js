@@ -1,0 +1,259 @@
+// The page: one state at a time, and how it comes from one to the next.
+
+import { Beginning } from "./begin.js";
+import { shownIn } from "./boxes.js";
+import { button, canvas, get, input } from "./dom.js";
+import { DRAW, Editing, TAP } from "./editing.js";
+import { Client, LocalClient, Problem } from "./js/bagtrack.js";
+import { FOLLOWING, Message } from "./message.js";
+import { words } from "./problems.js";
+import { Run } from "./run.js";
+import { prepareSaving } from "./saving.js";
+import { Seen } from "./seen.js";
+import { Stage } from "./stage.js";
+import { Timeline } from "./timeline.js";
+
+/**
+ * @typedef {import("./js/bagtrack.js").Box} Box
+ * @typedef {import("./source.js").Picture} Picture
+ * @typedef {import("./source.js").Source} Source
+ *
+ * @typedef {"start" | "opening" | "first" | "following" | "paused" | "ended"} State `first` waits for the first box;
+ *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
+ */
+
+export class Page {
+  constructor() {
+    /** What fails for longer is said. */
+    this.client = new Client(new URL(".", location.href), { patience: 1500 });
+    this.local = new LocalClient();
+    this.message = new Message(get("message"));
+    this.stage = new Stage(canvas("picture"));
+    this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame));
+    this.seen = new Seen();
+    this.editing = new Editing(this);
+    this.beginning = new Beginning(this);
+    /** @type {Run | undefined} */
+    this.run = undefined;
+    /** @type {Picture | undefined} An earlier frame that is shown. */
+    this.viewed = undefined;
+    /** Counts the frames that are to be shown: one that is overtaken by another is dropped. */
+    this.view = 0;
+    /** @type {Promise<Picture> | undefined} What the camera saw as the drawing began. */
+    this.frozen = undefined;
+    /** Whether there are results that were not saved. */
+    this.isUnsaved = false;
+    this.hasKey = false;
+    /** Counts the choices: one that is overtaken by another is dropped. */
+    this.choice = 0;
+    /** @type {(() => void) | undefined} What failed for want of a key. */
+    this.again = undefined;
+    /** Is told when rows or objects have changed. */
+    this.changed = () => {};
+    /** @type {State} */
+    this.state = "start";
+    this.enter("start");
+  }
+
+  /** Whether there are rows. */
+  get hasRows() {
+    return this.state === "following" || this.state === "paused" || this.state === "ended";
+  }
+
+  /** The frame that is shown.
+   * @returns {Picture | undefined} */
+  get shown() {
+    return this.viewed ?? this.run?.picture;
+  }
+
+  /** @param {State} state */
+  enter(state) {
+    this.state = state;
+    document.body.dataset.state = state;
+    const has = (/** @type {string | undefined} */ states) => (states ?? "").split(" ").includes(state);
+    for (const element of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-in]"))) {
+      element.hidden = !has(element.dataset.in);
+    }
+    for (const control of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("[data-on]"))) {
+      control.disabled = !has(control.dataset.on);
+    }
+    get("begin").hidden = state !== "first" || !this.run?.source.goTo;
+    get("hand-over").hidden = !this.run?.isLocal;
+    button("pause").textContent = state === "paused" ? "Go on" : "Pause";
+    if (!this.seen.hasShown) get("seen").hidden = true;
+  }
+
+  /** @param {string} text
+   * @param {boolean} [isBad] */
+  say(text, isBad) {
+    this.message.say(text, isBad);
+  }
+
+  /** @param {unknown} error */
+  fail(error) {
+    if (error instanceof Problem && error.slug === "unauthorized") {
+      get("key-form").hidden = false;
+      get("key").focus();
+    }
+    this.say(words(error, this.hasKey), true);
+    if (this.run?.isOver && this.hasRows) this.enter("ended");
+  }
+
+  /** Shows the first frame of a source and asks for a box.
+   * @param {() => Promise<Source>} open
+   * @param {(run: Run) => Promise<void>} [resume] Brings back what was tracked in it. */
+  async choose(open, resume) {
+    const own = (this.choice += 1);
+    this.reset();
+    this.enter("opening");
+    this.say("Opening…");
+    try {
+      const source = await open();
+      const first = await source.first();
+      if (own !== this.choice) return source.stop();
+      const isLocal = input("here").checked;
+      if (isLocal) this.local.warm().catch(() => undefined);
+      this.run = new Run(isLocal ? this.local : this.client, source, first, this.told());
+      this.run.sees = this.seen.isOn;
+      this.stage.draw(undefined);
+      this.stage.show(first.image);
+      prepareSaving();
+      if (resume) return await resume(this.run);
+      this.enter("first");
+      this.beginning.reset();
+      this.preview();
+      get("picture").scrollIntoView({ block: "nearest" });
+      this.say(TAP + DRAW);
+    } catch (error) {
+      if (own !== this.choice) return;
+      this.enter("start");
+      this.fail(error);
+    }
+  }
+
+  /** Lets go of what was there. */
+  reset() {
+    this.run?.stop();
+    this.run = undefined;
+    this.frozen = undefined;
+    this.isUnsaved = false;
+    this.editing.drawing.arm(false);
+    this.seen.reset();
+    get("handed").replaceChildren();
+    this.editing.add(false);
+    this.leave();
+  }
+
+  /** @returns {import("./run.js").Told} */
+  told() {
+    return {
+      answer: (picture, answer) => this.answered(picture, answer),
+      fail: (error) => this.fail(error),
+      line: (isUp) => this.message.line(isUp),
+      anew: () => this.say("The service had lost the session. It goes on from the last box: draw again if it is off."),
+      end: () => this.end("The video has ended. Save the results, or choose another one."),
+    };
+  }
+
+  /** Shows what the camera sees, until a box is drawn. */
+  preview() {
+    this.run?.source.preview?.((image) => this.stage.show(image));
+  }
+
+  /**
+   * @param {Run} own
+   * @param {Box} box
+   */
+  async follow(own, box) {
+    this.message.follow();
+    this.again = () => this.follow(own, box);
+    this.seen.given(this.stage, box);
+    await this.beginning.going;
+    this.enter("following");
+    try {
+      if (this.frozen) own.picture = await this.frozen;
+      await own.begin(box);
+      if (own === this.run) this.say(FOLLOWING);
+    } catch (error) {
+      this.enter("first");
+      this.fail(error);
+    }
+  }
+
+  /** Shows a frame with the objects in it.
+   * @param {Picture} shown
+   * @param {number[][]} [particles] */
+  show(shown, particles) {
+    const { run } = this;
+    if (!run) return;
+    this.stage.show(shown.image, shownIn(run, shown.frame, shown.image), particles);
+    this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame);
+    this.editing.list.show(run.objects, run.chosen);
+    const isKnown = run.chosen?.rows.has(shown.frame) ?? false;
+    button("backwards").disabled = !isKnown || shown.frame === 0 || run.isOver;
+  }
+
+  /** Shows again what is shown, after a change. */
+  repaint() {
+    if (this.hasRows && this.shown) this.show(this.shown);
+  }
+
+  /** @type {import("./run.js").Told["answer"]} */
+  answered(shown, answer) {
+    const { run } = this;
+    if (!run) return;
+    // Who looks at an earlier frame goes on doing so.
+    if (!this.viewed) this.show(shown, answer?.particles);
+    this.seen.figures(run, answer);
+    this.isUnsaved = run.frames.times.size > 1;
+    this.changed();
+    if (!answer) return;
+    this.seen.take(run, answer, this.stage);
+    this.message.take(answer.status);
+  }
+
+  /** Shows a frame that was tracked, and pauses.
+   * @param {number} frame */
+  async seek(frame) {
+    const { run } = this;
+    if (!run || !this.hasRows || run.isRedoing || frame === this.shown?.frame) return;
+    const wanted = (this.view += 1);
+    this.pause(true);
+    const { shown } = run.frames;
+    if (shown.length === 0) return;
+    const nearest = shown.reduce((one, other) => (Math.abs(other - frame) < Math.abs(one - frame) ? other : one));
+    if (nearest === run.lastFrame) {
+      this.leave();
+      return this.repaint();
+    }
+    const picture = await run.frames.at(nearest);
+    if (!picture || wanted !== this.view || run !== this.run) return;
+    this.viewed = picture;
+    this.show(picture);
+  }
+
+  /** Shows the last frame again. */
+  leave() {
+    this.view += 1;
+    this.viewed = undefined;
+  }
+
+  /** @param {boolean} isPaused */
+  pause(isPaused) {
+    if (this.state !== "ended") this.enter(isPaused ? "paused" : "following");
+    if (!isPaused) this.leave();
+    this.repaint();
+    this.run?.pause(isPaused);
+    if (!isPaused) this.run?.wake?.().catch((error) => this.fail(error));
+  }
+
+  /** Takes no more frames.
+   * @param {string} text */
+  end(text) {
+    this.run?.rest();
+    this.enter("ended");
+    this.say(text);
+    this.repaint();
+    this.changed();
+  }
+}

@@ -1,0 +1,111 @@
+// A video element that is gone to a time with, and what it shows then.
+
+/** Media times that differ by less are the same frame's, in seconds. */
+export const SAME = 0.001;
+/** How long a browser may take to show a frame that it went to, in milliseconds. */
+const SHOWN_WITHIN = 500;
+
+export class Playback {
+  /** @param {HTMLVideoElement} video */
+  constructor(video) {
+    this.video = video;
+    this.isSeeking = false;
+  }
+
+  /** Goes to a time and waits until its frame is shown.
+   * @param {number} time
+   * @returns {Promise<VideoFrameCallbackMetadata | undefined>} What is shown: a later frame, where the browser went on
+   *   to the next key frame. */
+  async seek(time) {
+    const { video } = this;
+    this.isSeeking = true;
+    /** @type {VideoFrameCallbackMetadata | undefined} */
+    let shown;
+    const there = new Promise((resolve) => {
+      /** @type {VideoFrameRequestCallback} */
+      const next = (_, metadata) => {
+        shown = metadata;
+        // What is told before the browser has gone there may be a later one.
+        if (metadata.mediaTime <= time + SAME) resolve(undefined);
+        else if (this.isSeeking) video.requestVideoFrameCallback(next);
+      };
+      video.requestVideoFrameCallback(next);
+    });
+    const done = new Promise((resolve) => video.addEventListener("seeked", resolve, { once: true }));
+    video.currentTime = time;
+    await done;
+    await Promise.race([there, new Promise((resolve) => setTimeout(resolve, SHOWN_WITHIN))]);
+    this.isSeeking = false;
+    return shown;
+  }
+}
+
+/** The frame that a video shows, and its media time. It may be newer than the one that was told of.
+ * @param {HTMLVideoElement} video
+ * @param {number} mediaTime
+ * @returns {{frame: VideoFrame | undefined, time: number}} */
+export function frameAt(video, mediaTime) {
+  if (typeof VideoFrame === "undefined") return { frame: undefined, time: mediaTime };
+  const frame = new VideoFrame(video);
+  const time = frame.timestamp / 1e6;
+  if (time >= mediaTime - SAME) return { frame, time };
+  // Not every browser gives it the time that it has in the file.
+  frame.close();
+  return { frame: undefined, time: mediaTime };
+}
+
+/** Whether the time of the frame is told. Some browsers tell the one that was sought, and some go on to a key frame.
+ * @param {VideoFrameCallbackMetadata | undefined} shown
+ * @param {number} sought
+ * @returns {shown is VideoFrameCallbackMetadata} */
+export function isTimeOf(shown, sought) {
+  return shown !== undefined && shown.mediaTime < sought - SAME / 2;
+}
+
+/** Whether two canvases of one size show the same.
+ * @param {HTMLCanvasElement} one
+ * @param {HTMLCanvasElement} other */
+export function areEqual(one, other) {
+  const [a, b] = [one, other].map((canvas) => {
+    const data = canvas.getContext("2d")?.getImageData(0, 0, canvas.width, canvas.height).data;
+    return new Uint32Array(data?.buffer ?? new ArrayBuffer(0));
+  });
+  return a.every((pixel, at) => pixel === b[at]);
+}
+
+/** Frames that tell the rate. */
+const TELLING = 9;
+/** How long they may take, in milliseconds. */
+const LEARNED_WITHIN = 2000;
+/** Rates that files have. One that is nearly one of them is that one: some files round their times to milliseconds. */
+const USUAL = [10, 12, 15, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 120];
+const NEARLY = 0.004;
+
+/** Frames a second, from the first frames of a file.
+ * @param {HTMLVideoElement} video */
+export async function learnRate(video) {
+  /** @type {number[]} */
+  const times = [];
+  video.playbackRate = 0.5;
+  video.currentTime = 0;
+  await new Promise((resolve) => {
+    setTimeout(resolve, LEARNED_WITHIN);
+    video.onended = resolve;
+    /** @type {VideoFrameRequestCallback} */
+    const next = (_, { mediaTime }) => {
+      times.push(mediaTime);
+      if (times.length === TELLING) resolve(undefined);
+      else video.requestVideoFrameCallback(next);
+    };
+    video.requestVideoFrameCallback(next);
+    video.play().catch(resolve);
+  });
+  video.pause();
+  const steps = times.map((time, at) => time - (times[at - 1] ?? time)).filter((step) => step > SAME);
+  if (steps.length === 0) return 30;
+  const shortest = Math.min(...steps);
+  const count = steps.reduce((sum, step) => sum + Math.round(step / shortest), 0);
+  const rate = count / steps.reduce((sum, step) => sum + step, 0);
+  const usual = USUAL.reduce((one, other) => (Math.abs(other - rate) < Math.abs(one - rate) ? other : one));
+  return Math.abs(usual - rate) < NEARLY * rate ? usual : rate;
+}

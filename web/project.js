@@ -1,0 +1,108 @@
+// A project: the objects with their rows, and what is known of the video. It is a file that people keep, and what the
+// browser keeps of a page.
+
+import { FollowedObject } from "./objects.js";
+
+/**
+ * @typedef {import("./run.js").Run} Run
+ * @typedef {import("./objects.js").Row} Row
+ *
+ * @typedef {[frame: number, time: number, x: number, y: number, width: number, height: number, score: number,
+ *   status: Row["status"], isKey: 0 | 1]} StoredRow `isKey`: the box was drawn.
+ *
+ * @typedef {object} Project
+ * @property {1} bagtrack_project The version.
+ * @property {{name: string, width: number, height: number, rate?: number}} video
+ * @property {boolean} ended Whether the whole video was tracked.
+ * @property {number} skipped Frames that were not tracked.
+ * @property {{number: number, name: string, color: string, shown: boolean, rows: StoredRow[]}[]} objects
+ */
+
+const STATUSES = ["tracking", "uncertain", "lost"];
+const NOT_ONE = "This file is no project of this page: ";
+
+/** @param {Run} run
+ * @returns {Project} */
+export function projectOf(run) {
+  const { name, size, rate } = run.source;
+  const objects = run.objects.map(({ number, name, color, isShown, rows }) => ({
+    number,
+    name,
+    color,
+    shown: isShown,
+    rows: [...rows.values()].map(stored),
+  }));
+  return { bagtrack_project: 1, video: { name, ...size, rate }, ended: run.isResting && !run.wake, skipped: run.skipped, objects };
+}
+
+/** @param {Row} row
+ * @returns {StoredRow} */
+function stored({ frame, time, box: { x, y, width, height }, score, status, corrected }) {
+  return [frame, time, x, y, width, height, score, status, corrected ? 1 : 0];
+}
+
+/** @param {StoredRow} stored
+ * @returns {Row} */
+function rowOf([frame, time, x, y, width, height, score, status, isKey]) {
+  return { frame, time, box: { x, y, width, height }, score, status, corrected: isKey === 1 };
+}
+
+/** Reads a project, and fails where it is none.
+ * @param {unknown} document
+ * @returns {Project} */
+export function readProject(document) {
+  const project = /** @type {Project} */ (document);
+  if (project?.bagtrack_project !== 1) throw new Error(`${NOT_ONE}it has no "bagtrack_project": 1.`);
+  const { video, objects } = project;
+  const isVideo = typeof video?.name === "string" && video.width > 0 && video.height > 0;
+  if (!isVideo || !Array.isArray(objects)) throw new Error(`${NOT_ONE}its video or its objects are missing.`);
+  for (const { rows } of objects) {
+    const isRow = (/** @type {StoredRow} */ row) =>
+      Array.isArray(row) && row.slice(0, 7).every(Number.isFinite) && STATUSES.includes(row[7]);
+    if (!Array.isArray(rows) || !rows.every(isRow)) throw new Error(`${NOT_ONE}a row of it is damaged.`);
+  }
+  return project;
+}
+
+/** Brings objects and rows into a run that has none.
+ * @param {Run} run
+ * @param {Project} project */
+export function adopt(run, project) {
+  for (const { number, name, color, shown, rows } of project.objects) {
+    const object = new FollowedObject(Number(number), run.follower());
+    Object.assign(object, { name: String(name), color: String(color), isShown: shown !== false });
+    for (const row of rows.map(rowOf)) {
+      object.set(row);
+      run.frames.times.set(row.frame, row.time);
+    }
+    object.sort();
+    run.objects.push(object);
+    run.count = Math.max(run.count, object.number + 1);
+  }
+  run.chosen = run.objects[0];
+  run.tracked = run.frames.times.size;
+  run.passedOver = project.skipped || 0;
+}
+
+/** A source for rows whose video is not at hand: its pictures are empty.
+ * @param {Project} project
+ * @returns {import("./source.js").Source} */
+export function withoutVideo({ video, objects }) {
+  const image = document.createElement("canvas");
+  [image.width, image.height] = [video.width, video.height];
+  const picture = (/** @type {number} */ frame, /** @type {number} */ time) => ({ image, blob: new Blob(), time, frame });
+  const [frame = 0, time = 0] = objects[0]?.rows[0] ?? [];
+  return {
+    name: video.name,
+    isLive: false,
+    size: { width: video.width, height: video.height },
+    rate: video.rate,
+    skipped: 0,
+    isAbsent: true,
+    first: async () => picture(frame, time),
+    at: async (frame, time) => picture(frame, time),
+    start: async (_, end) => end(),
+    hold() {},
+    stop() {},
+  };
+}

@@ -1,0 +1,88 @@
+// The buttons that save results. What makes the files is loaded when a source is open, and needs no service later.
+
+import { button, get } from "./dom.js";
+import { words } from "./problems.js";
+
+/** @typedef {import("./run.js").Run} Run */
+/** @typedef {import("./page.js").Page} Page */
+
+const modules = () => Promise.all([import("./save.js"), import("./recording.js"), import("./handover.js")]);
+
+/** @param {Page} page */
+export function offerSaving(page) {
+  get("results").addEventListener("click", async ({ target }) => {
+    const format = target instanceof HTMLElement ? target.closest("button")?.id.replace("save-", "") : undefined;
+    if (!format || !page.run || page.run.objects.length === 0) return;
+    try {
+      const [{ FORMATS, save }] = await modules();
+      const found = FORMATS[format];
+      if (!found) return;
+      save(found.make(page.run), page.run, found.ending);
+      page.isUnsaved = false;
+    } catch (error) {
+      page.say(words(error, page.hasKey), true);
+    }
+  });
+  button("hand-over").addEventListener("click", () => giveAway(page));
+  button("save-video").addEventListener("click", () => saveVideo(page));
+  if (typeof VideoEncoder === "undefined") {
+    button("save-video").textContent = "Video (Matroska)";
+    get("no-encoder").hidden = false;
+  }
+}
+
+/** Loads what makes the files, while there is a line to the service. */
+export const prepareSaving = () => void modules().catch(() => undefined);
+
+/** @param {Page} page */
+async function saveVideo(page) {
+  const { run } = page;
+  if (!run || run.objects.length === 0) return;
+  const own = button("save-video");
+  const label = own.textContent;
+  own.disabled = true;
+  const tell = (/** @type {number} */ done, /** @type {number} */ of) => {
+    own.textContent = `Making the video: ${Math.floor((100 * done) / of)} %`;
+  };
+  try {
+    const [{ save }, { extension, makeVideo }] = await modules();
+    save(await makeVideo(run, tell), run, extension);
+    const [kept, of] = [run.frames.shown.length, run.tracked];
+    if (kept < of) page.say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
+  } catch (error) {
+    page.say(words(error, page.hasKey), true);
+  }
+  own.textContent = label;
+  own.disabled = false;
+}
+
+/** Hands the objects over to the service, and shows their sessions.
+ * @param {Page} page */
+async function giveAway(page) {
+  const { run } = page;
+  if (!run) return;
+  page.again = () => giveAway(page);
+  button("hand-over").disabled = true;
+  try {
+    const handed = await (await modules())[2].handOver(run, page.client);
+    const links = handed.map(({ name, id }) => {
+      const link = document.createElement("a");
+      link.href = `sessions/${id}`;
+      link.textContent = name;
+      const item = document.createElement("li");
+      item.append(link, ` ${id}`);
+      return item;
+    });
+    get("handed").replaceChildren(...links);
+    const isWhole = handed.every((it) => it.isWhole);
+    page.say(
+      isWhole
+        ? "The service has the sessions, with all that was learned."
+        : "The service takes no states of other trackers (it was started without --unsigned-snapshots): it got the last " +
+            "frame and its boxes instead.",
+    );
+  } catch (error) {
+    page.fail(error);
+  }
+  button("hand-over").disabled = false;
+}

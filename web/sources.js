@@ -1,0 +1,79 @@
+// What one opens: buttons, files that are chosen, dropped or pasted, folders.
+
+import { openClip } from "./clip.js";
+import { get, input } from "./dom.js";
+
+/** What opens files and the camera is loaded when one is about to choose. */
+const modules = () => Promise.all([import("./file.js"), import("./images.js"), import("./camera.js")]);
+
+/** @typedef {import("./source.js").Source} Source */
+
+/** Opens what files are: one video, or images.
+ * @param {File[]} files
+ * @returns {Promise<Source>} */
+export async function openFiles(files) {
+  const [{ openFile }, { isImage, openImages }] = await modules();
+  const video = files.find((file) => file.type.startsWith("video/"));
+  if (!video && files.some(isImage)) return openImages(files);
+  return openFile(video ?? files[0], get("stage"));
+}
+
+/** All files of what was dropped, those in folders too.
+ * @param {DataTransfer} dropped */
+async function filesOf(dropped) {
+  const entries = [...dropped.items].map((item) => item.webkitGetAsEntry?.()).filter((entry) => !!entry);
+  // A drop has no entries where a program made it.
+  if (!entries.some(({ isDirectory }) => isDirectory)) return [...dropped.files];
+  return (await Promise.all(entries.map(filesIn))).flat();
+}
+
+/** @param {FileSystemEntry} entry
+ * @returns {Promise<File[]>} */
+async function filesIn(entry) {
+  if (entry.isFile) {
+    const { file } = /** @type {FileSystemFileEntry & {file: any}} */ (entry);
+    return [await new Promise((resolve, reject) => file.call(entry, resolve, reject))];
+  }
+  const reader = /** @type {FileSystemDirectoryEntry} */ (entry).createReader();
+  /** @type {File[]} */
+  const files = [];
+  for (;;) {
+    /** @type {FileSystemEntry[]} Some browsers give a hundred at a time. */
+    const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (some.length === 0) return files;
+    files.push(...(await Promise.all(some.map(filesIn))).flat());
+  }
+}
+
+/**
+ * @param {(open: () => Promise<Source>) => void} choose
+ * @param {(files: File[]) => boolean} take Takes files that are no frames, and says whether it did.
+ */
+export function offerSources(choose, take) {
+  const open = (/** @type {File[]} */ files) => {
+    if (files.length > 0 && !take(files)) choose(() => openFiles(files));
+  };
+  for (const kind of ["pointerover", "focusin", "dragenter"]) {
+    addEventListener(kind, () => modules().catch(() => undefined), { once: true });
+  }
+  for (const clip of ["card", "leaves"]) get(clip).addEventListener("click", () => choose(() => openClip(clip)));
+  get("camera").addEventListener("click", () => {
+    choose(async () => (await modules())[2].openCamera(get("stage")));
+  });
+  for (const id of ["file", "folder"]) {
+    input(id).addEventListener("change", () => {
+      open([...(input(id).files ?? [])]);
+      input(id).value = "";
+    });
+  }
+  for (const kind of ["dragover", "dragleave", "drop"]) {
+    addEventListener(kind, async (event) => {
+      // Without this the browser leaves the page for the file.
+      event.preventDefault();
+      document.body.classList.toggle("drop", kind === "dragover");
+      const { dataTransfer } = /** @type {DragEvent} */ (event);
+      if (kind === "drop" && dataTransfer) open(await filesOf(dataTransfer));
+    });
+  }
+  addEventListener("paste", (event) => open([...(event.clipboardData?.files ?? [])]));
+}

@@ -1,0 +1,104 @@
+// Frames that are files of their own: a sample clip, or a folder of images. Any of them can be had at any time.
+
+/**
+ * @typedef {import("./source.js").Picture} Picture
+ * @typedef {import("./source.js").Source} Source
+ */
+
+/** Frames that are loaded ahead. */
+const AHEAD = 12;
+
+/** @implements {Source} */
+export class Stills {
+  /**
+   * @param {string} name
+   * @param {number} rate Frames a second.
+   * @param {(index: number) => Promise<Blob>} load
+   */
+  constructor(name, rate, load) {
+    this.name = name;
+    this.isLive = false;
+    this.size = { width: 0, height: 0 };
+    /** @type {number} */
+    this.rate = rate;
+    this.load = load;
+    this.skipped = 0;
+    /** How many there are. */
+    this.count = 0;
+    /** @type {Map<number, Promise<Picture>>} */
+    this.loaded = new Map();
+    /** The one that was delivered last. */
+    this.index = 0;
+    this.isHeld = false;
+    this.isStopped = false;
+    /** @type {File[] | undefined} Where they are files of this machine. */
+    this.files = undefined;
+  }
+
+  get duration() {
+    return (this.count - 1) / this.rate;
+  }
+
+  async first() {
+    return this.goTo(0);
+  }
+
+  /** @param {number} time */
+  goTo(time) {
+    this.index = Math.min(Math.max(0, this.count - 1), Math.round(time * this.rate));
+    return this.picture(this.index);
+  }
+
+  /** @param {number} index */
+  at(index) {
+    return this.picture(index);
+  }
+
+  /** @param {number} index
+   * @returns {Promise<Picture>} */
+  async picture(index) {
+    const blob = await this.load(index);
+    return { blob, image: await createImageBitmap(blob), time: index / this.rate, frame: index };
+  }
+
+  /** @param {number} index */
+  ahead(index) {
+    const known = this.loaded.get(index);
+    if (known) return known;
+    const loading = this.picture(index);
+    // Whoever waits for it is told.
+    loading.catch(() => undefined);
+    this.loaded.set(index, loading);
+    return loading;
+  }
+
+  /**
+   * @param {(picture: Picture) => void} deliver
+   * @param {() => void} end
+   */
+  async start(deliver, end) {
+    let due = performance.now();
+    for (let index = this.index + 1; index < this.count && !this.isStopped; index += 1) {
+      for (let next = index; next < Math.min(index + AHEAD, this.count); next += 1) this.ahead(next);
+      const picture = await this.ahead(index);
+      this.loaded.delete(index);
+      due = Math.max(due + 1000 / this.rate, performance.now() - 100);
+      do {
+        await new Promise((resolve) => setTimeout(resolve, Math.max(0, due - performance.now())));
+        if (this.isHeld) due = performance.now() + 10;
+      } while (this.isHeld && !this.isStopped);
+      this.index = index;
+      if (!this.isStopped) deliver(picture);
+    }
+    if (!this.isStopped) end();
+  }
+
+  /** @param {boolean} isHeld */
+  hold(isHeld) {
+    this.isHeld = isHeld;
+  }
+
+  stop() {
+    this.isStopped = true;
+  }
+}
