@@ -1,9 +1,9 @@
 //! When a client's requests wait too long: controlled delay with the newest first (Maurer, *Fail at Scale*, 2015, after
 //! CoDel, RFC 8289).
 //!
-//! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So while
-//! even the least wait of an interval was above the target, the newest request goes first, which is answered in time, and
-//! one that has waited twice the target is refused.
+//! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So after
+//! an interval in which no wait was within the target, the newest request goes first, which is answered in time, and one
+//! that has waited twice the target is refused. This ends after an interval in which a request found none before it.
 
 use std::time::Duration;
 
@@ -15,8 +15,8 @@ const INTERVAL: Duration = Duration::from_millis(500);
 pub(super) struct ControlledDelay {
     /// When this interval ends.
     until: Duration,
-    /// The least wait in it.
-    least: Duration,
+    /// Whether the queue was long in it so far.
+    is_long: bool,
     is_overloaded: bool,
 }
 
@@ -32,15 +32,22 @@ pub(super) enum Order {
 }
 
 impl ControlledDelay {
-    /// Notes how long the oldest request `waited` when its flow's turn comes, `now`.
-    pub(super) fn order(&mut self, waited: Duration, now: Duration, target: Duration) -> Order {
+    /// Notes how long the oldest request `waited` when its flow's turn comes, `now`, and whether no other one waits there.
+    pub(super) fn order(
+        &mut self,
+        (waited, is_alone): (Duration, bool),
+        now: Duration,
+        target: Duration,
+    ) -> Order {
+        // What is refused makes room, so that the oldest has not waited long.
+        let is_short = waited <= target && (is_alone || !self.is_overloaded);
         if now < self.until {
-            self.least = self.least.min(waited);
+            self.is_long &= !is_short;
         } else {
             // Of an interval that ended long ago nothing is left.
             let is_recent = now < self.until + INTERVAL;
-            self.is_overloaded = is_recent && self.least > target;
-            (self.until, self.least) = (now + INTERVAL, waited);
+            self.is_overloaded = is_recent && self.is_long;
+            (self.until, self.is_long) = (now + INTERVAL, !is_short);
         }
         match self.is_overloaded {
             false => Order::Oldest,
@@ -60,7 +67,7 @@ mod tests {
     /// What is next each ten milliseconds while the oldest has waited so long: the same all the time.
     fn order(delay: &mut ControlledDelay, from: u64, to: u64, waited: Duration) -> Order {
         let mut moments = (from..to).step_by(10).map(Duration::from_millis);
-        let mut order = || Some(delay.order(waited, moments.next()?, TARGET));
+        let mut order = || Some(delay.order((waited, waited.is_zero()), moments.next()?, TARGET));
         let first = order().expect("a moment");
         while let Some(other) = order() {
             assert_eq!(other, first);
@@ -77,6 +84,8 @@ mod tests {
         assert_eq!(order(&mut delay, 10_500, 11_000, LATE), Order::Oldest);
         assert_eq!(order(&mut delay, 11_000, 11_500, LATE), Order::Refuse);
         assert_eq!(order(&mut delay, 11_500, 12_000, 2 * TARGET), Order::Newest);
+        // Room that refusals made is no end of it.
+        assert_eq!(order(&mut delay, 12_000, 14_000, TARGET), Order::Newest);
     }
 
     #[test]

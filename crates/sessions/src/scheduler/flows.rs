@@ -210,7 +210,9 @@ impl<G> Flows<G> {
             return Order::Oldest;
         };
         let target = self.delay.max(waiting.longest.at(now));
-        waiting.delay.order(now.saturating_sub(since), now, target)
+        let waited = now.saturating_sub(since);
+        let is_alone = waiting.requests.len() <= 1;
+        waiting.delay.order((waited, is_alone), now, target)
     }
 
     /// Notes work of a flow that took so long without a break, or will. Flows of another class have other times, so one
