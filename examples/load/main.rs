@@ -78,6 +78,23 @@ struct Options {
     server: Option<PathBuf>,
 }
 
+impl Options {
+    /// Sessions that the server must have room for, and its flags.
+    fn room_and_flags<'a>(&self, idle: &'a str) -> (u32, Vec<&'a str>) {
+        let overload = match self.overload.is_empty() {
+            // Many sessions of one client wait for each other.
+            true => ["--queue-delay", "0s"],
+            false => ["--trusted-proxies", "127.0.0.1"],
+        };
+        let cameras = self
+            .overload
+            .iter()
+            .map(|times| (times * MOST_FRAMES / 10.0) as u32);
+        let room = cameras.fold(self.sessions, u32::max);
+        (room, [&["--session-idle", idle], &overload[..]].concat())
+    }
+}
+
 fn main() -> Outcome<()> {
     let options = Options::parse();
     let preset: Preset = serde_json::from_value(serde_json::json!(options.preset))?;
@@ -93,18 +110,7 @@ fn main() -> Outcome<()> {
 
     // No session ends while others are still being opened, except where that is what is measured.
     let idle = if options.churn.is_some() { "1m" } else { "1d" };
-    let mut flags = vec!["--session-idle", idle];
-    match options.overload.is_empty() {
-        // Many sessions of one client wait for each other.
-        true => flags.extend(["--queue-delay", "0s"]),
-        false => flags.extend(["--trusted-proxies", "127.0.0.1"]),
-    }
-    let room = options
-        .overload
-        .iter()
-        .fold(options.sessions, |most, times| {
-            most.max((times * MOST_FRAMES / 10.0) as u32)
-        });
+    let (room, flags) = options.room_and_flags(idle);
     let server = Server::start(options.server.clone(), room, &flags)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -115,21 +121,8 @@ fn main() -> Outcome<()> {
     }
     if !options.overload.is_empty() {
         let length = Duration::from_secs(options.seconds);
-        let mut done = Done::new()?;
-        return runtime.block_on(async {
-            let mut clients = driver.open(options.sessions).await?;
-            clients.run(options.frames, None, length, &mut done).await?;
-            clients.close().await?;
-            let knee = done.per_second();
-            println!(
-                "{} sessions, closed loop: {knee:.0} frames a second",
-                options.sessions
-            );
-            for times in &options.overload {
-                overload::run(&driver, knee, *times, length).await?;
-            }
-            Ok(())
-        });
+        let load = (options.sessions, options.frames, length);
+        return runtime.block_on(overload::run(&driver, load, &options.overload));
     }
     if let Some(seconds) = options.churn {
         let rate = options.rate.unwrap_or(40.0);

@@ -12,7 +12,7 @@ use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep_until};
 
 use crate::Outcome;
-use crate::drive::{Driver, Failure};
+use crate::drive::{Done, Driver, Failure};
 
 /// Frames a second of a camera.
 const RATE: f64 = 10.0;
@@ -50,8 +50,27 @@ impl Answers {
     }
 }
 
+/// Prints how many of `frames` frames that many sessions get through in a second, and what becomes of so many `times` as
+/// many, for so long each.
+pub async fn run(
+    driver: &Driver,
+    (sessions, frames, length): (u32, u32, Duration),
+    times: &[f64],
+) -> Outcome<()> {
+    let mut done = Done::new()?;
+    let mut clients = driver.open(sessions).await?;
+    clients.run(frames, None, length, &mut done).await?;
+    clients.close().await?;
+    let knee = done.per_second();
+    println!("{sessions} sessions, closed loop: {knee:.0} frames a second");
+    for times in times {
+        send(driver, knee, *times, length).await?;
+    }
+    Ok(())
+}
+
 /// Sends `times` the frames that the server gets through in a second, `knee`, for so long, and prints what became of them.
-pub async fn run(driver: &Driver, knee: f64, times: f64, length: Duration) -> Outcome<()> {
+async fn send(driver: &Driver, knee: f64, times: f64, length: Duration) -> Outcome<()> {
     let cameras = (times * knee / RATE).ceil() as u32;
     let mut opened = Vec::new();
     for number in 0..cameras {
