@@ -22,10 +22,8 @@ said=$(systemd-analyze verify --man=no "$folder/bagtrack.service" 2>&1) || { ech
 systemd-analyze security --offline=true --threshold=20 "$folder/bagtrack.service" | tail -n 1
 
 # The program takes each setting of the file of variables.
-while IFS= read -r line; do
-    export "${line?}"
-done < <(sed -n 's/^#\{0,1\}\(BAGTRACK_[A-Z_]*=..*\)$/\1/p' deploy/systemd/bagtrack.env)
-for variable in ${!BAGTRACK_@}; do
+help=$("$program" serve --help)
+while IFS= read -r variable; do
     flag=--$(tr 'A-Z_' 'a-z-' <<<"${variable#BAGTRACK_}")
-    "$program" serve --help | grep --quiet -e "$flag" || { echo "$variable is no setting"; exit 1; }
-done
+    grep --quiet -e "$flag" <<<"$help" || { echo "$variable is no setting"; exit 1; }
+done < <(sed -n 's/^#\{0,1\}\(BAGTRACK_[A-Z_]*\)=.*$/\1/p' deploy/systemd/bagtrack.env)
