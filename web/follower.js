@@ -138,8 +138,6 @@ export class ServiceFollower {
     /** Whether the session has answered. */
     this.hasAnswered = false;
     this.isOver = false;
-    /** @type {Promise<unknown>} The state that was asked for last is here. */
-    this.saving = Promise.resolve();
     /** @type {{picture: Picture, box: Box} | undefined} What was answered last. */
     this.last = undefined;
     /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void, by?: object}[]} Oldest
@@ -237,7 +235,6 @@ export class ServiceFollower {
   /** Of now: frames on their way may be in it. */
   save() {
     const taken = this.own.call("GET", "/snapshot");
-    this.saving = taken.catch(() => undefined);
     return taken.then(async (response) => new Uint8Array(await response.arrayBuffer()));
   }
 
@@ -255,6 +252,6 @@ export class ServiceFollower {
     this.session = undefined;
     this.stream?.close();
     // One that cannot be ended expires.
-    this.saving.then(() => session?.end()).catch(() => undefined);
+    session?.end().catch(() => undefined);
   }
 }

@@ -70,8 +70,8 @@ export class Session {
     this.kept = new Kept(origin);
     /** @type {Promise<unknown>} The requests before. */
     this.before = Promise.resolve();
-    /** @type {Promise<unknown>} The snapshot that was asked for last, by the way, is here. */
-    this.taking = Promise.resolve();
+    /** @type {Set<Promise<unknown>>} What is being read of it. */
+    this.reading = new Set();
     this.isEnded = false;
     /** @type {FrameStream | undefined} */
     this.open = undefined;
@@ -161,8 +161,8 @@ export class Session {
   async end() {
     this.kept = new Kept();
     this.isEnded = true;
-    // Asked for after the end, it would be missed, and a page's console would say so.
-    await this.taking;
+    // What is still read would be missed after the end, and a page's console would say so.
+    await Promise.allSettled(this.reading);
     try {
       await this.call("DELETE", "");
     } catch (error) {
@@ -177,7 +177,15 @@ export class Session {
    * @param {import("./transport.js").Request} [request]
    */
   call(method, path, request) {
-    return this.client.transport.call(method, `sessions/${this.id}${path}`, request);
+    const called = this.client.transport.call(method, `sessions/${this.id}${path}`, request);
+    return method === "GET" ? this.noteReading(called) : called;
+  }
+
+  /** @param {Promise<Response>} called */
+  noteReading(called) {
+    const read = called.finally(() => this.reading.delete(read));
+    this.reading.add(read);
+    return read;
   }
 
   /**
@@ -261,9 +269,8 @@ export class Session {
     if (this.isEnded) return undefined;
     const { transport } = this.client;
     const { id, frame } = this;
-    const taken = transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {}).catch(() => undefined);
-    this.taking = taken;
-    const response = await taken;
+    const taken = this.noteReading(transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {}));
+    const response = await taken.catch(() => undefined);
     return response && { frame, request: restoring(await response.arrayBuffer()) };
   }
 

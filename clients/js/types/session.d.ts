@@ -58,8 +58,8 @@ export declare class Session {
     kept: Kept;
     /** @type {Promise<unknown>} The requests before. */
     before: Promise<unknown>;
-    /** @type {Promise<unknown>} The snapshot that was asked for last, by the way, is here. */
-    taking: Promise<unknown>;
+    /** @type {Set<Promise<unknown>>} What is being read of it. */
+    reading: Set<Promise<unknown>>;
     isEnded: boolean;
     /** @type {FrameStream | undefined} */
     open: FrameStream | undefined;
@@ -123,6 +123,8 @@ export declare class Session {
      * @param {import("./transport.js").Request} [request]
      */
     call(method: string, path: string, request?: import("./transport.js").Request): Promise<Response>;
+    /** @param {Promise<Response>} called */
+    noteReading(called: Promise<Response>): Promise<Response>;
     /**
      * @param {string} method
      * @param {string} path
