@@ -20,6 +20,7 @@ const HEADINGS: [(&str, &[&str]); 10] = [
             "workers",
             "queue",
             "session_queue",
+            "queue_delay",
             "work_timeout",
             "max_request_cpu",
         ],
