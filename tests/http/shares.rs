@@ -238,7 +238,8 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     let request = request_as(&app, MODEST, "/sessions", &[("box", BOX)]);
     let opened = request.body(picture).send().await.unwrap();
     expect(opened, StatusCode::CREATED).await;
-    assert!(upload_bytes(&app).await <= UPLOADS / 2);
+    // Its own body may be held a moment longer than its answer takes.
+    assert!(upload_bytes(&app).await <= UPLOADS / 2 + HELD);
     let mut ends = Vec::new();
     for mut stream in streams {
         ends.push(loop {
