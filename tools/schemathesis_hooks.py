@@ -122,6 +122,12 @@ def before_call(context, case, kwargs):
     if (path, method) == ("/sessions/{id}", "PUT"):
         # An id belongs to one request.
         case.path_parameters["id"] = str(uuid.uuid4())
+    if path == "/track":
+        # What is sent are pictures, and these are for a video.
+        for name in ["start", "count", "backwards", "until_lost", "keyframes"]:
+            query.pop(name, None)
+            if body is not None:
+                body.pop(name, None)
     if path == "/track" and body is not None:
         # A track begins: no picture is a snapshot, and a snapshot holds all settings.
         body.pop("snapshot", None)
