@@ -1,5 +1,6 @@
 //! How long to wait before a request is sent again.
 
+use crate::network::Carrier;
 use std::time::Duration;
 use tokio::time::Instant;
 
@@ -11,21 +12,23 @@ pub struct Backoff {
     begin: Instant,
     retry_for: Duration,
     next: Duration,
+    carrier: Carrier,
 }
 
 impl Backoff {
-    pub fn new(retry_for: Duration) -> Self {
+    pub fn new(retry_for: Duration, carrier: Carrier) -> Self {
         Self {
             begin: Instant::now(),
             retry_for,
             next: FIRST,
+            carrier,
         }
     }
 
     /// Waits, at least as long as the service asks for. False, and at once, where the time would be up then.
     pub async fn wait(&mut self, asked: Option<Duration>) -> bool {
         // Clients that were cut off together do not come back together.
-        let own = self.next.mul_f64(0.5 + rand::random::<f64>() / 2.0);
+        let own = self.next.mul_f64(0.5 + self.carrier.fraction() / 2.0);
         let pause = own.max(asked.unwrap_or_default());
         self.next = (2 * self.next).min(LONGEST);
         if self.begin.elapsed().saturating_add(pause) > self.retry_for {

@@ -1,6 +1,7 @@
 //! A service, where sessions are opened.
 
 use crate::error::ClientError;
+use crate::network::{Carrier, Network};
 use crate::options::{OpenOptions, Targets};
 use crate::remote::Remote;
 use crate::session::Session;
@@ -9,6 +10,7 @@ use crate::upload::Origin;
 use bytes::Bytes;
 use reqwest::header::HeaderValue;
 use reqwest::{IntoUrl, Url};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A bagtrack service. A copy shares the connections.
@@ -33,6 +35,7 @@ impl Client {
             addresses: vec![url.into_url()],
             key: None,
             http: None,
+            network: None,
             timeout: Duration::from_secs(15),
             retry_for: Duration::from_secs(60),
             snapshot_every: 30,
@@ -87,6 +90,7 @@ pub struct ClientBuilder {
     addresses: Vec<Result<Url, reqwest::Error>>,
     key: Option<Key>,
     http: Option<reqwest::Client>,
+    network: Option<Arc<dyn Network>>,
     timeout: Duration,
     retry_for: Duration,
     snapshot_every: u32,
@@ -140,6 +144,12 @@ impl ClientBuilder {
         self
     }
 
+    /// What carries requests in place of connections, in a simulation.
+    pub fn network(mut self, network: Arc<dyn Network>) -> Self {
+        self.network = Some(network);
+        self
+    }
+
     /// The client.
     ///
     /// # Errors
@@ -149,8 +159,12 @@ impl ClientBuilder {
         let http = self
             .http
             .map_or_else(|| reqwest::Client::builder().build(), Ok);
+        let carrier = match self.network {
+            None => Carrier::Connections(http?),
+            Some(network) => Carrier::Network(network, http?),
+        };
         let transport = Transport {
-            http: http?,
+            carrier,
             addresses: addresses?.into(),
             used: 0,
             authorization: self.key.transpose()?,

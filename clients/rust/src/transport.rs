@@ -2,6 +2,7 @@
 
 use crate::backoff::Backoff;
 use crate::error::ClientError;
+use crate::network::Carrier;
 use crate::problem::Problem;
 use bytes::Bytes;
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, RETRY_AFTER};
@@ -84,7 +85,7 @@ impl Reply {
 /// The service, as one session (or a client) reaches it.
 #[derive(Debug, Clone)]
 pub struct Transport {
-    pub http: reqwest::Client,
+    pub carrier: Carrier,
     /// At least one.
     pub addresses: Arc<[Url]>,
     /// Which of them is in use.
@@ -104,7 +105,7 @@ impl Transport {
 
     /// The answer to a request, which is sent again where that may help.
     pub async fn call(&mut self, request: &Request) -> Result<Reply, ClientError> {
-        let mut backoff = Backoff::new(self.retry_for);
+        let mut backoff = Backoff::new(self.retry_for, self.carrier.clone());
         // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
         let mut has_broken = self.retry_for.is_zero();
         loop {
@@ -142,7 +143,7 @@ impl Transport {
         if !request.query.is_empty() {
             url.query_pairs_mut().extend_pairs(&request.query);
         }
-        let mut sent = self.http.request(request.method.clone(), url);
+        let mut sent = self.carrier.http().request(request.method.clone(), url);
         sent = sent.timeout(self.timeout);
         if let Some(authorization) = &self.authorization {
             sent = sent.header(AUTHORIZATION, authorization);
@@ -154,7 +155,7 @@ impl Transport {
             }
             Body::Frames(frames) => sent.multipart(form(frames)),
         };
-        let answer = sent.send().await?;
+        let answer = self.carrier.send(sent.build()?).await?;
         Ok(Reply {
             status: answer.status(),
             headers: answer.headers().clone(),

@@ -7,7 +7,6 @@ use crate::transport::{Query, SNAPSHOT};
 use crate::upload::Origin;
 use std::time::Duration;
 use tokio::time::Instant;
-use uuid::Uuid;
 
 /// A service that is about to end may be the only one for a while: how long until the next try to go elsewhere.
 const MOVE_EVERY: Duration = Duration::from_secs(1);
@@ -45,7 +44,7 @@ impl Remote {
         let Some(origin) = self.kept.origin() else {
             return;
         };
-        let request = origin.request(Uuid::new_v4());
+        let request = origin.request(self.transport.carrier.new_id());
         let here = self.transport.used;
         self.transport.next_address();
         let created = match self.transport.attempt(&request).await {

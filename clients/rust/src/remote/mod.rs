@@ -67,7 +67,8 @@ fn answers(reply: &Reply) -> Result<Vec<Answer>, ClientError> {
 
 /// Opens a session; asks until there is an answer.
 async fn create(transport: &mut Transport, origin: &Origin) -> Result<Created, ClientError> {
-    let reply = transport.call(&origin.request(Uuid::new_v4())).await?;
+    let request = origin.request(transport.carrier.new_id());
+    let reply = transport.call(&request).await?;
     Ok(serde_json::from_slice(&reply.checked()?.body)?)
 }
 
@@ -137,7 +138,7 @@ impl Remote {
 
     /// Brings the service up to this frame; the answers to the request that has it.
     async fn deliver(&mut self, number: u64) -> Result<Vec<Answer>, ClientError> {
-        let mut backoff = Backoff::new(self.transport.retry_for);
+        let mut backoff = Backoff::new(self.transport.retry_for, self.transport.carrier.clone());
         let mut has_recovered = false;
         loop {
             let next = (self.last_acknowledged + 1).min(number);
