@@ -59,3 +59,4 @@ pub use problems::kind::Kind as ProblemKind;
 pub use quotas::client::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, BindError, Shutdown};
+pub use server::service::{Parts, Service};

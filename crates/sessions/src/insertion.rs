@@ -2,6 +2,7 @@
 
 use super::new_session::NewSession;
 use super::opening::Opening;
+use super::random::random;
 use super::registry::{Registry, TooManySessions};
 use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
@@ -44,7 +45,7 @@ impl Registry {
             request,
             estimates: state.latest(),
             expires: expires.map_or(0, |time| time.as_secs()),
-            incarnation: rand::random(),
+            incarnation: random(),
         }
     }
 

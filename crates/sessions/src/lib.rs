@@ -31,6 +31,7 @@ mod new_session;
 mod opening;
 mod owner;
 mod per_target;
+pub mod random;
 mod registry;
 mod replay;
 mod scheduler;
@@ -60,9 +61,10 @@ pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
-pub use scheduler::admission::{Admission, NoOutcome, QueueFull, WorkPanicked, threads_of};
+pub use scheduler::admission::{Admission, NoOutcome, QueueFull, WorkPanicked};
 pub use scheduler::budget::{Budget, BudgetFull, Charge};
 pub use scheduler::charged_bytes::ChargedBytes;
+pub use scheduler::executor::{AfterWork, Executor, Work, threads_of};
 pub use scheduler::fair_queue::WorkerSlot;
 pub use scheduler::flows::Flow;
 pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};
@@ -77,8 +79,9 @@ pub use snapshot::{
 pub use state::{SessionState, StepError};
 pub use store::{
     AddressError, Commit, Durability, DurabilityError, FileStore, FileStoreError, Gone, Intent,
-    Local, Outcome, Record, RedisAddress, RedisAddressError, RedisStore, SessionName, SessionStore,
-    Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version, reconcile,
+    Local, Outcome, Record, RedisAddress, RedisAddressError, RedisStore, ScriptServer, SessionName,
+    SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
+    reconcile,
 };
 pub use store::{Counted, StoreShare};
 pub use streams::{OpenStreams, StreamPlace};

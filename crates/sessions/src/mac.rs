@@ -6,6 +6,8 @@
 /// Bytes of a code.
 pub const MAC_BYTES: usize = blake3::OUT_LEN;
 
+use crate::random::random;
+
 type Key = [u8; blake3::KEY_LEN];
 
 /// What the key is derived from that stands for "unsigned". It is no secret: its code is a checksum.
@@ -28,7 +30,7 @@ impl MacKeys {
             .map(|secret| blake3::derive_key(context, secret.as_ref()));
         let mut accepted: Vec<Key> = derived.collect();
         if accepted.is_empty() {
-            accepted.push(rand::random());
+            accepted.push(random());
         }
         Self {
             context,

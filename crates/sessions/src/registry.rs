@@ -229,7 +229,7 @@ mod tests {
         let state = SessionState::start(&frame, print, &PerTarget::One(target), &params, || Ok(()))
             .unwrap();
         let new = NewSession {
-            id: Uuid::new_v4(),
+            id: crate::random::new_id(),
             opening: registry.opening([0; 32], &state),
             owner: Owner::default(),
             version: None,

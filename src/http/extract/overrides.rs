@@ -2,6 +2,7 @@
 
 use super::settings::{MAX_EXACT, Seed, whole};
 use crate::http::problems::problem::Problem;
+use bagtrack_sessions::random::random_range;
 use bagtrack_tracker::{Params, Preset};
 use serde::de::{Deserialize, Deserializer, Error};
 use serde_json::{Map, Value};
@@ -51,7 +52,7 @@ impl ParamOverrides {
     /// A parameter is unknown or has the wrong type.
     pub fn resolve(self, preset: Preset, seed: Option<Seed>) -> Result<Params, Problem> {
         let mut params = preset.params();
-        params.seed = rand::random_range(0..=MAX_EXACT);
+        params.seed = random_range(0..=MAX_EXACT);
         // One at a time, so that a value of the wrong type can be named.
         for (name, value) in self.0 {
             if !is_public(&name) {

@@ -4,6 +4,7 @@
 //! where spans are exported to (feature `otel`).
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use bagtrack_sessions::random::random_range;
 
 /// The header.
 pub const TRACEPARENT: HeaderName = HeaderName::from_static("traceparent");
@@ -29,7 +30,7 @@ impl TraceContext {
             (Some(value), None) => value.to_str().ok().and_then(parse),
             _ => None,
         };
-        let span = rand::random_range(1..=u64::MAX);
+        let span = random_range(1..=u64::MAX);
         match named {
             Some(parent) => Self {
                 parent: Some(parent.span),
@@ -37,7 +38,7 @@ impl TraceContext {
                 ..parent
             },
             None => Self {
-                trace: rand::random_range(1..=u128::MAX),
+                trace: random_range(1..=u128::MAX),
                 parent: None,
                 span,
                 flags: 0,

@@ -6,6 +6,7 @@
 
 use super::connection_service::ConnectionService;
 use super::refusal;
+use super::service::{Parts, Service};
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
 use crate::http::config::service::Config;
@@ -18,15 +19,10 @@ use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::net::connections::{Connections, NoRoom};
 use crate::http::net::handshake::Security;
 use crate::http::problems::problem::Problem;
-#[cfg(fuzzing)]
-use crate::http::quotas::client::Peer;
-use crate::http::server::router::router;
 use crate::http::state::AppState;
-#[cfg(fuzzing)]
-use axum::Extension;
 use axum::Router;
-use bagtrack_sessions::clock::{interval, sleep, timeout};
-use bagtrack_sessions::{Clock, FileStoreError};
+use bagtrack_sessions::clock::{sleep, timeout};
+use bagtrack_sessions::{Clock, Executor, FileStoreError};
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -87,7 +83,7 @@ impl From<()> for Shutdown {
 pub struct Application {
     listener: TcpListener,
     security: Security,
-    state: AppState,
+    service: Service,
     extra: Router,
 }
 
@@ -115,10 +111,16 @@ impl Application {
         let listener = TcpListener::bind(address).await;
         let listener = listener.map_err(|source| BindError::Listen { address, source })?;
         let store = store::connect(&config.store, clock.clone()).await?;
+        let executor = Executor::threads(config.worker_count()).map_err(BindError::Workers)?;
+        let parts = Parts {
+            clock,
+            store,
+            executor,
+        };
         Ok(Self {
             listener,
             security,
-            state: AppState::new(config, access, clock, store).map_err(BindError::Workers)?,
+            service: Service::of(config, access, parts),
             extra: Router::new(),
         })
     }
@@ -147,7 +149,7 @@ impl Application {
 
     /// The API keys, to read them again.
     pub fn api_keys(&self) -> ApiKeys {
-        self.state.access.keys.clone()
+        self.service.state.access.keys.clone()
     }
 
     /// Serves these routes too: behind the layers that all requests pass, but not behind those that ask for a key, or
@@ -161,8 +163,7 @@ impl Application {
     /// can be opened.
     #[cfg(fuzzing)]
     pub fn into_router(self) -> Router {
-        let peer = Peer(SocketAddr::from(([127, 0, 0, 1], 1)));
-        router(self.state, self.extra).layer(Extension(peer))
+        self.service.router(SocketAddr::from(([127, 0, 0, 1], 1)))
     }
 
     /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
@@ -172,26 +173,30 @@ impl Application {
         let Self {
             listener,
             security,
-            state,
+            service,
             extra,
         } = self;
+        let state = service.state.clone();
         let config = &state.config;
         let (ending, _) = watch::channel(false);
         let (keep_alive, cut_off) = watch::channel(());
-        let sweeper = tokio::spawn(sweep(state.clone()));
+        let sweeper = tokio::spawn({
+            let service = service.clone();
+            async move { service.sweep().await }
+        });
         {
-            let service = router(state.clone(), extra);
-            let service = ConnectionService::new(state.clone(), security, service);
-            let accepting = accept(&listener, &state, service, &ending, cut_off);
+            let routes = service.routes(extra);
+            let served = ConnectionService::new(state.clone(), security, routes);
+            let accepting = accept(&listener, &state, served, &ending, cut_off);
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
                 how = shutdown => {
                     tracing::info!("shutting down");
-                    state.service.drain();
+                    service.drain();
                     tokio::spawn({
-                        let state = state.clone();
-                        async move { state.service.flush().await }
+                        let service = service.clone();
+                        async move { service.flush().await }
                     });
                     // New connections are still served: a load balancer asks for /readyz on them.
                     if how.into() == Shutdown::Gradual {
@@ -206,7 +211,7 @@ impl Application {
         // Each connection, and each stream that took one over, holds a receiver.
         let ended = timeout(config.shutdown_timeout, ending.closed()).await;
         drop(keep_alive);
-        state.service.flush().await;
+        service.flush().await;
         ended.is_ok()
     }
 }
@@ -267,23 +272,5 @@ fn refuse(stream: TcpStream, peer: SocketAddr, state: &AppState, has_tls: bool) 
     {
         // It does not wait: the stream is not in blocking mode.
         let _ = stream.write(&answer);
-    }
-}
-
-async fn sweep(state: AppState) {
-    let idle = state.config.session_idle;
-    let mut ticks = interval((idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30)));
-    loop {
-        ticks.tick().await;
-        let expired = state.service.registry.sweep();
-        state.service.prune();
-        state.metrics.upkeep();
-        if expired > 0 {
-            tracing::info!(
-                expired,
-                live = state.service.registry.len(),
-                "sessions expired"
-            );
-        }
     }
 }

@@ -10,3 +10,4 @@ pub mod application;
 mod connection_service;
 mod refusal;
 pub mod router;
+pub mod service;

@@ -6,12 +6,12 @@ use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json;
 use axum::http::header::CONTENT_SECURITY_POLICY;
+use bagtrack_sessions::random::new_id;
 use std::net::IpAddr;
-use uuid::Uuid;
 
 /// The answer that ends a connection of this client with a problem. Counts it, and writes its line in the log.
 pub fn answer_of(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
-    let id = Uuid::new_v4().to_string();
+    let id = new_id().to_string();
     metrics.problem(problem.kind());
     let (kind, status) = (problem.kind().slug(), problem.kind().status().as_u16());
     tracing::info!(id, %client, kind, status, "connection refused");

@@ -10,11 +10,10 @@ use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
 use bagtrack_sessions::{
-    Admission, Budget, Charge, Clock, Flow, IdempotencyStore, Lease, OpenStreams, Registry,
-    ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
+    Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,
+    Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
 use saturation::Saturation;
-use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::SystemTime;
@@ -56,23 +55,26 @@ impl std::ops::Deref for AppState {
 }
 
 impl AppState {
-    /// The state of a service with these settings, keys and this clock.
-    ///
-    /// # Errors
-    /// The system gives no threads for the workers.
+    /// The state of a service with these settings and keys, this clock, and what its work is done by.
     pub fn new(
         config: Config,
         access: Access,
         clock: Clock,
         store: Option<Arc<dyn SessionStore>>,
-    ) -> io::Result<Self> {
+        executor: Executor,
+    ) -> Self {
         let metrics = Metrics::new();
         let clients = Clients::new(&config, store.is_some());
         let service = SessionService::new(ServiceParts {
             settings: settings(&config),
             registry: registry(&config, &clock, store.is_some()),
             store,
-            admission: Admission::new(config.queue, config.worker_count(), config.queue_delay)?,
+            admission: Admission::on(
+                executor,
+                config.queue,
+                config.worker_count(),
+                config.queue_delay,
+            ),
             streams: OpenStreams::default(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             keys: access.snapshots.clone(),
@@ -80,7 +82,7 @@ impl AppState {
             queue_wait: metrics.queue_wait.clone(),
             draining: AtomicBool::new(false),
         });
-        Ok(Self(Arc::new(Shared {
+        Self(Arc::new(Shared {
             service,
             uploads: clients.all().upload_bytes.clone(),
             clients,
@@ -92,7 +94,7 @@ impl AppState {
             upload_saturation: Saturation::default(),
             clock,
             config,
-        })))
+        }))
     }
 
     /// Whether the service was asked to end.

@@ -5,6 +5,7 @@ use super::idempotency::CreationKey;
 use super::service::SessionService;
 use super::start::Start;
 use crate::clock::timeout;
+use crate::random::new_id;
 use crate::store::{Counted, Outcome, Record, SessionName, StoreShare, Version};
 use crate::{
     ActError, NewSession, Owner, QueuePermit, Reservation, Session, SessionState, Stopped,
@@ -66,7 +67,7 @@ impl SessionService {
     /// What it begins with cannot be used, there is no room, or another request has opened one under this name.
     pub async fn open(&self, request: OpenRequest) -> Result<Opened, OpenError> {
         let Some(key) = request.key.clone() else {
-            let session = self.open_as(request, Uuid::new_v4()).await?;
+            let session = self.open_as(request, new_id()).await?;
             return Ok(Opened {
                 session,
                 replayed: false,
@@ -136,7 +137,7 @@ impl SessionService {
         if let Some(live) = opened.filter(|id| self.registry.is_live(*id)) {
             return Ok(live);
         }
-        let new = Uuid::new_v4();
+        let new = new_id();
         match &self.store {
             None => Ok(new),
             Some(store) => Ok(store.claim(owner, key, new).await?),

@@ -5,11 +5,11 @@
 //! that times out or whose client goes away does not end work that has begun, so its permits stay taken until that work
 //! has ended, and never more threads work than there are workers.
 
+use super::executor::{AfterWork, Executor};
 use super::fair_queue::{FairQueue, WorkerSlot};
-use super::flows::{Flow, SizeClass, max_begun};
+use super::flows::Flow;
 use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
-use super::workers::Workers;
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -64,17 +64,12 @@ fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
         .take()
 }
 
-/// The threads for so many workers of one class.
-pub fn threads_of(workers: usize) -> usize {
-    workers + max_begun(workers)
-}
-
 /// A queue before the workers. Clones share both.
 #[derive(Debug, Clone)]
 pub struct Admission {
     queue: Arc<Places>,
     workers: FairQueue,
-    threads: Arc<[Workers; 2]>,
+    executor: Executor,
 }
 
 impl Admission {
@@ -85,13 +80,16 @@ impl Admission {
     /// # Errors
     /// The system gives no threads for the workers.
     pub fn new(queue: usize, workers: usize, delay: Duration) -> io::Result<Self> {
-        // Of work on several frames, what has begun may wait between two of them.
-        let threads = |class: SizeClass| Workers::new(threads_of(workers), class.niceness());
-        Ok(Self {
+        Ok(Self::on(Executor::threads(workers)?, queue, workers, delay))
+    }
+
+    /// The same, with the work done by `executor`.
+    pub fn on(executor: Executor, queue: usize, workers: usize, delay: Duration) -> Self {
+        Self {
             queue: Places::new(queue),
-            workers: FairQueue::new(workers, delay),
-            threads: Arc::new([threads(SizeClass::Small)?, threads(SizeClass::Large)?]),
-        })
+            workers: FairQueue::new(workers, delay).measured_by(executor.cpu_clock()),
+            executor,
+        }
     }
 
     /// Whether there is a place in the queue for a client now. It may be gone when it is asked for.
@@ -143,13 +141,13 @@ impl Admission {
         let (send, outcome) = oneshot::channel();
         // Where this future is dropped before a worker takes it, the work and its permits are dropped with it.
         let unstarted = Unstarted(Arc::new(Mutex::new(Some((queue, work)))));
-        let (taken, threads) = (unstarted.0.clone(), self.threads.clone());
+        let (taken, executor) = (unstarted.0.clone(), self.executor.clone());
         let start = move |mut turn: WorkerSlot| {
             let Some((queue, work)) = take(&taken) else {
                 return Err(turn);
             };
-            let threads = &threads[turn.class() as usize];
-            threads.start(Box::new(move || {
+            let class = turn.class();
+            let work = Box::new(move || -> AfterWork {
                 turn.begin();
                 // A panic drops `work`, so no half-changed value is read.
                 let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut turn))));
@@ -159,7 +157,8 @@ impl Admission {
                     // It cannot be sent when the client has gone.
                     let _ = send.send(outcome);
                 })
-            }));
+            });
+            executor.start(class, work);
             Ok(())
         };
         self.workers.enter(asked, Box::new(start));
@@ -265,7 +264,7 @@ mod tests {
     async fn a_thread_goes_on_with_the_work_that_waits_for_its_worker() {
         let admission = Admission::new(9, 1, Duration::ZERO).unwrap();
         // A thread that starts late would be the one that became idle last.
-        while format!("{:?}", admission.threads[0]) != "Workers(9 idle)" {
+        while !format!("{:?}", admission.executor).starts_with("[Workers(9 idle)") {
             tokio::task::yield_now().await;
         }
         let (go, wait) = mpsc::channel::<()>();

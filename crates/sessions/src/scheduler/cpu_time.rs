@@ -2,9 +2,28 @@
 
 use std::time::Duration;
 
+/// What measures the processor time of work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CpuClock {
+    /// The processor time of the thread that asks.
+    Thread,
+    /// Work takes none.
+    Still,
+}
+
+impl CpuClock {
+    /// Processor time since some fixed moment.
+    pub(super) fn now(self) -> Duration {
+        match self {
+            Self::Thread => thread_cpu_time(),
+            Self::Still => Duration::ZERO,
+        }
+    }
+}
+
 /// Processor time of this thread since some fixed moment.
 #[cfg(unix)]
-pub(super) fn thread_cpu_time() -> Duration {
+fn thread_cpu_time() -> Duration {
     use rustix::time::{ClockId, clock_gettime};
     let time = clock_gettime(ClockId::ThreadCPUTime);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
@@ -14,7 +33,7 @@ pub(super) fn thread_cpu_time() -> Duration {
 
 /// Elsewhere the time of day stands in for it.
 #[cfg(not(unix))]
-pub(super) fn thread_cpu_time() -> Duration {
+fn thread_cpu_time() -> Duration {
     use crate::clock::{self, Instant};
     use std::sync::OnceLock;
     static START: OnceLock<Instant> = OnceLock::new();

@@ -12,7 +12,7 @@
 //! Work on several frames gives its worker up between two of them when another flow has the better claim. Its thread
 //! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
 
-use super::cpu_time::thread_cpu_time;
+use super::cpu_time::CpuClock;
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,7 +24,10 @@ type Give = Box<dyn FnOnce(WorkerSlot) -> Result<(), WorkerSlot> + Send>;
 
 /// The queue. Clones are the same one.
 #[derive(Clone)]
-pub(super) struct FairQueue(Arc<Mutex<Flows<Give>>>);
+pub(super) struct FairQueue {
+    flows: Arc<Mutex<Flows<Give>>>,
+    cpu: CpuClock,
+}
 
 /// What a request asks of the queue.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +45,7 @@ pub(super) struct Asked {
 pub struct WorkerSlot {
     /// None once the worker was handed on.
     queue: Option<FairQueue>,
+    cpu: CpuClock,
     flow: Flow,
     length: Job,
     class: SizeClass,
@@ -56,7 +60,15 @@ pub struct WorkerSlot {
 impl FairQueue {
     /// For so many workers. `delay` is the target of what a flow's requests wait; zero where they may wait for ever.
     pub(super) fn new(workers: usize, delay: Duration) -> Self {
-        Self(Arc::new(Mutex::new(Flows::new(workers, delay))))
+        Self {
+            flows: Arc::new(Mutex::new(Flows::new(workers, delay))),
+            cpu: CpuClock::Thread,
+        }
+    }
+
+    /// The queue before workers whose time this clock measures.
+    pub(super) fn measured_by(self, cpu: CpuClock) -> Self {
+        Self { cpu, ..self }
     }
 
     /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. It is dropped where the
@@ -133,6 +145,7 @@ impl FairQueue {
     fn turn(&self, flow: Flow, length: Job, class: SizeClass) -> WorkerSlot {
         WorkerSlot {
             queue: Some(self.clone()),
+            cpu: self.cpu,
             flow,
             length,
             class,
@@ -177,7 +190,7 @@ impl FairQueue {
 
     fn lock(&self) -> MutexGuard<'_, Flows<Give>> {
         // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.flows.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -193,9 +206,14 @@ impl WorkerSlot {
         self.class
     }
 
+    /// What measures the processor time of the work.
+    pub(super) fn cpu(&self) -> CpuClock {
+        self.cpu
+    }
+
     /// Work begins on this thread.
     pub(super) fn begin(&mut self) {
-        let now = thread_cpu_time();
+        let now = self.cpu.now();
         (self.began, self.checked) = (Some(now), now);
     }
 
@@ -207,7 +225,7 @@ impl WorkerSlot {
                 ..Held::default()
             };
         };
-        let now = thread_cpu_time();
+        let now = self.cpu.now();
         self.longest = self.longest.max(now.saturating_sub(self.checked));
         self.checked = now;
         Held {
@@ -220,6 +238,10 @@ impl WorkerSlot {
     /// Lets a request of another flow go first, where that has the better claim. Blocks this thread until there is a
     /// worker again; it must not be one that runs tasks.
     pub(super) fn yield_to_others(&mut self) {
+        // On the one thread of all work nobody could give the worker back.
+        if self.cpu == CpuClock::Still {
+            return;
+        }
         // Work on one frame ends sooner than it would come back.
         let (Some(queue), Job::Batch | Job::ResumedBatch(_)) = (self.queue.clone(), self.length)
         else {

@@ -12,6 +12,7 @@ pub(crate) mod budget;
 pub(crate) mod charged_bytes;
 mod controlled_delay;
 mod cpu_time;
+pub(crate) mod executor;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;
 mod places;

@@ -3,7 +3,7 @@
 //! A thread cannot be stopped from outside. So the work itself asks, before each frame, whether it should go on. There
 //! it also lets other clients' requests go first.
 
-use super::cpu_time::thread_cpu_time;
+use super::cpu_time::CpuClock;
 use super::fair_queue::WorkerSlot;
 use crate::clock::{self, Instant};
 use std::sync::Arc;
@@ -69,10 +69,12 @@ impl WorkLimit {
 
     /// Begins to count this thread's processor time, while the work has this turn.
     pub fn start<'a>(&'a self, turn: &'a mut WorkerSlot) -> WorkMeter<'a> {
+        let cpu = turn.cpu();
         WorkMeter {
             limit: self,
             turn,
-            started: thread_cpu_time(),
+            cpu,
+            started: cpu.now(),
             steps: Vec::new(),
         }
     }
@@ -93,6 +95,7 @@ impl Drop for AbandonOnDrop {
 pub struct WorkMeter<'a> {
     limit: &'a WorkLimit,
     turn: &'a mut WorkerSlot,
+    cpu: CpuClock,
     started: Duration,
     steps: Vec<Duration>,
 }
@@ -100,9 +103,9 @@ pub struct WorkMeter<'a> {
 impl WorkMeter<'_> {
     /// Does a step of the work, and notes its processor time.
     pub fn step<T>(&mut self, step: impl FnOnce() -> T) -> T {
-        let before = thread_cpu_time();
+        let before = self.cpu.now();
         let result = step();
-        self.steps.push(thread_cpu_time().saturating_sub(before));
+        self.steps.push(self.cpu.now().saturating_sub(before));
         result
     }
 
@@ -113,7 +116,7 @@ impl WorkMeter<'_> {
 
     /// Processor time that the work has taken.
     pub fn cpu_time(&self) -> Duration {
-        thread_cpu_time().saturating_sub(self.started)
+        self.cpu.now().saturating_sub(self.started)
     }
 
     /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.

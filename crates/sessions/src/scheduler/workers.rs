@@ -3,13 +3,10 @@
 //! A thread keeps a megabyte or more of buffers from one frame to the next. So work goes to the thread that became idle
 //! last: its buffers are most likely still in the caches of its core.
 
+use super::executor::{AfterWork, Work};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::{fmt, io};
-
-/// Work, and what is to be done once its thread can be given the next. Neither may panic.
-type Job = Box<dyn FnOnce() -> After + Send>;
-type After = Box<dyn FnOnce()>;
 
 /// The threads. When this is dropped each ends after its current job, once no job waits.
 pub(super) struct Workers(Arc<Shared>);
@@ -19,7 +16,7 @@ struct Shared(Mutex<State>);
 
 #[derive(Default)]
 struct State {
-    waiting: VecDeque<Job>,
+    waiting: VecDeque<Work>,
     /// One for each idle thread, in the order in which they became idle.
     idle: Vec<Arc<ParkingSlot>>,
     closed: bool,
@@ -42,7 +39,7 @@ impl Workers {
     }
 
     /// Runs `job` on a thread: at once if one is idle, else after the jobs that wait already.
-    pub(super) fn start(&self, job: Job) {
+    pub(super) fn start(&self, job: Work) {
         let mut state = self.0.lock();
         match state.idle.pop() {
             Some(slot) => {
@@ -75,7 +72,7 @@ impl Shared {
     fn serve(&self, niceness: i32) {
         lower_priority(niceness);
         let slot = Arc::new(ParkingSlot::default());
-        let mut after: After = Box::new(|| ());
+        let mut after: AfterWork = Box::new(|| ());
         loop {
             let Some(job) = self.next(&slot, after) else {
                 return;
@@ -85,7 +82,7 @@ impl Shared {
     }
 
     /// The next job; none when the thread is to end.
-    fn next(&self, slot: &Arc<ParkingSlot>, after: After) -> Option<Job> {
+    fn next(&self, slot: &Arc<ParkingSlot>, after: AfterWork) -> Option<Work> {
         let mut state = self.lock();
         let waiting = state.waiting.pop_front();
         if waiting.is_some() || state.closed {
@@ -121,17 +118,17 @@ fn lower_priority(_: i32) {}
 /// Where one idle thread waits for a job, or for None, which tells it to end.
 #[derive(Default)]
 struct ParkingSlot {
-    given: Mutex<Option<Option<Job>>>,
+    given: Mutex<Option<Option<Work>>>,
     filled: Condvar,
 }
 
 impl ParkingSlot {
-    fn give(&self, job: Option<Job>) {
+    fn give(&self, job: Option<Work>) {
         *self.given.lock().unwrap_or_else(PoisonError::into_inner) = Some(job);
         self.filled.notify_one();
     }
 
-    fn wait(&self) -> Option<Job> {
+    fn wait(&self) -> Option<Work> {
         let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(job) = given.take() {
@@ -152,7 +149,7 @@ mod tests {
     use std::sync::mpsc;
     use std::thread::{self, ThreadId};
 
-    fn job(work: impl FnOnce() + Send + 'static) -> Job {
+    fn job(work: impl FnOnce() + Send + 'static) -> Work {
         Box::new(|| {
             work();
             Box::new(|| ())

@@ -29,7 +29,7 @@ mod record;
 mod redis;
 mod session_store;
 
-pub use self::redis::{RedisAddress, RedisAddressError, RedisStore};
+pub use self::redis::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};

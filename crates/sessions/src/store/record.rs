@@ -2,6 +2,7 @@
 
 use crate::opening::Opening;
 use crate::owner::Owner;
+use crate::random::random;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use uuid::Uuid;
@@ -35,7 +36,7 @@ impl Version {
     pub fn first(frame: u64) -> Self {
         Self {
             // Below 2⁶², so that it can be counted up as a signed number.
-            generation: rand::random::<u64>() >> 2,
+            generation: random::<u64>() >> 2,
             frame,
             checkpoint: frame,
         }

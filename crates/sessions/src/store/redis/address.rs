@@ -1,7 +1,9 @@
 //! Where the Redis is.
 
+use super::script::ScriptServer;
 use redis::cluster::ClusterClient;
 use redis::{Client, ErrorKind};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The text is no address of a Redis.
@@ -19,6 +21,8 @@ pub(super) enum Kind {
     Server(Box<Client>),
     /// Nodes of a cluster, from which the others are found.
     Cluster(Box<ClusterClient>),
+    /// What stands in for one.
+    Given(Arc<dyn ScriptServer>),
 }
 
 impl RedisAddress {

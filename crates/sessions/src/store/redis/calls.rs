@@ -4,12 +4,14 @@ use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
 };
-use super::address::RedisAddress;
+use super::address::{Kind, RedisAddress};
 use super::connection::{Call, Connection};
+use super::script::{Script, ScriptCall, ScriptServer};
 use super::scripts::Scripts;
-use crate::clock::{sleep, wall_now};
+use crate::clock::{Clock, sleep};
 use crate::owner::Owner;
-use redis::{FromRedisValue, Script, ScriptInvocation};
+use crate::random::random;
+use redis::FromRedisValue;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::{Duration, SystemTime};
@@ -33,6 +35,7 @@ struct Shared {
     connection: Connection,
     scripts: Scripts,
     prefix: String,
+    clock: Clock,
     /// Whether it refused the last new session for want of room.
     is_full: AtomicBool,
 }
@@ -95,12 +98,35 @@ impl RedisStore {
         prefix: &str,
         timeout: Duration,
     ) -> Result<Self, StoreUnavailable> {
+        Self::connect_at(address, prefix, timeout, Clock::default()).await
+    }
+
+    /// The same, with what stands in for a Redis, and this clock.
+    ///
+    /// # Errors
+    /// None.
+    pub async fn behind(
+        server: Arc<dyn ScriptServer>,
+        prefix: &str,
+        timeout: Duration,
+        clock: Clock,
+    ) -> Result<Self, StoreUnavailable> {
+        Self::connect_at(RedisAddress(Kind::Given(server)), prefix, timeout, clock).await
+    }
+
+    async fn connect_at(
+        address: RedisAddress,
+        prefix: &str,
+        timeout: Duration,
+        clock: Clock,
+    ) -> Result<Self, StoreUnavailable> {
         let connection = Connection::new(address, timeout);
         let connection = connection.map_err(|error| StoreUnavailable(error.to_string()))?;
         let shared = Arc::new(Shared {
             connection,
             scripts: Scripts::new(),
             prefix: prefix.to_owned(),
+            clock,
             is_full: AtomicBool::new(false),
         });
         shared.probe().await;
@@ -108,12 +134,18 @@ impl RedisStore {
         Ok(Self(shared))
     }
 
-    async fn about_record(
-        &self,
-        script: ScriptInvocation<'_>,
-    ) -> Result<Outcome, StoreUnavailable> {
+    async fn about_record(&self, script: ScriptCall<'_>) -> Result<Outcome, StoreUnavailable> {
         let Answer(outcome) = self.0.connection.call(Call::Script(script)).await?;
         Ok(outcome)
+    }
+
+    /// Milliseconds since 1970.
+    fn now(&self) -> u64 {
+        let clock = &self.0.clock;
+        let since = clock
+            .wall(clock.now())
+            .duration_since(SystemTime::UNIX_EPOCH);
+        milliseconds(since.unwrap_or_default())
     }
 
     /// Of a record. Braces make a cluster keep the keys of a session at one node.
@@ -137,7 +169,9 @@ impl RedisStore {
         let (places, bytes) = (session.places, session.bytes);
         let member = format!("{id}:{incarnation}:{places}:{bytes}");
         let mut script = self.0.scripts.admit.key(self.key_of_client(&share.client));
-        script.arg(member).arg(now() + milliseconds(session.ttl));
+        script
+            .arg(member)
+            .arg(self.now() + milliseconds(session.ttl));
         script.arg(share.max_places).arg(share.max_bytes);
         script.arg(milliseconds(COUNTED));
         let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
@@ -167,14 +201,14 @@ impl RedisStore {
                 .key(self.key_of_client(&share.client));
             script
                 .arg(&member)
-                .arg(until.map_or(0, |lives| now() + lives));
+                .arg(until.map_or(0, |lives| self.now() + lives));
             let _: i64 = self.0.connection.call(Call::Script(script)).await?;
         }
         Ok(())
     }
 
     /// Runs a script on a session.
-    fn on<'a>(&self, script: &'a Script, name: SessionName) -> ScriptInvocation<'a> {
+    fn on<'a>(&self, script: &'a Script, name: SessionName) -> ScriptCall<'a> {
         let SessionName { id, incarnation } = name;
         let mut invocation = script.key(self.key(id));
         let ended = format!("{}:ended:{{{id}}}:{incarnation:016x}", self.0.prefix);
@@ -290,15 +324,9 @@ impl SessionStore for RedisStore {
     }
 }
 
-/// Milliseconds since 1970.
-fn now() -> u64 {
-    let since = wall_now().duration_since(SystemTime::UNIX_EPOCH);
-    milliseconds(since.unwrap_or_default())
-}
-
 /// A name for one write.
 fn token() -> String {
-    format!("{:016x}", rand::random::<u64>())
+    format!("{:016x}", random::<u64>())
 }
 
 fn milliseconds(time: Duration) -> u64 {

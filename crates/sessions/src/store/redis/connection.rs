@@ -2,16 +2,14 @@
 
 use super::super::session_store::StoreUnavailable;
 use super::address::{Kind, RedisAddress};
+use super::script::{ScriptCall, ScriptServer};
 use crate::clock::{self, sleep, timeout_at};
-use redis::aio::{ConnectionLike, ConnectionManager, ConnectionManagerConfig};
+use redis::aio::{ConnectionManager, ConnectionManagerConfig};
 use redis::cluster::ClusterConfig;
 use redis::cluster_async::ClusterConnection;
-use redis::{
-    Cmd, ErrorKind, FromRedisValue, Pipeline, RedisError, RedisFuture, RedisResult,
-    ScriptInvocation, ServerErrorKind, Value,
-};
+use redis::{ErrorKind, FromRedisValue, RedisError, RedisResult, ServerErrorKind, Value};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Between two attempts of one call.
@@ -19,15 +17,19 @@ const PAUSE: Duration = Duration::from_millis(10);
 
 /// What is sent to the store. It can be sent again.
 pub(super) enum Call<'a> {
-    Script(ScriptInvocation<'a>),
-    Command(Cmd),
+    Script(ScriptCall<'a>),
+    Ping,
 }
 
 impl Call<'_> {
     async fn send(&self, link: &mut Link) -> RedisResult<Value> {
-        match self {
-            Self::Script(script) => script.invoke_async(link).await,
-            Self::Command(command) => command.query_async(link).await,
+        match (self, link) {
+            (Self::Script(script), Link::Server(link)) => script.invoke(link).await,
+            (Self::Script(script), Link::Cluster(link)) => script.invoke(link).await,
+            (Self::Script(script), Link::Given(server)) => script.run_at(server.as_ref()).await,
+            (Self::Ping, Link::Server(link)) => redis::cmd("PING").query_async(link).await,
+            (Self::Ping, Link::Cluster(link)) => redis::cmd("PING").query_async(link).await,
+            (Self::Ping, Link::Given(server)) => server.ping().await,
         }
     }
 }
@@ -37,6 +39,7 @@ impl Call<'_> {
 pub(super) enum Link {
     Server(ConnectionManager),
     Cluster(ClusterConnection),
+    Given(Arc<dyn ScriptServer>),
 }
 
 /// The connection, and whether the store answers.
@@ -70,34 +73,7 @@ impl Link {
                 let link = client.get_pending_async_connection_with_config(config);
                 Ok(Self::Cluster(link))
             }
-        }
-    }
-}
-
-impl ConnectionLike for Link {
-    fn req_packed_command<'a>(&'a mut self, cmd: &'a Cmd) -> RedisFuture<'a, Value> {
-        match self {
-            Self::Server(link) => link.req_packed_command(cmd),
-            Self::Cluster(link) => link.req_packed_command(cmd),
-        }
-    }
-
-    fn req_packed_commands<'a>(
-        &'a mut self,
-        pipeline: &'a Pipeline,
-        offset: usize,
-        count: usize,
-    ) -> RedisFuture<'a, Vec<Value>> {
-        match self {
-            Self::Server(link) => link.req_packed_commands(pipeline, offset, count),
-            Self::Cluster(link) => link.req_packed_commands(pipeline, offset, count),
-        }
-    }
-
-    fn get_db(&self) -> i64 {
-        match self {
-            Self::Server(link) => link.get_db(),
-            Self::Cluster(link) => link.get_db(),
+            Kind::Given(server) => Ok(Self::Given(server.clone())),
         }
     }
 }
@@ -210,7 +186,7 @@ impl Connection {
             let is_refused = self.attempt(write).await.is_err();
             self.refuses.store(is_refused, Ordering::Release);
         } else {
-            let _ = self.attempt(Call::Command(redis::cmd("PING"))).await;
+            let _ = self.attempt(Call::Ping).await;
         }
     }
 }

@@ -15,7 +15,9 @@
 mod address;
 mod calls;
 mod connection;
+mod script;
 mod scripts;
 
 pub use address::{RedisAddress, RedisAddressError};
 pub use calls::RedisStore;
+pub use script::ScriptServer;

@@ -5,7 +5,7 @@
 //! They answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}` where
 //! the record has another version, and `{3}` where the session was ended.
 
-use redis::Script;
+use super::script::Script;
 
 /// Says that there is no record, and whether its session was ended.
 const ABSENT: &str = r"

@@ -1,0 +1,66 @@
+//! The one place that draws random numbers: ids, names of writes, seeds of trackers.
+//!
+//! They come from the thread's generator, which the system seeds. A simulation has one thread and seeds it itself, so
+//! that the same happens again.
+
+use rand::distr::uniform::{SampleRange, SampleUniform};
+use rand::distr::{Distribution, StandardUniform};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::cell::RefCell;
+use uuid::Uuid;
+
+thread_local! {
+    static SEEDED: RefCell<Option<ChaCha8Rng>> = const { RefCell::new(None) };
+}
+
+/// From now on what is drawn on this thread follows from `seed`: whoever knows it knows the ids and the keys. For
+/// simulations only.
+pub fn seed_this_thread(seed: u64) {
+    SEEDED.set(Some(ChaCha8Rng::seed_from_u64(seed)));
+}
+
+/// A number of any value.
+pub fn random<T>() -> T
+where
+    StandardUniform: Distribution<T>,
+{
+    SEEDED.with_borrow_mut(|seeded| match seeded {
+        Some(seeded) => seeded.random(),
+        None => rand::rng().random(),
+    })
+}
+
+/// A number of this range, which is not empty.
+pub fn random_range<T: SampleUniform>(range: impl SampleRange<T>) -> T {
+    SEEDED.with_borrow_mut(|seeded| match seeded {
+        Some(seeded) => seeded.random_range(range),
+        None => rand::rng().random_range(range),
+    })
+}
+
+/// A new id.
+pub fn new_id() -> Uuid {
+    uuid::Builder::from_random_bytes(random()).into_uuid()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seeded_thread_draws_the_same_again_and_others_do_not() {
+        let drawn = || (new_id(), random::<u64>(), random_range(0..1000));
+        let seeded = |seed| {
+            let thread = std::thread::spawn(move || {
+                seed_this_thread(seed);
+                drawn()
+            });
+            thread.join().unwrap()
+        };
+        assert_eq!(seeded(1), seeded(1));
+        assert_ne!(seeded(1), seeded(2));
+        assert_ne!(drawn(), drawn());
+        assert_eq!(drawn().0.get_version_num(), 4);
+    }
+}

@@ -1,0 +1,92 @@
+//! The service without a network: its routes, and what goes on beside requests.
+
+use super::application::BindError;
+use crate::http::auth::access::Access;
+use crate::http::config::service::Config;
+use crate::http::quotas::client::Peer;
+use crate::http::server::router::router;
+use crate::http::state::AppState;
+use axum::{Extension, Router};
+use bagtrack_sessions::clock::interval;
+use bagtrack_sessions::{Clock, Executor, SessionStore};
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What a service is made of, beside its settings.
+#[derive(Debug)]
+pub struct Parts {
+    /// What sessions expire by.
+    pub clock: Clock,
+    /// What keeps them. The store that the settings name is not looked at.
+    pub store: Option<Arc<dyn SessionStore>>,
+    /// What decodes and tracks.
+    pub executor: Executor,
+}
+
+/// The service, which listens nowhere: for simulations, which bring its requests themselves. Clones are the same.
+#[derive(Debug, Clone)]
+pub struct Service {
+    pub(super) state: AppState,
+}
+
+impl Service {
+    /// The service with these settings.
+    ///
+    /// # Errors
+    /// The settings or the keys cannot be used.
+    pub fn new(config: Config, parts: Parts) -> Result<Self, BindError> {
+        config.validate()?;
+        let access = Access::load(&config.access, config.listen)?;
+        Ok(Self::of(config, access, parts))
+    }
+
+    /// The same, with settings and keys that were checked.
+    pub(super) fn of(config: Config, access: Access, parts: Parts) -> Self {
+        let Parts {
+            clock,
+            store,
+            executor,
+        } = parts;
+        let state = AppState::new(config, access, clock, store, executor);
+        Self { state }
+    }
+
+    /// The routes, as a client at this address meets them.
+    pub fn router(&self, client: SocketAddr) -> Router {
+        self.routes(Router::new()).layer(Extension(Peer(client)))
+    }
+
+    /// The routes, beside these.
+    pub(super) fn routes(&self, extra: Router) -> Router {
+        router(self.state.clone(), extra)
+    }
+
+    /// The service is about to end: no session is opened from now on, and all answers say so.
+    pub fn drain(&self) {
+        self.state.service.drain();
+    }
+
+    /// Writes to the store what only this process has of its sessions.
+    pub async fn flush(&self) {
+        self.state.service.flush().await;
+    }
+
+    /// Ends expired sessions, again and again.
+    pub async fn sweep(&self) {
+        let state = &self.state;
+        let idle = state.config.session_idle;
+        let often = (idle / 4).clamp(Duration::from_millis(100), Duration::from_secs(30));
+        let mut ticks = interval(often);
+        loop {
+            ticks.tick().await;
+            let expired = state.service.registry.sweep();
+            state.service.prune();
+            state.metrics.upkeep();
+            if expired > 0 {
+                let live = state.service.registry.len();
+                tracing::info!(expired, live, "sessions expired");
+            }
+        }
+    }
+}
