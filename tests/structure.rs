@@ -16,7 +16,7 @@ fn crates() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let members = fs::read_dir(root.join("crates")).expect("the folder of the crates");
     let members = members.map(|member| member.expect("a readable folder").path());
-    let others = [root.to_owned(), root.join("clients/rust")];
+    let others = [root.to_owned(), root.join("clients/rust"), root.join("sim")];
     members.chain(others).map(|path| path.join("src")).collect()
 }
 

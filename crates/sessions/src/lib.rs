@@ -31,6 +31,7 @@ mod new_session;
 mod opening;
 mod owner;
 mod per_target;
+mod planted;
 pub mod random;
 mod registry;
 mod replay;
@@ -59,6 +60,8 @@ pub use new_session::NewSession;
 pub use opening::Opening;
 pub use owner::Owner;
 pub use per_target::{MAX_TARGETS, PerTarget};
+#[cfg(feature = "planted-faults")]
+pub use planted::{PlantedFault, plant};
 pub use registry::{NoSession, Registry, TooManySessions};
 pub use replay::{Fingerprint, ReplayDecision, ReplayError};
 pub use scheduler::admission::{Admission, NoOutcome, QueueFull, WorkPanicked};

@@ -5,6 +5,7 @@
 //! so a request with several frames can be repeated too.
 
 use super::per_target::PerTarget;
+use super::planted::PlantedFault;
 use super::targets::{Correction, Estimates};
 use bagtrack_tracker::{Estimate, Rect};
 use serde::{Deserialize, Serialize};
@@ -119,6 +120,9 @@ pub(super) fn decide(
     let stored = &recent[recent.len() - posted.len()..];
     let mut pairs = stored.iter().zip(posted);
     if pairs.all(|(stored, posted)| stored.is_of(*posted, given)) {
+        if PlantedFault::TracksTwice.is_here() {
+            return Ok(ReplayDecision::Process);
+        }
         Ok(ReplayDecision::Replay(
             stored.iter().map(Answered::estimates).collect(),
         ))

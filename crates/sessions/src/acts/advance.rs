@@ -4,6 +4,7 @@ use super::error::{ActError, FramesError};
 use super::frames::{FrameBatch, Tracked};
 use super::service::SessionService;
 use crate::clock::timeout;
+use crate::planted::{PlantedFault, commit_later};
 use crate::store::{Commit, Intent, Local, Outcome, Step, StoreUnavailable, reconcile};
 use crate::{
     LockedSession, QueuePermit, ReplayError, SessionBusy, SessionPermit, SessionState, Stopped,
@@ -90,7 +91,10 @@ impl SessionService {
                     self.take_over(&mut locked, *record, flow).await?;
                     return Err(FramesError::NotInOrder);
                 }
-                step => return Err(self.refusal(locked.session(), step).into()),
+                step => {
+                    attempt.keep_uncommitted(&mut locked);
+                    return Err(self.refusal(locked.session(), step).into());
+                }
             }
         }
         Err(SessionBusy.into())
@@ -160,6 +164,10 @@ impl SessionService {
                     takes_over: is_told || batch.number.is_none(),
                     ttl,
                 };
+                if PlantedFault::AnswersBeforeCommit.is_here() {
+                    commit_later(store.clone(), &commit);
+                    return Ok(Outcome::Committed(ttl));
+                }
                 store.commit(commit).await
             }
             Attempt::Replayed(_) | Attempt::Misnumbered(_) => {
@@ -188,6 +196,16 @@ impl Attempt {
         }
     }
 
+    /// What the store did not take stays in memory, where that fault is planted.
+    fn keep_uncommitted(self, locked: &mut LockedSession) {
+        if let Self::Tracked(state, ..) = self
+            && PlantedFault::KeepsUncommitted.is_here()
+        {
+            let version = locked.session().version();
+            locked.replace(*state, version);
+        }
+    }
+
     /// The copy becomes the session's state.
     fn accept(self, locked: &mut LockedSession, was_late: bool) -> Result<Tracked, FramesError> {
         let session = locked.session().clone();
@@ -208,6 +226,9 @@ impl Attempt {
         };
         session.renew();
         tracked.checkpoint = session.checkpoint();
+        if PlantedFault::TellsEarlyCheckpoint.is_here() && tracked.checkpoint.is_some() {
+            tracked.checkpoint = Some(locked.state().latest_frame());
+        }
         Ok(tracked)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::error::ActError;
 use super::service::SessionService;
+use crate::planted::PlantedFault;
 use crate::store::{Intent, Local, Record, Step, StoreUnavailable, reconcile};
 use crate::{Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState};
 use std::sync::Arc;
@@ -115,7 +116,10 @@ impl SessionService {
         flow: Flow,
     ) -> Result<(), ActError> {
         let (newest, record) = self.decode(record, flow).await?;
-        locked.replace(newest, Some(record.version));
+        match PlantedFault::GoesOnWithOldState.is_here() {
+            true => locked.session().set_version(Some(record.version)),
+            false => locked.replace(newest, Some(record.version)),
+        }
         locked.session().set_ttl(record.ttl);
         Ok(())
     }

@@ -10,6 +10,7 @@ use super::fair_queue::{FairQueue, WorkerSlot};
 use super::flows::Flow;
 use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
+use crate::planted::PlantedFault;
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -151,7 +152,10 @@ impl Admission {
                 turn.begin();
                 // A panic drops `work`, so no half-changed value is read.
                 let outcome = catch_unwind(AssertUnwindSafe(|| span.in_scope(|| work(&mut turn))));
-                drop(queue);
+                match PlantedFault::KeepsPlace.is_here() && send.is_closed() {
+                    true => std::mem::forget(queue),
+                    false => drop(queue),
+                }
                 Box::new(move || {
                     drop(turn);
                     // It cannot be sent when the client has gone.

@@ -6,6 +6,7 @@
 //! the record has another version, and `{3}` where the session was ended.
 
 use super::script::Script;
+use crate::planted::PlantedFault;
 
 /// Says that there is no record, and whether its session was ended.
 const ABSENT: &str = r"
@@ -159,10 +160,11 @@ pub(super) struct Scripts {
 
 impl Scripts {
     pub(super) fn new() -> Self {
+        let (create, commit) = planted();
         let telling = |body: &str| Script::new(&format!("{ABSENT}{TELL}{body}"));
         Self {
-            create: telling(&format!("{NEARLY_FULL}{CREATE}")),
-            commit: telling(COMMIT),
+            create: telling(&format!("{NEARLY_FULL}{create}")),
+            commit: telling(&commit),
             check: telling(CHECK),
             fence: telling(FENCE),
             claim: Script::new(CLAIM),
@@ -173,4 +175,20 @@ impl Scripts {
             lives: Script::new(LIVES),
         }
     }
+}
+
+/// The scripts that create and commit, without the lines that a planted fault leaves out.
+fn planted() -> (String, String) {
+    let (mut create, mut commit) = (CREATE.to_owned(), COMMIT.to_owned());
+    if PlantedFault::OpensTwice.is_here() {
+        create = create.replace("if token then return tell(key, false) end", "");
+    }
+    if PlantedFault::CommitsOutOfOrder.is_here() {
+        commit = commit.replace("or frame ~= ARGV[2] ", "");
+    }
+    if PlantedFault::LivesForEver.is_here() {
+        create = create.replace("redis.call('PEXPIRE', key, ARGV[7])", "");
+        commit = commit.replace("redis.call('PEXPIRE', key, ARGV[5])", "");
+    }
+    (create, commit)
 }

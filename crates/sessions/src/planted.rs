@@ -1,0 +1,96 @@
+//! Faults that a simulation must find. They are in builds with the feature `planted-faults` only, and there one at a time.
+
+use crate::store::{Commit, SessionStore};
+use std::sync::Arc;
+
+/// A fault of the code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlantedFault {
+    /// A frame is answered before the store has it.
+    AnswersBeforeCommit,
+    /// A call to the store without answer counts as done.
+    TakesSilenceForConsent,
+    /// A frame that the store did not take stays in memory.
+    KeepsUncommitted,
+    /// The store takes a frame, whichever it had before.
+    CommitsOutOfOrder,
+    /// A record that is taken over brings its version, and not its state.
+    GoesOnWithOldState,
+    /// The answer names a checkpoint that is not written.
+    TellsEarlyCheckpoint,
+    /// A session that is opened again overwrites its record.
+    OpensTwice,
+    /// The format of a record is not written.
+    ForgetsFormat,
+    /// Records have no time to live.
+    LivesForEver,
+    /// A frame that is sent again is tracked again.
+    TracksTwice,
+    /// A request whose client has gone keeps its place in the queue.
+    KeepsPlace,
+}
+
+impl PlantedFault {
+    /// All of them.
+    #[cfg(feature = "planted-faults")]
+    pub const ALL: [Self; 11] = [
+        Self::AnswersBeforeCommit,
+        Self::TakesSilenceForConsent,
+        Self::KeepsUncommitted,
+        Self::CommitsOutOfOrder,
+        Self::GoesOnWithOldState,
+        Self::TellsEarlyCheckpoint,
+        Self::OpensTwice,
+        Self::ForgetsFormat,
+        Self::LivesForEver,
+        Self::TracksTwice,
+        Self::KeepsPlace,
+    ];
+
+    /// Whether this thread has it.
+    #[cfg(feature = "planted-faults")]
+    pub(crate) fn is_here(self) -> bool {
+        HERE.get() == Some(self)
+    }
+
+    /// None is.
+    #[cfg(not(feature = "planted-faults"))]
+    pub(crate) const fn is_here(self) -> bool {
+        false
+    }
+}
+
+#[cfg(feature = "planted-faults")]
+thread_local! {
+    static HERE: std::cell::Cell<Option<PlantedFault>> = const { std::cell::Cell::new(None) };
+}
+
+/// This thread has this fault from now on, or none.
+#[cfg(feature = "planted-faults")]
+pub fn plant(fault: Option<PlantedFault>) {
+    HERE.set(fault);
+}
+
+/// Commits a frame when it has been answered.
+pub(crate) fn commit_later(store: Arc<dyn SessionStore>, commit: &Commit) {
+    let Commit {
+        name,
+        before,
+        frame,
+        takes_over,
+        ttl,
+        ..
+    } = *commit;
+    let state = commit.state.map(<[u8]>::to_vec);
+    tokio::spawn(async move {
+        let commit = Commit {
+            name,
+            before,
+            frame,
+            state: state.as_deref(),
+            takes_over,
+            ttl,
+        };
+        let _ = store.commit(commit).await;
+    });
+}

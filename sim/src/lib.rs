@@ -1,0 +1,40 @@
+//! A deterministic simulation: three replicas of the real service, the real store over a simulated Redis, and the real
+//! Rust client, in one thread on a simulated clock. Everything that happens follows from a seed.
+//!
+//! | who | what is real | what is simulated |
+//! |---|---|---|
+//! | [callers](caller) | the client `bagtrack-client` with its rules (docs/PROTOCOL.md) | what they want, and their patience |
+//! | [the network](network) | requests and answers as HTTP has them | lines that lose, delay, double and break |
+//! | [replicas](replica) | routes, acts, store, scheduler, tracker | sockets, threads, processor time |
+//! | [the store](redis) | its Lua scripts | the server: keys, times to live, and whether it is there |
+//! | [the nemesis](nemesis) | | kills, drains, restarts, clocks that jump |
+//!
+//! After each run [`journal`], [`caller`] and [`checks`] have compared what was promised with what happened: every
+//! answer is that of the [tracker alone](replay), no number is answered with two boxes, nothing is answered that the
+//! store does not have, every session goes on until its caller ends it or it expires, and nothing is held in the end.
+//!
+//! The same seed does the same again, since one thread runs all tasks in order; the time is tokio's, paused; and all
+//! random numbers are drawn from the seed, those of the service by `bagtrack_sessions::random`. Work takes simulated time
+//! only: what the scheduler does with measured times is left to its own tests.
+
+pub mod caller;
+pub mod chance;
+pub mod checks;
+pub mod cluster;
+pub mod faults;
+pub mod journal;
+pub mod life;
+pub mod nemesis;
+pub mod network;
+#[cfg(feature = "planted-faults")]
+mod planted;
+pub mod redis;
+pub mod replay;
+pub mod replica;
+pub mod scenes;
+pub mod trace;
+pub mod world;
+
+#[cfg(feature = "planted-faults")]
+pub use planted::finds;
+pub use world::{Outcome, run};

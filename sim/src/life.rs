@@ -1,0 +1,100 @@
+//! The life of a replica: it ends at any await.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+
+/// The life. Clones are the same.
+#[derive(Debug, Clone, Default)]
+pub struct Life(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    is_dead: bool,
+    /// How often its tasks run until it ends, where that is decided.
+    polls_left: Option<u32>,
+    wakers: Vec<Waker>,
+}
+
+/// A task of a replica. It gives nothing when the replica has died.
+pub struct Mortal<T> {
+    life: Life,
+    task: Option<Pin<Box<dyn Future<Output = T> + Send>>>,
+}
+
+impl Life {
+    /// It ends now. What its tasks hold is dropped when they are next asked.
+    pub fn end(&self) {
+        let mut state = self.lock();
+        state.is_dead = true;
+        let wakers = std::mem::take(&mut state.wakers);
+        drop(state);
+        wakers.into_iter().for_each(Waker::wake);
+    }
+
+    /// It ends after its tasks have run so often: in the middle of some await.
+    pub fn end_after(&self, polls: u32) {
+        self.lock().polls_left = Some(polls);
+    }
+
+    /// Whether it has ended.
+    pub fn is_dead(&self) -> bool {
+        self.lock().is_dead
+    }
+
+    /// Whether it has ended, or its end is decided.
+    pub fn is_doomed(&self) -> bool {
+        let state = self.lock();
+        state.is_dead || state.polls_left.is_some()
+    }
+
+    /// A task of the replica.
+    pub fn run<T>(&self, task: impl Future<Output = T> + Send + 'static) -> Mortal<T> {
+        Mortal {
+            life: self.clone(),
+            task: Some(Box::pin(task)),
+        }
+    }
+
+    /// One of its tasks is to run. Whether it may.
+    fn goes_on(&self, context: &Context) -> bool {
+        let mut state = self.lock();
+        if let Some(left) = &mut state.polls_left {
+            *left = left.saturating_sub(1);
+            if *left == 0 {
+                drop(state);
+                self.end();
+                return false;
+            }
+        }
+        if state.is_dead {
+            return false;
+        }
+        if !state
+            .wakers
+            .iter()
+            .any(|waker| waker.will_wake(context.waker()))
+        {
+            state.wakers.push(context.waker().clone());
+        }
+        true
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<T> Future for Mortal<T> {
+    type Output = Option<T>;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context) -> Poll<Option<T>> {
+        if !self.life.goes_on(context) {
+            self.task = None;
+        }
+        match &mut self.task {
+            None => Poll::Ready(None),
+            Some(task) => task.as_mut().poll(context).map(Some),
+        }
+    }
+}

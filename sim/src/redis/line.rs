@@ -1,0 +1,134 @@
+//! A replica's line to the server, over a network with faults.
+
+use super::server::{Server, broken};
+use crate::chance::Chance;
+use crate::faults::Rates;
+use crate::life::Life;
+use crate::trace::Trace;
+use bagtrack_sessions::ScriptServer;
+use bagtrack_sessions::clock::sleep;
+use redis::{RedisFuture, RedisResult, Value};
+use std::future::pending;
+use std::time::Duration;
+
+/// The line of one replica.
+#[derive(Debug, Clone)]
+pub struct Line {
+    /// Of which replica it is.
+    pub name: String,
+    /// The server at its other end.
+    pub server: Server,
+    /// The replica. Of one that is dead nothing comes.
+    pub life: Life,
+    /// What goes wrong.
+    pub rates: Rates,
+    /// Draws it.
+    pub chance: Chance,
+    /// What happened.
+    pub trace: Trace,
+}
+
+impl Line {
+    fn latency(&self) -> Duration {
+        match self.rates.happens(&self.chance, self.rates.late) {
+            true => self.chance.millis(20..1500),
+            false => self.chance.millis(0..3),
+        }
+    }
+
+    /// A message is lost: the line breaks, or nothing more comes over it.
+    async fn lose(&self, what: &str) -> RedisResult<Value> {
+        self.trace
+            .note(format_args!("{} store: {what} lost", self.name));
+        match self.chance.happens(0.5) {
+            true => Err(broken()),
+            false => pending().await,
+        }
+    }
+
+    async fn deliver(&self, script: &str, keys: &[String], args: &[Vec<u8>]) -> RedisResult<Value> {
+        let (_, _, epoch) = self.server.state();
+        sleep(self.latency()).await;
+        if self.rates.happens(&self.chance, self.rates.store_lost) {
+            if self.rates.happens(&self.chance, self.rates.store_doubled) {
+                self.repeat_later(script, keys, args);
+            }
+            return self.lose("request").await;
+        }
+        if self.life.is_dead() {
+            return pending().await;
+        }
+        let (is_there, slow_by, now_epoch) = self.server.state();
+        if !is_there || now_epoch != epoch {
+            return Err(broken());
+        }
+        let answer = self.server.run(script, keys, args);
+        let told = answer
+            .as_ref()
+            .map_or_else(|_| "refused".to_owned(), summary);
+        self.trace
+            .note(format_args!("{} store: {} {told}", self.name, keys[0]));
+        if self.rates.happens(&self.chance, self.rates.store_doubled) {
+            self.repeat_later(script, keys, args);
+        }
+        sleep(self.latency() + slow_by).await;
+        if self
+            .rates
+            .happens(&self.chance, self.rates.store_answer_lost)
+        {
+            return self.lose("answer").await;
+        }
+        match self.server.state() {
+            (true, _, after) if after == epoch => answer,
+            _ => Err(broken()),
+        }
+    }
+
+    /// The message was in a buffer of a line that was given up, and comes once more.
+    fn repeat_later(&self, script: &str, keys: &[String], args: &[Vec<u8>]) {
+        let (line, delay) = (self.clone(), self.chance.millis(1..2500));
+        let (script, keys, args) = (script.to_owned(), keys.to_vec(), args.to_vec());
+        tokio::spawn(async move {
+            sleep(delay).await;
+            let answer = line.server.run(&script, &keys, &args);
+            let told = answer
+                .as_ref()
+                .map_or_else(|_| "refused".to_owned(), summary);
+            line.trace.note(format_args!(
+                "{} store: {} again, {told}",
+                line.name, keys[0]
+            ));
+        });
+    }
+}
+
+impl ScriptServer for Line {
+    fn run<'a>(
+        &'a self,
+        script: &'a str,
+        keys: &'a [String],
+        args: &'a [Vec<u8>],
+    ) -> RedisFuture<'a, Value> {
+        Box::pin(self.deliver(script, keys, args))
+    }
+
+    fn ping(&self) -> RedisFuture<'_, Value> {
+        Box::pin(async {
+            let (_, slow_by, epoch) = self.server.state();
+            sleep(self.latency() + slow_by).await;
+            match self.server.state() {
+                (true, _, after) if after == epoch => Ok(Value::SimpleString("PONG".to_owned())),
+                _ => Err(broken()),
+            }
+        })
+    }
+}
+
+/// The first number of an answer, which tells its kind.
+fn summary(answer: &Value) -> String {
+    match answer {
+        Value::Array(parts) => parts.first().map_or_else(String::new, summary),
+        Value::Int(number) => number.to_string(),
+        _ => "text".to_owned(),
+    }
+}

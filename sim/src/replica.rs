@@ -1,0 +1,187 @@
+//! A replica: the real service, with its tasks, that lives until it is killed.
+
+use crate::chance::Chance;
+use crate::faults::Rates;
+use crate::life::Life;
+use crate::redis::line::Line;
+use crate::redis::server::Server;
+use crate::trace::Trace;
+use axum::Router;
+use axum::body::Body;
+use bagtrack::http::{Config, Parts, Service};
+use bagtrack_sessions::clock::{Instant, now, sleep};
+use bagtrack_sessions::{Clock, Executor, RedisStore, SessionStore};
+use bytes::Bytes;
+use http::{Request, Response};
+use http_body_util::BodyExt;
+use std::cell::Cell;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+use tokio::sync::oneshot;
+use tower::ServiceExt;
+
+/// How long a session lives without a frame.
+pub const IDLE: Duration = Duration::from_secs(40);
+/// Longest time of a call to the store.
+const STORE_TIMEOUT: Duration = Duration::from_millis(800);
+
+/// What all replicas of a run have.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The store; without it each has its sessions for itself.
+    pub store: Option<Server>,
+    /// The state is written at every so many frames.
+    pub store_every: u64,
+    /// Workers of each.
+    pub workers: usize,
+    /// What goes wrong.
+    pub rates: Rates,
+    /// Draws it.
+    pub chance: Chance,
+    /// What happens.
+    pub trace: Trace,
+}
+
+/// A replica.
+#[derive(Debug, Clone)]
+pub struct Replica {
+    /// Which one, and which life of it.
+    pub name: String,
+    /// Its life.
+    pub life: Life,
+    /// The service.
+    pub service: Service,
+    /// What its sessions expire by.
+    pub clock: Clock,
+    router: Router,
+}
+
+thread_local! {
+    static BEGIN: Cell<Option<Instant>> = const { Cell::new(None) };
+}
+
+/// The time of day at the beginning of a run is always the same.
+pub fn set_time_of_day() {
+    BEGIN.set(Some(now()));
+}
+
+fn time_of_day() -> SystemTime {
+    let passed = BEGIN.get().map(|begin| begin.elapsed());
+    SystemTime::UNIX_EPOCH + Duration::from_secs(1_800_000_000) + passed.unwrap_or_default()
+}
+
+fn config(setup: &Setup) -> Config {
+    let mut config = Config {
+        workers: Some(setup.workers),
+        queue: 16,
+        max_sessions: 8,
+        session_idle: IDLE,
+        session_first: IDLE,
+        work_timeout: Duration::from_secs(5),
+        ..Config::default()
+    };
+    config.limits.client_sessions = Some(8);
+    config.limits.client_requests = Some(16);
+    config.store.store_every = setup.store_every;
+    config.access.snapshot_keys = vec!["a secret of all replicas".into()];
+    config
+}
+
+impl Replica {
+    /// Starts one.
+    pub async fn start(setup: &Setup, name: String) -> Self {
+        let (life, clock) = (Life::default(), Clock::with_wall(time_of_day));
+        let store = match &setup.store {
+            None => None,
+            Some(server) => Some(store(setup, &name, server, &life, &clock).await),
+        };
+        let parts = Parts {
+            clock: clock.clone(),
+            store,
+            executor: executor(setup, &life),
+        };
+        let service = Service::new(config(setup), parts).expect("the settings are valid");
+        tokio::spawn(life.run({
+            let service = service.clone();
+            async move { service.sweep().await }
+        }));
+        let router = service.router(SocketAddr::from((Ipv4Addr::LOCALHOST, 1)));
+        setup.trace.note(format_args!("{name} started"));
+        Self {
+            name,
+            life,
+            service,
+            clock,
+            router,
+        }
+    }
+
+    /// The answer to a request, with its whole body; none where the replica dies before. The request goes on when this
+    /// is dropped, unless `abort` is.
+    pub fn answer(
+        &self,
+        request: Request<Body>,
+    ) -> (oneshot::Receiver<Response<Bytes>>, AbortOnDrop) {
+        let (send, answer) = oneshot::channel();
+        let router = self.router.clone();
+        let task = tokio::spawn(self.life.run(async move {
+            let Ok(response) = router.oneshot(request).await;
+            let (head, body) = response.into_parts();
+            if let Ok(body) = body.collect().await {
+                let _ = send.send(Response::from_parts(head, body.to_bytes()));
+            }
+        }));
+        (answer, AbortOnDrop(Some(task.abort_handle())))
+    }
+}
+
+/// Ends a request when its client has gone.
+#[derive(Debug)]
+pub struct AbortOnDrop(Option<tokio::task::AbortHandle>);
+
+impl AbortOnDrop {
+    /// The request goes on without its client, as behind a proxy that does not tell.
+    pub fn detach(mut self) {
+        self.0 = None;
+    }
+}
+
+impl Drop for AbortOnDrop {
+    fn drop(&mut self) {
+        if let Some(task) = &self.0 {
+            task.abort();
+        }
+    }
+}
+
+async fn store(
+    setup: &Setup,
+    name: &str,
+    server: &Server,
+    life: &Life,
+    clock: &Clock,
+) -> Arc<dyn SessionStore> {
+    let line = Line {
+        name: name.to_owned(),
+        server: server.clone(),
+        life: life.clone(),
+        rates: setup.rates.clone(),
+        chance: setup.chance.clone(),
+        trace: setup.trace.clone(),
+    };
+    let store = RedisStore::behind(Arc::new(line), "sim", STORE_TIMEOUT, clock.clone()).await;
+    Arc::new(store.expect("the address can be used"))
+}
+
+/// Does the work of a replica after some time, on the thread of the simulation.
+fn executor(setup: &Setup, life: &Life) -> Executor {
+    let (chance, life) = (setup.chance.clone(), life.clone());
+    Executor::on_one_thread(move |work| {
+        let takes = chance.millis(1..20);
+        tokio::spawn(life.run(async move {
+            sleep(takes).await;
+            work()();
+        }));
+    })
+}

@@ -1,0 +1,15 @@
+//! Each planted fault is found within 1,000 seeds.
+
+#![cfg(feature = "planted-faults")]
+
+use bagtrack_sessions::PlantedFault;
+
+#[test]
+fn each_planted_fault_is_found() {
+    for fault in PlantedFault::ALL {
+        let found = sim::finds(fault, 1000);
+        assert!(found.is_some(), "{fault:?}");
+    }
+    // It was they that were found.
+    assert!(sim::run(0).faults.is_empty());
+}
