@@ -115,10 +115,29 @@ function yolo(run) {
   return zip([{ name: "data.yaml", text: `path: .\ntrain: images/train\nnames:\n${names}` }, ...texts]);
 }
 
+/** Whether the video has a frame after the last row of an object, as far as is known.
+ * @param {Run} run
+ * @param {Row} last */
+function goesOn({ hasAll, source }, { time }) {
+  const interval = 1 / (source.rate ?? 25);
+  return !hasAll && source.duration !== undefined && time + 1.5 * interval < source.duration;
+}
+
 /** @param {string} text */
 const escaped = (text) => text.replace(/[<>&"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
-/** CVAT for video 1.1: a track for each object, outside where it is lost.
+/** A box of CVAT, which draws what lies between key frames, so each frame is one.
+ * @param {Row} row
+ * @param {number} frame
+ * @param {boolean} isOutside */
+function keyFrame({ box }, frame, isOutside) {
+  const corners = { xtl: box.x, ytl: box.y, xbr: box.x + box.width, ybr: box.y + box.height };
+  const sides = Object.entries(corners).map(([side, value]) => `${side}="${value.toFixed(2)}"`).join(" ");
+  return `<box frame="${frame}" outside="${isOutside ? 1 : 0}" occluded="0" keyframe="1" ${sides} z_order="0"></box>`;
+}
+
+/** CVAT for video 1.1: a track for each object. It is shown until a box is outside: where the object is lost, and after
+ * its last row where the video goes on.
  * @param {Run} run */
 function cvat(run) {
   const { video, video_width: width, video_height: height } = about(run);
@@ -126,13 +145,9 @@ function cvat(run) {
   const size = Math.max(...rows.map(({ frame }) => frame)) + 1;
   const labels = run.objects.map(({ name }) => `<label><name>${escaped(name)}</name><attributes></attributes></label>`);
   const tracks = run.objects.map(({ number, name, rows: own }) => {
-    const boxes = [...own.values()].map(({ frame, box, status }) => {
-      const corners = { xtl: box.x, ytl: box.y, xbr: box.x + box.width, ybr: box.y + box.height };
-      const sides = Object.entries(corners).map(([side, value]) => `${side}="${value.toFixed(2)}"`).join(" ");
-      const flags = `outside="${status === "lost" ? 1 : 0}" occluded="0" keyframe="1"`;
-      // CVAT draws what lies between key frames, so each frame is one.
-      return `<box frame="${frame}" ${flags} ${sides} z_order="0"></box>`;
-    });
+    const boxes = [...own.values()].map((row) => keyFrame(row, row.frame, row.status === "lost"));
+    const last = [...own.values()].pop();
+    if (last && last.status !== "lost" && goesOn(run, last)) boxes.push(keyFrame(last, last.frame + 1, true));
     return `<track id="${number}" label="${escaped(name)}" source="semi-auto">\n${boxes.join("\n")}\n</track>`;
   });
   const task = `<task><name>${escaped(video)}</name><size>${size}</size><mode>interpolation</mode><start_frame>0</start_frame>
@@ -148,10 +163,30 @@ ${tracks.join("\n")}
   return new Blob([document], { type: "application/xml" });
 }
 
+/** The key frames of an object for Label Studio. One that is not enabled is shown itself, and nothing after it: so it
+ * is the last before the object is lost; or the first in which it is, where there is no row of the frame before.
+ * @param {Run} run
+ * @param {Map<number, Row>} rows */
+function sequenceOf(run, rows) {
+  const { width, height } = run.source.size;
+  const sequence = [];
+  for (const { frame, time, box, status } of rows.values()) {
+    const area = { x: (100 * box.x) / width, y: (100 * box.y) / height };
+    const size = { width: (100 * box.width) / width, height: (100 * box.height) / height };
+    const item = { frame: frame + 1, time, enabled: status !== "lost", rotation: 0, ...area, ...size };
+    const before = sequence[sequence.length - 1];
+    if (item.enabled) sequence.push(item);
+    else if (before?.enabled && before.frame === frame) before.enabled = false;
+    else if (before?.enabled) sequence.push(item);
+  }
+  const [last, row] = [sequence[sequence.length - 1], [...rows.values()].pop()];
+  if (last && row && goesOn(run, row)) last.enabled = false;
+  return sequence;
+}
+
 /** Label Studio: a task with a video, and a region of it for each object. Frames count from 1, boxes are in percent.
  * @param {Run} run */
 function labelStudio(run) {
-  const { width, height } = run.source.size;
   const last = Math.max(...tracked(run));
   const rate = run.source.rate ?? 25;
   const result = run.objects.map(({ number, name, rows }) => ({
@@ -163,17 +198,7 @@ function labelStudio(run) {
       framesCount: last + 1,
       duration: Number(((last + 1) / rate).toFixed(3)),
       labels: [name],
-      sequence: [...rows.values()].map(({ frame, time, box, status }) => ({
-        frame: frame + 1,
-        time,
-        // After a key frame that is not enabled the region is not shown.
-        enabled: status !== "lost",
-        rotation: 0,
-        x: (100 * box.x) / width,
-        y: (100 * box.y) / height,
-        width: (100 * box.width) / width,
-        height: (100 * box.height) / height,
-      })),
+      sequence: sequenceOf(run, rows),
     },
   }));
   return json([{ data: { video: run.source.name }, annotations: [{ result }] }]);

@@ -157,3 +157,138 @@ fn boxes_go_to_a_new_file() {
     let kept = rows(&fs::read_to_string(&file).expect("it was written"));
     assert_eq!(kept, rows(&printed)[..4]);
 }
+
+/// The value of an attribute in a line of XML.
+fn attribute<'a>(line: &'a str, name: &str) -> &'a str {
+    let (_, rest) = line
+        .split_once(&format!(" {name}=\""))
+        .expect("it is there");
+    rest.split_once('"').expect("it ends").0
+}
+
+#[test]
+fn documents_of_annotation_tools_tell_the_boxes_of_the_others() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let flags = ["track", text(&dir), ONE, OTHER, "--name", "a \"<dog>\""];
+    let csv = rows(&succeeds(&[&flags[..4], &["--format", "csv"]].concat()));
+    let made = |format| succeeds(&[&flags[..], &["--format", format]].concat());
+
+    let coco: Value = serde_json::from_str(&made("coco")).expect("it is JSON");
+    assert_eq!(coco["categories"][0]["name"], "a \"<dog>\"");
+    assert_eq!(coco["categories"][1]["name"], "Object 2");
+    assert_eq!(coco["images"][3]["file_name"], "0004.jpg");
+    assert_eq!(
+        (&coco["images"][3]["id"], &coco["images"][3]["frame_id"]),
+        (&4.into(), &3.into())
+    );
+    let notes = coco["annotations"].as_array().expect("a list");
+    assert_eq!(notes.len(), csv.len());
+    for (note, row) in notes.iter().zip(&csv) {
+        assert_eq!(note["image_id"], row.frame + 1);
+        assert_eq!(note["track_id"], row.target + 1);
+        for (side, value) in row.area.iter().enumerate() {
+            let told = note["bbox"][side].as_f64().expect("a number");
+            assert!((told - value).abs() < 0.006, "{note} {row:?}");
+        }
+    }
+
+    let cvat = made("cvat");
+    assert!(cvat.contains("<name>a &#34;&#60;dog&#62;&#34;</name>"));
+    let boxes: Vec<&str> = cvat.lines().filter(|it| it.starts_with("<box")).collect();
+    assert_eq!(boxes.len(), csv.len());
+    for row in &csv {
+        // One track after the other.
+        let line = boxes[12 * row.target + row.frame as usize];
+        assert_eq!(attribute(line, "frame"), row.frame.to_string());
+        assert_eq!(attribute(line, "outside"), "0");
+        let right: f64 = attribute(line, "xbr").parse().expect("a number");
+        assert!((right - row.area[0] - row.area[2]).abs() < 0.006, "{line}");
+    }
+
+    let tasks: Value = serde_json::from_str(&made("label-studio")).expect("it is JSON");
+    let region = &tasks[0]["annotations"][0]["result"][1]["value"];
+    assert_eq!(tasks[0]["data"]["video"], "clip");
+    assert_eq!(region["framesCount"], 12);
+    let second = csv.iter().filter(|row| row.target == 1);
+    for (item, row) in region["sequence"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .zip(second)
+    {
+        assert_eq!(item["frame"], row.frame + 1);
+        let x = item["x"].as_f64().expect("a number") * 3.2;
+        assert!((x - row.area[0]).abs() < 0.001, "{item} {row:?}");
+    }
+}
+
+#[test]
+fn a_part_of_a_clip_ends_where_it_was_tracked_to() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let flags = ["track", text(&dir), ONE, "--start", "2", "--frames", "5"];
+    let cvat = succeeds(&[&flags[..], &["--format", "cvat"]].concat());
+    let last = cvat.lines().rfind(|it| it.starts_with("<box"));
+    let last = last.expect("there are boxes");
+    assert_eq!(
+        (attribute(last, "frame"), attribute(last, "outside")),
+        ("8", "1")
+    );
+    let tasks = succeeds(&[&flags[..], &["--format", "label-studio"]].concat());
+    let tasks: Value = serde_json::from_str(&tasks).expect("it is JSON");
+    let sequence = &tasks[0]["annotations"][0]["result"][0]["value"]["sequence"];
+    let enabled: Vec<bool> = (0..6)
+        .map(|at| sequence[at]["enabled"].as_bool().expect("it is there"))
+        .collect();
+    assert_eq!(enabled, [true, true, true, true, true, false]);
+    // To the last frame, or back from it, there is nothing after it.
+    for more in [&["--frames", "99"][..], &["--backwards"]] {
+        let flags = [
+            "track",
+            text(&dir),
+            ONE,
+            "--start",
+            "11",
+            "--format",
+            "cvat",
+        ];
+        let cvat = succeeds(&[&flags[..], more].concat());
+        assert!(!cvat.contains("outside=\"1\""), "{cvat}");
+        let first = cvat.lines().find(|it| it.starts_with("<box"));
+        let frame = attribute(first.expect("there are boxes"), "frame");
+        assert_eq!(frame, if more.len() == 2 { "11" } else { "0" });
+    }
+}
+
+#[test]
+fn labels_of_yolo_go_to_a_new_folder() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let flags = ["track", text(&dir), ONE, OTHER, "--format", "yolo"];
+    assert!(fails(&flags).contains("-o DIR"));
+    let out = parent.path().join("labels");
+    let with = [&flags[..], &["-o", text(&out)]].concat();
+    assert_eq!(succeeds(&with), "");
+    let about = fs::read_to_string(out.join("data.yaml")).expect("it was written");
+    assert!(
+        about.ends_with("names:\n  0: \"Object 1\"\n  1: \"Object 2\"\n"),
+        "{about}"
+    );
+    let first = fs::read_to_string(out.join("labels/train/0001.txt")).expect("it was written");
+    assert_eq!(
+        first,
+        "0 0.209844 0.542500 0.144063 0.240000\n1 0.687500 0.208333 0.125000 0.166667\n"
+    );
+    assert!(out.join("labels/train/0012.txt").exists());
+    assert!(fails(&with).contains("labels is not empty"));
+    for format in ["coco", "yolo", "otb"] {
+        let line = fails(&["track", text(&dir), ONE, "--keyframes", "--format", format]);
+        assert!(line.contains("boxes of every frame"), "{line}");
+    }
+    let line = fails(&["track", text(&dir), ONE, "--name", "a", "--name", "b"]);
+    assert!(
+        line.contains("--name is given 2 times, for 1 boxes"),
+        "{line}"
+    );
+}

@@ -1,15 +1,23 @@
 //! How `bagtrack track` writes boxes: one file a format.
 //!
-//! In: a [`Row`] for each target in each frame. Out: a line. `text`, `json` and `csv` have 0-based pixels, as the
-//! service does, with the score and the status; `otb` and `mot` are what the tools of these benchmarks read.
+//! In: a [`Row`] for each target in each frame, and the [`Clip`] that they are of. Out: a line for each row, a document,
+//! or the texts of a folder. `text`, `json` and `csv` have 0-based pixels, as the service does, with the score and the
+//! status; the others are what the tools read that they are named after. The page saves the same (`web/save.js`), and
+//! `tools/exports.sh` lets the tools' own readers read both.
 
+mod clip;
+mod coco;
 mod csv;
+mod cvat;
 mod json;
+mod label_studio;
 mod mot;
 mod otb;
 mod row;
 mod text;
+mod yolo;
 
+pub use clip::Clip;
 pub use row::{Columns, Row};
 
 /// A format.
@@ -25,31 +33,90 @@ pub enum Format {
     Otb,
     /// frame,id,left,top,width,height,score,-1,-1,-1, all counted from 1, as tools of the MOTChallenge read it.
     Mot,
+    /// COCO's JSON, with `track_id` and `video_id`; without the frames in which a target is lost.
+    Coco,
+    /// Ultralytics' YOLO: a folder (`-o DIR`) with data.yaml and a text for each frame; without lost targets.
+    Yolo,
+    /// CVAT for video 1.1: a track for each target, outside where it is lost.
+    Cvat,
+    /// Label Studio's JSON: a task with a `videorectangle` for each target, switched off where it is lost.
+    LabelStudio,
+}
+
+/// What a format makes of rows.
+pub enum Form {
+    /// A line for each row, which is written at once.
+    Lines(Lines),
+    /// One text for all rows, which is written at the end.
+    Document(fn(&Clip, &[Row]) -> serde_json::Result<String>),
+    /// Several texts, in a folder.
+    Folder(fn(&Clip, &[Row]) -> serde_json::Result<Vec<TextFile>>),
+}
+
+/// A format that has a line for each row.
+pub struct Lines {
+    /// What the file begins with.
+    pub header: fn(Columns) -> Option<String>,
+    /// The line of a target in a frame.
+    pub line: fn(&Row, Columns) -> serde_json::Result<String>,
+}
+
+/// A text of a folder.
+#[derive(Debug)]
+pub struct TextFile {
+    /// Its path in the folder, with slashes.
+    pub path: String,
+    /// What is in it.
+    pub text: String,
 }
 
 impl Format {
-    /// Whether its lines say which frame and target they are of.
+    /// Whether it tells which frame and target a box is of.
     pub fn has_target(self) -> bool {
         self != Self::Otb
     }
 
-    /// What the file begins with.
-    pub fn header(self, columns: Columns) -> Option<String> {
-        match self {
-            Self::Text => Some(text::header(columns)),
-            Self::Csv => Some(csv::HEADER.to_owned()),
-            Self::Json | Self::Otb | Self::Mot => None,
-        }
+    /// Whether it says what is between two key frames, or leaves it to who reads it.
+    pub fn takes_key_frames(self) -> bool {
+        !matches!(self, Self::Otb | Self::Coco | Self::Yolo)
     }
 
-    /// The line of a target in a frame.
-    pub fn line(self, row: &Row, columns: Columns) -> serde_json::Result<String> {
-        Ok(match self {
-            Self::Text => text::line(row, columns),
-            Self::Json => json::line(row)?,
-            Self::Csv => csv::line(row),
-            Self::Otb => otb::line(row),
-            Self::Mot => mot::line(row),
-        })
+    /// What it makes of rows.
+    pub fn form(self) -> Form {
+        match self {
+            Self::Text => Form::Lines(Lines {
+                header: |columns| Some(text::header(columns)),
+                line: |row, columns| Ok(text::line(row, columns)),
+            }),
+            Self::Csv => Form::Lines(Lines {
+                header: |_| Some(csv::HEADER.to_owned()),
+                line: |row, _| Ok(csv::line(row)),
+            }),
+            Self::Json => Form::Lines(plain(|row, _| json::line(row))),
+            Self::Otb => Form::Lines(plain(|row, _| Ok(otb::line(row)))),
+            Self::Mot => Form::Lines(plain(|row, _| Ok(mot::line(row)))),
+            Self::Coco => Form::Document(coco::document),
+            Self::Cvat => Form::Document(|clip, rows| Ok(cvat::document(clip, rows))),
+            Self::LabelStudio => Form::Document(label_studio::document),
+            Self::Yolo => Form::Folder(yolo::folder),
+        }
     }
+}
+
+/// Lines without a header.
+fn plain(line: fn(&Row, Columns) -> serde_json::Result<String>) -> Lines {
+    Lines {
+        header: |_| None,
+        line,
+    }
+}
+
+/// JSON with an indent of one space, as the page writes it.
+fn pretty(value: &impl serde::Serialize) -> serde_json::Result<String> {
+    let mut bytes = Vec::new();
+    let formatter = serde_json::ser::PrettyFormatter::with_indent(b" ");
+    value.serialize(&mut serde_json::Serializer::with_formatter(
+        &mut bytes, formatter,
+    ))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned() + "\n")
 }

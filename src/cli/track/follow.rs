@@ -5,7 +5,7 @@ use super::frames::{FrameFile, Frames};
 use super::interrupt::Interrupt;
 use super::rows::Rows;
 use super::targets::Targets;
-use crate::cli::formats::Row;
+use crate::cli::formats::{Clip, Row};
 use bagtrack_sessions::Selection;
 use bagtrack_tracker::{Params, Rect};
 use indicatif::ProgressBar;
@@ -28,6 +28,10 @@ pub struct Job {
     pub selection: Selection<Row>,
     /// Where boxes go.
     pub rows: Rows,
+    /// What the video or folder is called.
+    pub name: String,
+    /// What each target is called.
+    pub names: Vec<String>,
     /// Goes on by a step a frame.
     pub bar: ProgressBar,
 }
@@ -42,22 +46,38 @@ impl Job {
     /// Follows the targets to the last frame that is wanted, or to a signal, and closes what is drawn. Returns how many
     /// frames were tracked.
     pub fn run(mut self, interrupt: &Interrupt) -> Result<u64, Box<dyn Error>> {
-        let mut drawn = None;
-        let followed = self.follow(interrupt, &mut drawn);
+        let (mut targets, mut drawn) = (None, None);
+        let followed = self.follow(interrupt, &mut targets, &mut drawn);
         // Also after an error: the frames before it are worth keeping.
-        write(&mut self.rows, &self.selection.finish())?;
+        write(&mut self.rows, self.selection.finish())?;
+        if let Some(targets) = targets {
+            self.finish(&targets)?;
+        }
         let finished = drawn.map_or(Ok(()), Drawn::finish);
         // An encoder that has ended is the cause of an error in the loop.
         finished?;
         followed
     }
 
+    /// Writes the formats that need all rows.
+    fn finish(&mut self, targets: &Targets) -> io::Result<()> {
+        let length = self.rows.length();
+        let clip = Clip {
+            name: self.name.clone(),
+            size: targets.frame_size(),
+            rate: self.frames.rate().value(),
+            names: self.names.clone(),
+            goes_on: self.frames.count().is_some_and(|count| length < count),
+        };
+        or_stop(self.rows.finish(&clip)).map(|_| ())
+    }
+
     fn follow(
         &mut self,
         interrupt: &Interrupt,
+        targets: &mut Option<Targets>,
         drawn: &mut Option<Drawn>,
     ) -> Result<u64, Box<dyn Error>> {
-        let mut targets: Option<Targets> = None;
         let mut count = 0;
         while !interrupt.came() && self.count.is_none_or(|most| count <= most) {
             if self.frames.are_before_first() {
@@ -68,7 +88,7 @@ impl Job {
             let Some(frame) = self.frames.next()? else {
                 break;
             };
-            if let Then::Stop = self.take(&frame, &mut targets, drawn)? {
+            if let Then::Stop = self.take(&frame, targets, drawn)? {
                 break;
             }
             count += 1;
@@ -114,7 +134,7 @@ impl Job {
             };
             (estimate, row)
         }));
-        match write(&mut self.rows, &rows)? {
+        match write(&mut self.rows, rows)? {
             Then::GoOn if self.selection.has_ended() => Ok(Then::Stop),
             then => Ok(then),
         }
@@ -122,11 +142,16 @@ impl Job {
 }
 
 /// Writes rows, to a reader that may have seen enough: `bagtrack track … | head`.
-fn write(to: &mut Rows, rows: &[Row]) -> io::Result<Then> {
+fn write(to: &mut Rows, rows: Vec<Row>) -> io::Result<Then> {
     if rows.is_empty() {
         return Ok(Then::GoOn);
     }
-    match to.write(rows) {
+    or_stop(to.write(rows))
+}
+
+/// A reader that has seen enough is no error.
+fn or_stop(written: io::Result<()>) -> io::Result<Then> {
+    match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Then::Stop),
         written => written.map(|()| Then::GoOn),
     }

@@ -47,7 +47,8 @@ pub struct Frames {
 }
 
 enum Source {
-    Folder(IntoIter<PathBuf>),
+    /// Those that are wanted, and how many there are.
+    Folder(IntoIter<PathBuf>, u64),
     Video(Pictures, VideoInfo),
 }
 
@@ -85,7 +86,7 @@ impl Frames {
             }
         }
         Ok(Self {
-            source: Source::Folder(paths.into_iter()),
+            source: Source::Folder(paths.into_iter(), count as u64),
             direction,
             shown,
             next: Some(first),
@@ -136,7 +137,7 @@ impl Frames {
     /// Frames a second.
     pub fn rate(&self) -> Rate {
         match &self.source {
-            Source::Folder(_) => Rate::default(),
+            Source::Folder(..) => Rate::default(),
             Source::Video(_, info) => info.rate,
         }
     }
@@ -146,10 +147,18 @@ impl Frames {
         matches!(self.source, Source::Video(..))
     }
 
+    /// How many frames the folder or video has, where that is known.
+    pub fn count(&self) -> Option<u64> {
+        match &self.source {
+            Source::Folder(_, count) => Some(*count),
+            Source::Video(_, info) => info.count(),
+        }
+    }
+
     /// How many frames are left, where that is known.
     pub fn left(&self) -> Option<u64> {
         match (&self.source, self.direction) {
-            (Source::Folder(paths), _) => Some(paths.len() as u64),
+            (Source::Folder(paths, _), _) => Some(paths.len() as u64),
             (Source::Video(..), Direction::Backwards) => Some(self.next.map_or(0, |next| next + 1)),
             (Source::Video(_, info), Direction::Forwards) => {
                 Some(info.count()?.saturating_sub(self.next?))
@@ -186,7 +195,7 @@ impl Frames {
             Direction::Backwards => index.checked_sub(1),
         };
         match &mut self.source {
-            Source::Folder(paths) => match paths.next() {
+            Source::Folder(paths, _) => match paths.next() {
                 Some(path) => Ok(Some(read(index, &path)?)),
                 None => Ok(None),
             },

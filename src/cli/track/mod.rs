@@ -43,6 +43,10 @@ pub struct Args {
     /// groundtruth_rect.txt in DIR is taken (1-based there).
     #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rect, allow_hyphen_values = true)]
     boxes: Vec<Rect>,
+    /// What a target is called, where the format says it: once for each box, in their order. Without it they are Object 1,
+    /// Object 2, …
+    #[arg(long = "name", value_name = "NAME")]
+    names: Vec<String>,
     /// The first frame: its number, counted from 0, or its time in a video, like 12.5s, 1:30 or 0:01:30. The boxes hold
     /// there, and the frames before it are passed over.
     #[arg(long, value_name = "FRAME|TIME", value_parser = start::parse)]
@@ -65,10 +69,10 @@ pub struct Args {
     /// Seed of all random draws: the same seed gives the same boxes.
     #[arg(long)]
     seed: Option<u64>,
-    /// How boxes are written. Frames and targets count from 0 but for otb and mot.
+    /// How boxes are written. Frames and targets count from 0 but for otb, mot, and what COCO and Label Studio count.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// Writes the boxes to a new file, not to standard output.
+    /// Writes the boxes to a new file, not to standard output; with --format yolo to a new folder.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
@@ -94,6 +98,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
         true => vec![annotated(&args.path, frames.first())?],
         false => args.boxes,
     };
+    let names = names_of(&args.names, boxes.len())?;
     let columns = Columns {
         time: frames.have_times(),
         target: boxes.len() > 1,
@@ -112,6 +117,8 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
         params,
         destination,
         rows,
+        name: name_of(&args.path),
+        names,
         bar: bar.clone(),
     };
     let followed = job.run(&interrupt);
@@ -142,8 +149,9 @@ fn check(args: &Args) -> Result<(), String> {
             "--format otb has one target a file: take --format mot or csv, or run once for each box".to_owned(),
         );
     }
-    if args.keyframes && !args.format.has_target() {
-        let text = "--format otb has a row for every frame: take --format csv, json or mot for --keyframes";
+    if args.keyframes && !args.format.takes_key_frames() {
+        let text =
+            "otb, coco and yolo have boxes of every frame: take another --format for --keyframes";
         return Err(text.to_owned());
     }
     if args.backwards && args.start.is_none() {
@@ -151,6 +159,25 @@ fn check(args: &Args) -> Result<(), String> {
         return Err(text.to_owned());
     }
     Ok(())
+}
+
+/// The name of a file or folder, whatever way led to it.
+fn name_of(path: &Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// What each of `count` targets is called.
+fn names_of(given: &[String], count: usize) -> Result<Vec<String>, String> {
+    if given.len() > count {
+        return Err(format!(
+            "--name is given {} times, for {count} boxes",
+            given.len()
+        ));
+    }
+    let made = (given.len()..count).map(|target| format!("Object {}", target + 1));
+    Ok(given.iter().cloned().chain(made).collect())
 }
 
 /// The box of frame `index` in the annotations of `dir`.

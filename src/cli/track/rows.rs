@@ -1,26 +1,126 @@
-//! Where the boxes are written: standard output, or a new file.
+//! Where the boxes are written: standard output, a new file, or a new folder.
 
-use crate::cli::formats::{Columns, Format, Row};
+use crate::cli::formats::{Clip, Columns, Form, Format, Lines, Row, TextFile};
+use bagtrack_cli::output::new_folder;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// The lines of boxes. Each is written at once, so that they are kept whatever ends the process.
+/// Takes the rows. Lines are written at once, so that they are kept whatever ends the process; a document or a folder is
+/// written by `finish`.
 pub struct Rows {
-    out: Box<dyn Write>,
-    /// The file, if it was made for these lines.
-    made: Option<PathBuf>,
+    sink: Sink,
     is_on_terminal: bool,
-    format: Format,
     columns: Columns,
+}
+
+enum Sink {
+    Lines(Lines, Output),
+    Document(
+        fn(&Clip, &[Row]) -> serde_json::Result<String>,
+        Output,
+        Vec<Row>,
+    ),
+    Folder(
+        fn(&Clip, &[Row]) -> serde_json::Result<Vec<TextFile>>,
+        PathBuf,
+        Vec<Row>,
+    ),
+}
+
+/// A file, or standard output.
+struct Output {
+    out: Box<dyn Write>,
+    /// The file, if it was made for what is written.
+    made: Option<PathBuf>,
     has_begun: bool,
 }
 
 impl Rows {
-    /// Lines in this format, to standard output or to a file, which must be new.
-    pub fn open(file: Option<&Path>, format: Format, columns: Columns) -> Result<Self, String> {
-        let file = file.filter(|file| *file != Path::new("-"));
-        let (out, made): (Box<dyn Write>, _) = match file {
+    /// Rows in this format, to standard output or to a file or folder, which must be new.
+    pub fn open(path: Option<&Path>, format: Format, columns: Columns) -> Result<Self, String> {
+        let path = path.filter(|path| *path != Path::new("-"));
+        let sink = match format.form() {
+            Form::Lines(lines) => Sink::Lines(lines, Output::open(path)?),
+            Form::Document(make) => Sink::Document(make, Output::open(path)?, Vec::new()),
+            Form::Folder(make) => {
+                let text = "a folder of texts is written: give a new folder with -o DIR";
+                let path = path.ok_or_else(|| text.to_owned())?;
+                new_folder(path).map_err(|error| format!("-o {error}"))?;
+                Sink::Folder(make, path.to_owned(), Vec::new())
+            }
+        };
+        let is_lines = matches!(sink, Sink::Lines(..));
+        Ok(Self {
+            sink,
+            is_on_terminal: is_lines && path.is_none() && io::stdout().is_terminal(),
+            columns,
+        })
+    }
+
+    /// Whether people see the lines as they come.
+    pub fn are_on_terminal(&self) -> bool {
+        self.is_on_terminal
+    }
+
+    /// Takes these rows.
+    pub fn write(&mut self, new: Vec<Row>) -> io::Result<()> {
+        match &mut self.sink {
+            Sink::Document(_, _, rows) | Sink::Folder(_, _, rows) => {
+                rows.extend(new);
+                Ok(())
+            }
+            Sink::Lines(lines, output) => {
+                let mut text = String::new();
+                if !output.has_begun {
+                    text.extend((lines.header)(self.columns));
+                    if !text.is_empty() {
+                        text.push('\n');
+                    }
+                }
+                for row in &new {
+                    text += &(lines.line)(row, self.columns)?;
+                    text.push('\n');
+                }
+                output.write(&text)
+            }
+        }
+    }
+
+    /// How many frames the rows reach over, where they were kept.
+    pub fn length(&self) -> u64 {
+        match &self.sink {
+            Sink::Lines(..) => 0,
+            Sink::Document(_, _, rows) | Sink::Folder(_, _, rows) => Clip::length(rows),
+        }
+    }
+
+    /// Writes what was kept until now. The rows are those of this clip.
+    pub fn finish(&mut self, clip: &Clip) -> io::Result<()> {
+        match &mut self.sink {
+            Sink::Lines(..) => Ok(()),
+            Sink::Document(make, output, rows) => output.write(&make(clip, in_order(rows))?),
+            Sink::Folder(make, folder, rows) => {
+                for TextFile { path, text } in make(clip, in_order(rows))? {
+                    let file = folder.join(path);
+                    fs::create_dir_all(file.parent().unwrap_or(folder))?;
+                    fs::write(&file, text)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Rows as documents have them: frame by frame, forwards.
+fn in_order(rows: &mut [Row]) -> &[Row] {
+    rows.sort_by_key(|row| (row.frame, row.target));
+    rows
+}
+
+impl Output {
+    fn open(path: Option<&Path>) -> Result<Self, String> {
+        let (out, made): (Box<dyn Write>, _) = match path {
             None => (Box::new(io::stdout()), None),
             Some(path) => match create(path)? {
                 (file, true) => (Box::new(file), Some(path.to_owned())),
@@ -30,38 +130,18 @@ impl Rows {
         Ok(Self {
             out,
             made,
-            is_on_terminal: file.is_none() && io::stdout().is_terminal(),
-            format,
-            columns,
             has_begun: false,
         })
     }
 
-    /// Whether people see the lines as they come.
-    pub fn are_on_terminal(&self) -> bool {
-        self.is_on_terminal
-    }
-
-    /// Writes the lines of these rows.
-    pub fn write(&mut self, rows: &[Row]) -> io::Result<()> {
-        let mut text = String::new();
-        if !self.has_begun {
-            text.extend(self.format.header(self.columns));
-            if !text.is_empty() {
-                text.push('\n');
-            }
-        }
-        for row in rows {
-            text += &self.format.line(row, self.columns)?;
-            text.push('\n');
-        }
+    fn write(&mut self, text: &str) -> io::Result<()> {
         self.has_begun = true;
         self.out.write_all(text.as_bytes())?;
         self.out.flush()
     }
 }
 
-impl Drop for Rows {
+impl Drop for Output {
     /// Takes away a file that nothing was written to, so that the command can be given again.
     fn drop(&mut self) {
         if let (Some(path), false) = (&self.made, self.has_begun) {

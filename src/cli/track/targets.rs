@@ -6,7 +6,10 @@ use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
 use std::error::Error;
 
 /// A tracker for each target.
-pub struct Targets(Vec<Tracker>);
+pub struct Targets {
+    trackers: Vec<Tracker>,
+    frame_size: (u32, u32),
+}
 
 impl Targets {
     /// Trackers that start with `boxes` in a frame. They are those of a session of the service with these boxes.
@@ -23,22 +26,30 @@ impl Targets {
             })
         };
         let trackers = boxes.iter().enumerate().map(start);
-        Ok(Self(trackers.collect::<Result<_, String>>()?))
+        Ok(Self {
+            trackers: trackers.collect::<Result<_, String>>()?,
+            frame_size: frame.source_size(),
+        })
     }
 
     /// Tracks through the next frame, which is decoded once for all targets.
     pub fn step(&mut self, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-        let format = largest_format(self.0.iter().map(Tracker::frame_format));
+        let format = largest_format(self.trackers.iter().map(Tracker::frame_format));
         let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &|_| format)?;
-        for tracker in &mut self.0 {
+        for tracker in &mut self.trackers {
             step(tracker, &frame)?;
         }
         Ok(())
     }
 
+    /// Width and height of the frames, as the boxes count them.
+    pub fn frame_size(&self) -> (u32, u32) {
+        self.frame_size
+    }
+
     /// The last answer for each.
     pub fn estimates(&self) -> Vec<Estimate> {
-        self.0.iter().map(Tracker::estimate).collect()
+        self.trackers.iter().map(Tracker::estimate).collect()
     }
 }
 

@@ -65,7 +65,8 @@ impl Rate {
         })
     }
 
-    fn value(self) -> f64 {
+    /// As a number.
+    pub fn value(self) -> f64 {
         f64::from(self.numerator) / f64::from(self.denominator)
     }
 }

@@ -1,0 +1,44 @@
+//! The folder of a dataset for Ultralytics' YOLO: `data.yaml`, and for each frame a text in `labels/train` with the
+//! class, the centre and the size of each box, as shares of the frame. Lost targets are left out. The pictures go to
+//! `images/train`, with the names of the texts.
+
+use super::TextFile;
+use super::clip::{Clip, image_name};
+use super::row::Row;
+use std::path::Path;
+
+/// The texts of rows in the order of frames.
+pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
+    let mut about = "path: .\ntrain: images/train\nnames:\n".to_owned();
+    for (target, name) in clip.names.iter().enumerate() {
+        // A text of JSON is one of YAML.
+        about += &format!("  {target}: {}\n", serde_json::to_string(name)?);
+    }
+    let of_frames = rows.chunk_by(|one, other| one.frame == other.frame);
+    let labels = of_frames.map(|of_frame| {
+        let picture = image_name(&of_frame[0]);
+        let name = Path::new(&picture).with_extension("txt");
+        TextFile {
+            path: format!("labels/train/{}", name.display()),
+            text: of_frame.iter().filter_map(|row| line(clip, row)).collect(),
+        }
+    });
+    let about = TextFile {
+        path: "data.yaml".to_owned(),
+        text: about,
+    };
+    Ok(std::iter::once(about).chain(labels).collect())
+}
+
+/// The line of a target, which is a class of its own.
+fn line(clip: &Clip, row: &Row) -> Option<String> {
+    let area = clip.inside(row)?;
+    let (width, height) = (f64::from(clip.size.0), f64::from(clip.size.1));
+    let x = (area.x + area.width / 2.0) / width;
+    let y = (area.y + area.height / 2.0) / height;
+    let (width, height) = (area.width / width, area.height / height);
+    Some(format!(
+        "{} {x:.6} {y:.6} {width:.6} {height:.6}\n",
+        row.target
+    ))
+}
