@@ -115,3 +115,53 @@ fn a_read_only_container_has_room_for_videos() {
         assert_eq!(bodies.expect("a bound of bodies").1, room, "{file}");
     }
 }
+
+/// cargo refuses a workspace whose members are not all there, whether they are built or not.
+#[test]
+fn an_image_is_built_of_a_whole_workspace() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (file, ignored) in [
+        ("docker/Dockerfile", ".dockerignore"),
+        (
+            "docker/label-studio/Dockerfile",
+            "docker/label-studio/Dockerfile.dockerignore",
+        ),
+    ] {
+        let kept = std::fs::read_to_string(root.join(ignored)).unwrap();
+        let kept: Vec<&str> = kept.lines().filter_map(|it| it.strip_prefix('!')).collect();
+        let context = tempfile::tempdir().unwrap();
+        let dockerfile = std::fs::read_to_string(root.join(file)).unwrap();
+        let (build, _) = dockerfile
+            .split_once("\nFROM ${RUST_IMAGE} AS build\n")
+            .and_then(|(_, rest)| rest.split_once("\nFROM "))
+            .expect("there is a stage that builds");
+        for line in build.lines().filter_map(|line| line.strip_prefix("COPY ")) {
+            let (sources, into) = line.rsplit_once(' ').expect("a source and a place");
+            for source in sources.split(' ') {
+                let is_kept = kept.iter().any(|it| Path::new(source).starts_with(it));
+                assert!(is_kept, "{ignored} leaves out {source}");
+                let place = match into.ends_with('/') {
+                    true => context.path().join(source),
+                    false => context.path().join(into),
+                };
+                std::fs::create_dir_all(place.parent().unwrap()).unwrap();
+                std::os::unix::fs::symlink(root.join(source), place).unwrap();
+            }
+        }
+        for member in ["python", "sim"].map(|name| context.path().join(name)) {
+            if !member.is_symlink() {
+                // The Dockerfile makes it.
+                std::fs::create_dir_all(member.join("src")).unwrap();
+                std::fs::write(member.join("src/lib.rs"), "").unwrap();
+            }
+        }
+        let told = Command::new(env!("CARGO"))
+            .args(["metadata", "--no-deps", "--offline", "--locked"])
+            .args(["--format-version", "1", "--manifest-path"])
+            .arg(context.path().join("Cargo.toml"))
+            .output()
+            .unwrap();
+        let error = String::from_utf8_lossy(&told.stderr);
+        assert!(told.status.success(), "{file}: {error}");
+    }
+}
