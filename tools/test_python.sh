@@ -37,7 +37,7 @@ environment_with "$environment" "maturin>=1.9,<2" "mypy>=1.11" pyright "numpy>=1
     "websockets>=13" "pillow>=9" "opencv-python-headless>=4.5"
 # attributee 0.1.10 is not what vot-toolkit 0.9 was made for.
 for packages in "got10k==0.1.3" "vot-toolkit==0.9.0 vot-trax>=4 attributee==0.1.9" "cvat-sdk>=2.20 cvat-cli>=2.20" \
-    "nuclio-sdk>=0.5" "supervision>=0.25"; do
+    "nuclio-sdk>=0.5" "supervision>=0.25" "labelme>=5.5"; do
     # shellcheck disable=SC2086
     environment_with "$environment" $packages || echo "Left out, for want of its package: $packages"
 done
@@ -54,8 +54,8 @@ opencv_samples target/opencv-samples || echo "Left out, for want of Debian's ope
 export OPENCV_SAMPLES=$PWD/target/opencv-samples
 "$environment/bin/python" -m pytest --quiet -rs python/tests --ignore python/tests/test_label_studio.py "$@"
 
-if environment_with "$label_studio" "label-studio-ml==1.0.9" redis rq "setuptools<81" "numpy>=1.21" "pytest>=8" \
-    "pillow>=9" "opencv-python-headless>=4.5"; then
+if environment_with "$label_studio" --requirement docker/label-studio/requirements.txt "numpy>=1.21" "pytest>=8" \
+    "pillow>=9"; then
     "$label_studio/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/wheels/*.whl
     "$label_studio/bin/python" -m pytest --quiet -rs --disable-warnings python/tests/test_label_studio.py
 else

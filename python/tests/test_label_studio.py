@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +24,7 @@ from label_studio_ml.api import init_app  # noqa: E402
 
 import bagtrack  # noqa: E402
 from bagtrack.adapters.label_studio import BagTrack  # noqa: E402
-from conftest import SEED, Clip, clock  # noqa: E402
+from conftest import ROOT, SEED, Clip, clock, run  # noqa: E402
 
 CONFIG = """
 <View>
@@ -93,10 +103,10 @@ def test_a_box_goes_on_through_the_video(clip: Clip, video: Path, tmp_path: Path
         shares = np.array([track[0][side] for side in ("x", "y", "width", "height")])
         tracker.init(frames[first - 1], shares / 100 * [*size, *size])
         for item in track[1:]:
-            ok, box = tracker.update(frames[item["frame"] - 1])
+            _, box = tracker.update(frames[item["frame"] - 1])
             found = [item[side] for side in ("x", "y", "width", "height")]
             assert found == (np.array(box) / [*size, *size] * 100).tolist()
-            assert item["enabled"] == ok and item["time"] == (item["frame"] - 1) / RATE
+            assert item["enabled"] and item["time"] == (item["frame"] - 1) / RATE
     assert result["result"][0]["value"]["labels"] == ["Person"]
     assert 0 < result["score"] < 1
 
@@ -109,3 +119,84 @@ def test_a_call_tracks_no_more_frames_than_it_may(video: Path, tmp_path: Path, m
     monkeypatch.setattr(BagTrack, "max_frames", 7)
     [result] = predict(video, tmp_path, {"result": [region([drawn(3, clip.boxes()[2], (320, 240))])]})
     assert [item["frame"] for item in result["result"][0]["value"]["sequence"]] == list(range(3, 11))
+
+
+def test_a_lost_target_is_shown_in_no_frame(tmp_path: Path) -> None:
+    """Label Studio shows a key frame itself, whether it is enabled or not."""
+    run("sample", "--out", tmp_path / "leaves", "--scene", "leaves", "--frames", 90, "--format", "png")
+    frames = [cv2.imread(str(file)) for file in sorted((tmp_path / "leaves" / "img").iterdir())]
+    truth = (tmp_path / "leaves" / "groundtruth_rect.txt").read_text().split()
+    x, y, width, height = (float(value) for value in truth[0].split(","))
+    file = tmp_path / "leaves.avi"
+    writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"MJPG"), RATE, (320, 240))
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
+    [result] = predict(file, tmp_path, {"result": [region([drawn(1, (x - 1, y - 1, width, height), (320, 240))])]})
+    sequence = result["result"][0]["value"]["sequence"]
+    read, tracker, shown = cv2.VideoCapture(str(file)), bagtrack.Tracker(seed=SEED), []
+    tracker.init(read.read()[1], (x - 1, y - 1, width, height))
+    for number in range(2, 91):
+        ok, _ = tracker.update(read.read()[1])
+        before = [item for item in sequence if item["frame"] <= number][-1]
+        shown.append(ok)
+        assert ok == (before["frame"] == number or before["enabled"]), number
+    assert not all(shown) and any(shown)
+
+
+DOCKER = ROOT / "docker" / "label-studio"
+
+
+@pytest.fixture
+def as_in_the_image(tmp_path: Path) -> Iterator[str]:
+    """The address of the backend, started by the command of the image."""
+    if not (Path(sys.executable).parent / "gunicorn").exists():
+        pytest.skip("the package gunicorn cannot be had")
+    [command] = re.findall(r"^CMD (\[.*\])$", (DOCKER / "Dockerfile").read_text(), re.MULTILINE)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PORT": str(port), "MODEL_DIR": str(tmp_path), "HOME": str(tmp_path)}
+    process = subprocess.Popen(json.loads(command), cwd=DOCKER, env=environment)
+    try:
+        late = time.monotonic() + 60
+        while not answers(f"http://127.0.0.1:{port}/health"):
+            assert process.poll() is None and time.monotonic() < late
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def answers(url: str) -> bool:
+    try:
+        with urllib.request.urlopen(url) as response:
+            return bool(json.load(response)["status"] == "UP")
+    except urllib.error.URLError:
+        return False
+
+
+def test_the_command_of_the_image_runs_the_backend(as_in_the_image: str, clip: Clip, video: Path) -> None:
+    def post(path: str, document: dict) -> dict:
+        body, headers = json.dumps(document).encode(), {"Content-Type": "application/json"}
+        with urllib.request.urlopen(urllib.request.Request(as_in_the_image + path, body, headers)) as response:
+            return dict(json.load(response))
+
+    setup = {"project": "1.1", "schema": CONFIG, "hostname": "http://127.0.0.1", "access_token": ""}
+    post("/setup", setup)
+    task = {"id": 1, "data": {"film": str(video)}}
+    context = {"result": [region([drawn(1, clip.box, (320, 240))])]}
+    request = {"tasks": [task], "project": "1.1", "label_config": CONFIG, "params": {"context": context}}
+    [result] = post("/predict", request)["results"]
+    assert len(result["result"][0]["value"]["sequence"]) == len(clip.files)
+
+
+def test_the_image_is_built_of_what_is_there() -> None:
+    """Docker takes what the Dockerfile copies, and pip what the wheel's adapter needs."""
+    ignored = (DOCKER / "Dockerfile.dockerignore").read_text().split()
+    kept = [line[1:] for line in ignored if line.startswith("!")]
+    copied = re.findall(r"^COPY (?!--from)(.*) \S+$", (DOCKER / "Dockerfile").read_text(), re.MULTILINE)
+    for source in " ".join(copied).split():
+        assert (ROOT / source).exists(), source
+        assert any(source == folder or source.startswith(f"{folder}/") for folder in kept), source

@@ -4,7 +4,8 @@ A backend's `model.py`, for `label-studio-ml init` and `start`:
 
     from bagtrack.adapters.label_studio import BagTrack
 
-Whoever draws a box gets the boxes of the frames after it. Where the target is lost the object is switched off.
+Whoever draws a box gets the boxes of the frames after it. Where the target is lost the object is switched off: in the
+last frame before, since Label Studio shows a key frame that is not enabled, and hides what follows it.
 """
 
 from __future__ import annotations
@@ -50,10 +51,10 @@ class BagTrack(LabelStudioMLBase):  # type: ignore[misc]
 
     def _track(self, video: str, value: dict[str, Any]) -> tuple[dict[str, Any], float]:
         """The value of a region with the boxes after its last one, and the least score."""
-        sequence = sorted(value["sequence"], key=lambda item: item["frame"])
-        last = sequence[-1]
+        track = [dict(item) for item in sorted(value["sequence"], key=lambda item: item["frame"])]
+        last = track[-1]
         tracker = bagtrack.Tracker(**self.settings)
-        new, scores = [], [1.0]
+        scores = [1.0]
         for number, frame, time in frames(video, last["frame"], self.max_frames + 1):
             size = np.array([frame.shape[1], frame.shape[0]] * 2)
             if number == last["frame"]:
@@ -63,9 +64,12 @@ class BagTrack(LabelStudioMLBase):  # type: ignore[misc]
             ok, box = tracker.update(frame)
             scores.append(tracker.score)
             x, y, width, height = (np.array(box) / size * 100).tolist()
+            if not ok:
+                track[-1]["enabled"] = False
+                continue
             item = {"frame": number, "x": x, "y": y, "width": width, "height": height}
-            new.append({**item, "enabled": ok, "rotation": 0, "time": time})
-        return {**value, "sequence": sequence + new}, min(scores)
+            track.append({**item, "enabled": True, "rotation": 0, "time": time})
+        return {**value, "sequence": track}, min(scores)
 
     def _video_key(self, task: dict[str, Any], to_name: str) -> str:
         """The field of the task's data that the tag of this name shows."""
