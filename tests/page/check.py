@@ -17,9 +17,11 @@ import threading
 import time
 import urllib.parse
 
+import budgets
 import files
 import kept
 import local
+import quickstart
 import sources
 import studio
 import welcome
@@ -323,9 +325,11 @@ ALL = [
     session_ended_elsewhere,
     key_needed,
     busy_service,
+    *budgets.ALL,
     *files.ALL,
     *local.ALL,
     *kept.ALL,
+    *quickstart.ALL,
     *sources.ALL,
     *studio.ALL,
 ]
