@@ -23,3 +23,8 @@
 
 pub mod drawing;
 pub mod http;
+
+/// The lines of Rust in the README, which have to compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

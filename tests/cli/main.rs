@@ -1,7 +1,7 @@
 //! The command line, as a person types it.
 
+mod curl_session;
 mod help;
-mod readme_session;
 mod sample_track;
 mod serve;
 mod track_formats;

@@ -1,4 +1,4 @@
-//! The curl session of the README, run as it is typed.
+//! The curl session of docs/QUICKSTART.md, run as it is typed.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -37,10 +37,10 @@ impl Drop for Service {
 }
 
 /// The first shell block after the heading.
-fn block(readme: &str, heading: &str) -> String {
-    let (_, section) = readme
+fn block(text: &str, heading: &str) -> String {
+    let (_, section) = text
         .split_once(heading)
-        .expect("the README has the section");
+        .expect("the document has the section");
     let (_, block) = section
         .split_once("```sh\n")
         .expect("the section has a shell block");
@@ -53,22 +53,25 @@ fn block(readme: &str, heading: &str) -> String {
 
 #[test]
 #[ignore = "needs curl, uuidgen and bash: apt-get install curl uuid-runtime"]
-fn the_readmes_curl_session_works_as_typed() {
-    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let readme = std::fs::read_to_string(readme).expect("the package has a README");
-    let session = block(&readme, "## A session with curl");
+fn the_whole_curl_session_works_as_typed() {
+    let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/QUICKSTART.md");
+    let document = std::fs::read_to_string(document).expect("the project has a quickstart");
+    let session = block(&document, "## A whole session");
     let service = Service::start();
     let folder = tempfile::tempdir().expect("the system has a place for temporary folders");
     // Only what differs from a user's machine: where the binary is, and the port; and errors end the script.
     let script = session
-        .replace("cargo run --release --", env!("CARGO_BIN_EXE_bagtrack"))
+        .replace(
+            "bagtrack sample",
+            &format!("{} sample", env!("CARGO_BIN_EXE_bagtrack")),
+        )
         .replace("http://127.0.0.1:8080", &service.url)
         .replace(
             "curl ",
             "curl --silent --show-error --fail-with-body --write-out '\\n' ",
         );
     assert!(
-        script.contains(&service.url) && !script.contains("cargo run"),
+        script.contains(&service.url) && script.contains(env!("CARGO_BIN_EXE_bagtrack")),
         "{script}"
     );
     let output = Command::new("bash")
