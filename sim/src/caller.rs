@@ -14,6 +14,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// Longest time of a request.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
 /// A caller.
 #[derive(Debug)]
 pub struct Caller {
@@ -74,7 +77,7 @@ impl Caller {
             builder = builder.or_at(address);
         }
         builder
-            .timeout(Duration::from_secs(5))
+            .timeout(TIMEOUT)
             .retry_for(Duration::from_secs(60))
             .snapshot_every(snapshot_every)
             .http(http)
@@ -280,8 +283,8 @@ impl Caller {
     fn refused(&self, account: &Account, error: ClientError) -> Result<(), Ended> {
         match error {
             ClientError::Refused(problem) if matches!(problem.status, 404 | 410) => {
-                // One second of the lease is the client's.
-                match account.touched.elapsed() + Duration::from_secs(1) >= self.idle {
+                // The lease began when the service answered, which the caller may have heard one time-out later.
+                match account.touched.elapsed() + TIMEOUT + Duration::from_secs(1) >= self.idle {
                     true => Err(Ended::Expired),
                     false => Err(Ended::Lost(format!("{problem:?}"))),
                 }
