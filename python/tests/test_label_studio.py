@@ -135,7 +135,8 @@ def test_a_lost_target_is_shown_in_no_frame(tmp_path: Path) -> None:
     [result] = predict(file, tmp_path, {"result": [region([drawn(1, (x - 1, y - 1, width, height), (320, 240))])]})
     sequence = result["result"][0]["value"]["sequence"]
     read, tracker, shown = cv2.VideoCapture(str(file)), bagtrack.Tracker(seed=SEED), []
-    tracker.init(read.read()[1], (x - 1, y - 1, width, height))
+    shares = np.array([sequence[0][side] for side in ("x", "y", "width", "height")])
+    tracker.init(read.read()[1], shares / 100 * [320, 240, 320, 240])
     for number in range(2, 91):
         ok, _ = tracker.update(read.read()[1])
         before = [item for item in sequence if item["frame"] <= number][-1]
