@@ -367,11 +367,11 @@ fn text(answer: &Answer) -> String {
         y,
         width,
         height,
-    } = answer.rect;
-    let status = match answer.status {
+    } = answer.first.rect;
+    let status = match answer.first.status {
         Status::Tracking => "tracking",
         Status::Uncertain => "uncertain",
         Status::Lost => "lost",
     };
-    replay::text([x, y, width, height], answer.score, status)
+    replay::text([x, y, width, height], answer.first.score, status)
 }

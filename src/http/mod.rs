@@ -40,6 +40,8 @@ mod stream;
 
 pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
+pub use bagtrack_api::ProblemKind;
+pub use bagtrack_api::media_types::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 pub use config::access::AccessConfig;
 pub use config::base_path::{BasePath, BasePathError};
 pub use config::flag_values::{parse_duration, parse_listen};
@@ -50,12 +52,10 @@ pub use config::settings::{ConfigError, Secret};
 pub use config::store::StoreConfig;
 #[cfg(feature = "tls")]
 pub use config::tls::TlsConfig;
-pub use extract::uploaded::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 #[cfg(fuzzing)]
 pub use middleware::forwarded::address as forwarded_address;
 #[cfg(feature = "tls")]
 pub use net::certificate::{Certificate, CertificateError};
-pub use problems::kind::Kind as ProblemKind;
 pub use quotas::client::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, BindError, Shutdown};

@@ -103,8 +103,8 @@ async fn several_targets_and_corrections_are_as_the_service_has_them() {
         };
         let (expected, answer) = (expect(expected, StatusCode::OK).await, answer.unwrap());
         assert_eq!(written(&answer), expected, "frame {number}");
-        assert_eq!(answer.targets.len(), 3);
-        assert_eq!(answer.rect, answer.targets[0].rect);
+        assert_eq!(answer.targets().len(), 3);
+        assert_eq!(answer.first, answer.targets()[0]);
     }
 }
 
@@ -118,8 +118,8 @@ async fn a_correction_of_the_only_target_counts_as_a_frame() {
     };
     let answer = session.correct(CLIP.frames[0].clone(), 0, right).await;
     let answer = answer.unwrap();
-    assert_eq!((answer.frame, answer.rect.x), (1, 50.25));
-    assert!(answer.targets.is_empty());
+    assert_eq!((answer.frame, answer.first.rect.x), (1, 50.25));
+    assert_eq!(answer.targets, None);
     assert_eq!(
         session.track(CLIP.frames[1].clone()).await.unwrap().frame,
         2

@@ -25,7 +25,8 @@ async fn every_kind_has_its_section_with_status_cause_and_cure() {
     let page = response.text().await.unwrap();
     for kind in ProblemKind::ALL {
         let section = section(&page, kind.slug());
-        for text in [kind.title(), kind.status().as_str(), "What to do:"] {
+        let status = kind.status().to_string();
+        for text in [kind.title(), &status, "What to do:"] {
             assert!(section.contains(text), "{text}: {section}");
         }
         let paragraphs = section.matches("<p>").count();

@@ -41,8 +41,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut session = client.build()?.open(first, target, &options).await?;
     for file in rest {
         let answer = session.track(std::fs::read(file)?).await?;
-        let (frame, rect, score) = (answer.frame, answer.rect, answer.score);
-        println!("{frame} {rect} {score} {:?}", answer.status);
+        let (frame, rect, score) = (answer.frame, answer.first.rect, answer.first.score);
+        println!("{frame} {rect} {score} {:?}", answer.first.status);
     }
     session.end().await?;
     Ok(())

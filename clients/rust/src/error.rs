@@ -1,6 +1,6 @@
 //! What can go wrong.
 
-use crate::problem::Problem;
+use bagtrack_api::ProblemDocument as Problem;
 
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]

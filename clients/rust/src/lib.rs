@@ -11,7 +11,7 @@
 //! let mut session = client.open(first, target, &OpenOptions::new().seed(1)).await?;
 //! for frame in frames {
 //!     let answer = session.track(frame).await?;
-//!     println!("{}: {} ({:.2})", answer.frame, answer.rect, answer.score);
+//!     println!("{}: {} ({:.2})", answer.frame, answer.first.rect, answer.first.score);
 //! }
 //! session.end().await
 //! # }
@@ -34,7 +34,8 @@
 //!
 //! `docs/PROTOCOL.md` has the details, which are those of the Python and the JavaScript client. So the boxes are the same
 //! as if nothing had happened. A snapshot is taken every [`ClientBuilder::snapshot_every`] frames, and the frames since
-//! then are kept. A service with a store says what it has (`Checkpoint`), and no snapshots are taken then. Without a store, replicas and restarts need common snapshot keys.
+//! then are kept. A service with a store says what it has (`Checkpoint`), and no snapshots are taken
+//! then. Without a store, replicas and restarts need common snapshot keys.
 //!
 //! A frame without an answer, because of the last row or because the call was dropped, is kept: the next call sends it
 //! before its own frame. Do not send it again.
@@ -43,23 +44,22 @@
 //!
 //! The crate brings no TLS. With a feature like `rustls` of reqwest 0.13 in your own manifest, `https://` works.
 
-mod answer;
 mod backoff;
 mod client;
 mod error;
 mod kept;
 mod network;
 mod options;
-mod problem;
 mod remote;
 mod session;
 mod transport;
 mod upload;
 
-pub use answer::{Answer, Rect, Status, Target};
+pub use bagtrack_api::{
+    Answer, PresetName as Preset, ProblemDocument as Problem, Rect, Status, TargetView,
+};
 pub use client::{Client, ClientBuilder};
 pub use error::ClientError;
 pub use network::Network;
-pub use options::{OpenOptions, Preset, Targets};
-pub use problem::Problem;
+pub use options::{OpenOptions, Targets};
 pub use session::Session;

@@ -1,17 +1,8 @@
 //! How a session is opened.
 
-use crate::answer::Rect;
 use crate::transport::Query;
+use bagtrack_api::{PresetName, Rect};
 use serde_json::{Map, Value};
-
-/// A named set of the tracker's parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Preset {
-    /// The paper's tracker, extended; the default.
-    Robust,
-    /// The paper's equations as printed.
-    Paper,
-}
 
 /// What is followed: a `Rect`, or several in a `Vec` or an array.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +46,7 @@ impl Targets {
 /// The tracker's settings; without them those of the service.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OpenOptions {
-    preset: Option<Preset>,
+    preset: Option<PresetName>,
     seed: Option<u64>,
     parameters: Map<String, Value>,
 }
@@ -67,7 +58,7 @@ impl OpenOptions {
     }
 
     /// The preset.
-    pub fn preset(mut self, preset: Preset) -> Self {
+    pub fn preset(mut self, preset: PresetName) -> Self {
         self.preset = Some(preset);
         self
     }
@@ -87,8 +78,8 @@ impl OpenOptions {
 
     pub(crate) fn query(&self, targets: &Targets) -> Query {
         let preset = self.preset.map(|preset| match preset {
-            Preset::Robust => "robust",
-            Preset::Paper => "paper",
+            PresetName::Robust => "robust",
+            PresetName::Paper => "paper",
         });
         let parameters = &self.parameters;
         let parameters = (!parameters.is_empty()).then(|| Value::from(parameters.clone()));

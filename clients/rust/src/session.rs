@@ -1,9 +1,9 @@
 //! A session: frames go in, boxes come back.
 
-use crate::answer::{Answer, Rect};
 use crate::error::ClientError;
 use crate::remote::Remote;
 use crate::upload::Upload;
+use bagtrack_api::{Answer, Rect};
 use bytes::Bytes;
 use uuid::Uuid;
 
@@ -24,6 +24,17 @@ impl Session {
     /// The number of the last frame that was answered; that of the first is 0.
     pub fn frame(&self) -> u64 {
         self.0.answered()
+    }
+
+    /// From a service with a store: the last frame whose state is in the store, as the last answer has it.
+    pub fn checkpoint(&self) -> Option<u64> {
+        self.0.standing().checkpoint
+    }
+
+    /// Whether the service was about to end at the last answer. The session goes on elsewhere by itself, where there is
+    /// another one.
+    pub fn is_draining(&self) -> bool {
+        self.0.standing().draining
     }
 
     /// How many frames were sent again after they had been answered, because the service had lost them.

@@ -3,18 +3,14 @@
 use crate::backoff::Backoff;
 use crate::error::ClientError;
 use crate::network::Carrier;
-use crate::problem::Problem;
+use bagtrack_api::ProblemDocument as Problem;
+use bagtrack_api::headers::{CHECKPOINT, DRAINING};
 use bytes::Bytes;
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, RETRY_AFTER};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode, Url};
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The media type of a frame.
-pub const FRAME: &str = "application/octet-stream";
-/// The media type of a snapshot.
-pub const SNAPSHOT: &str = "application/vnd.bagtrack.snapshot";
 
 /// Names and values.
 pub type Query = Vec<(&'static str, String)>;
@@ -50,6 +46,15 @@ pub enum Body {
     Frames(Vec<Bytes>),
 }
 
+/// What is said of a session beside an answer.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Standing {
+    /// The last frame whose state is in the store.
+    pub checkpoint: Option<u64>,
+    /// Whether the service is about to end.
+    pub draining: bool,
+}
+
 /// The answer to a request.
 pub struct Reply {
     pub status: StatusCode,
@@ -66,10 +71,35 @@ impl Reply {
         }
     }
 
+    /// The problem document; of a proxy's error page one with the status alone.
     fn problem(&self) -> Problem {
-        let seconds = self.headers.get(RETRY_AFTER);
-        let seconds = seconds.and_then(|value| value.to_str().ok()?.parse().ok());
-        Problem::read(self.status, seconds.map(Duration::from_secs), &self.body)
+        let problem = serde_json::from_slice(&self.body).unwrap_or_else(|_| Problem {
+            title: self
+                .status
+                .canonical_reason()
+                .unwrap_or("an error")
+                .to_owned(),
+            ..Problem::default()
+        });
+        Problem {
+            status: self.status.as_u16(),
+            retry_after: self.number(RETRY_AFTER.as_str()).map(Duration::from_secs),
+            ..problem
+        }
+    }
+
+    /// The number in this header field.
+    fn number(&self, name: &str) -> Option<u64> {
+        self.headers.get(name)?.to_str().ok()?.parse().ok()
+    }
+
+    /// What the header fields say of the session.
+    pub fn standing(&self) -> Standing {
+        let draining = self.headers.get(DRAINING);
+        Standing {
+            checkpoint: self.number(CHECKPOINT),
+            draining: draining.is_some_and(|value| value == "true"),
+        }
     }
 
     /// Whether the same request may succeed later: as the service says, or a proxy before it.

@@ -1,7 +1,8 @@
 //! What is sent in one request, and what opens a session.
 
-use crate::answer::Rect;
-use crate::transport::{Body, FRAME, Query, Request};
+use crate::transport::{Body, Query, Request};
+use bagtrack_api::Rect;
+use bagtrack_api::media_types::FRAME;
 use bytes::Bytes;
 use reqwest::Method;
 use uuid::Uuid;

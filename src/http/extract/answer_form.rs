@@ -2,9 +2,7 @@
 
 use axum::http::HeaderMap;
 use axum::http::header::ACCEPT;
-
-/// The media type of answers as lines.
-pub const LINES: &str = "application/x-ndjson";
+use bagtrack_api::media_types::LINES;
 
 /// The form of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

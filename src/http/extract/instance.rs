@@ -3,14 +3,14 @@
 //! The id is the client's `x-request-id` where it can be used, so that a trace can be followed through several services,
 //! else a new one.
 
-use crate::http::problems::document::ProblemDocument;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, Request};
 use axum::http::header::HeaderName;
 use axum::http::request::Parts;
 use axum::http::{Extensions, Uri};
+use bagtrack_api::ProblemDocument;
+use bagtrack_api::ProblemKind as Kind;
 use std::convert::Infallible;
 use tower_http::request_id::RequestId;
 
@@ -57,7 +57,7 @@ impl Instance {
             _ => tracing::info!(kind, cause, "problem"),
         }
         let (path, id) = (self.path.clone(), self.request_id.clone());
-        ProblemDocument::new(problem, state.config.base_path.as_str(), path, id)
+        problem.document(state.config.base_path.as_str(), path, id)
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::base64_file;
 use super::misnamed;
-use super::settings::{FrameCount, Settings};
 use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
+use bagtrack_api::requests::{FrameCount, Settings};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::borrow::Cow;

@@ -1,8 +1,8 @@
 //! Files under another name than `frame`, which is the likeliest mistake of all, and settings in the wrong place.
 
-use super::settings::Settings;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::requests::{FrameCount, Settings};
 use bagtrack_ingest::{self as ingest, video};
 use bagtrack_tracker::Params;
 use serde_json::{Value, json};
@@ -46,10 +46,10 @@ pub(super) fn field<S: Settings>(name: &str, value: &str) -> Option<Problem> {
     (is_text && is_name_of_file(name) && !is_setting::<S>(name)).then(|| {
         let name = shown(name);
         let detail = match S::FRAMES {
-            super::settings::FrameCount::Several => format!(
+            FrameCount::Several => format!(
                 "There is no field `{name}`. Send the file as base64 in `frame`, several in the array `frames`."
             ),
-            super::settings::FrameCount::One => {
+            FrameCount::One => {
                 format!("There is no field `{name}`. Send the file as base64 in `frame`.")
             }
         };

@@ -5,7 +5,7 @@
 //! sends as `application/x-www-form-urlencoded` unless it is told otherwise, and generated clients label a file as JSON
 //! where a call takes both. Settings come in the query or as fields of the form, each once.
 //!
-//! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](settings::Settings) type of the route.
+//! Out: an [`Upload`](uploaded::Upload) with the files and the [`Settings`](bagtrack_api::requests::Settings) type of the route.
 //! Handlers get it by an extractor, which refuses a request as early as it can: first for its query, then for what the
 //! route needs besides (a session, room for one), then for its announced length, a full queue and the client's quota,
 //! and only then for its body. Memory is charged as the bytes of the body arrive, and a place in the queue is taken when
@@ -28,7 +28,6 @@ pub mod query;
 pub mod read_request;
 pub mod session_path;
 pub mod session_request;
-pub mod settings;
 pub mod texts;
 pub mod uploaded;
 pub mod video_frames;

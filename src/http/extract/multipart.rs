@@ -6,13 +6,13 @@
 
 use super::body::{self, Buffer};
 use super::misnamed;
-use super::settings::Settings;
 use super::texts::MAX_TEXT_BYTES;
 use super::uploaded::Fields;
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};
 use axum::extract::{FromRequest, Multipart, Request};
+use bagtrack_api::requests::Settings;
 use bagtrack_sessions::Charge;
 use bytes::BytesMut;
 use http_body::Frame;

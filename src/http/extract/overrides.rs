@@ -1,112 +1,85 @@
-//! A preset with single parameters set otherwise.
+//! What a new track begins with: boxes, and a preset with single parameters set otherwise.
 
-use super::settings::{MAX_EXACT, Seed, whole};
 use crate::http::problems::problem::Problem;
+use bagtrack_api::requests::{MAX_EXACT, Seed, whole};
+use bagtrack_api::{self as api, Parameters, PresetName};
 use bagtrack_sessions::random::random_range;
-use bagtrack_tracker::{Params, Preset};
-use serde::de::{Deserialize, Deserializer, Error};
+use bagtrack_sessions::{Boxes, PerTarget};
+use bagtrack_tracker::{Params, Preset, Rect};
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 
-/// A named set of the tracker's parameters.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize, utoipa::ToSchema,
-)]
-#[schema(as = Preset)]
-#[serde(rename_all = "snake_case")]
-pub enum PresetName {
-    /// The equations and numbers of the paper.
-    Paper,
-    /// The default: extended where the printed equations lose the object.
-    Robust,
+/// The longest list of boxes is as long as a session has targets.
+const _: () = assert!(api::MAX_TARGETS == bagtrack_sessions::MAX_TARGETS);
+
+/// A box as the tracker has it.
+pub fn rect(target: api::Rect) -> Rect {
+    Rect::new(target.x, target.y, target.width, target.height)
 }
 
-impl From<PresetName> for Preset {
-    fn from(name: PresetName) -> Self {
-        match name {
-            PresetName::Paper => Self::Paper,
-            PresetName::Robust => Self::Robust,
-        }
-    }
-}
-
-/// Single parameters by their names.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
-#[serde(transparent)]
-pub struct ParamOverrides(Map<String, Value>);
-
-impl<'de> Deserialize<'de> for ParamOverrides {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = Cow::<str>::deserialize(deserializer)?;
-        serde_json::from_str(&text).map(Self).map_err(|_| {
-            D::Error::custom("`parameters` must be a JSON object of parameters, like {\"seed\": 7}")
-        })
-    }
-}
-
-impl ParamOverrides {
-    /// The parameters of `preset` with these overrides, and with `seed`, where there is one. Without any seed a random one
-    /// is drawn.
-    ///
-    /// # Errors
-    /// A parameter is unknown or has the wrong type.
-    pub fn resolve(self, preset: Preset, seed: Option<Seed>) -> Result<Params, Problem> {
-        let mut params = preset.params();
-        params.seed = random_range(0..=MAX_EXACT);
-        // One at a time, so that a value of the wrong type can be named.
-        for (name, value) in self.0 {
-            if !is_public(&name) {
-                return Err(unknown(&name));
-            }
-            let mut known = fields(&params);
-            let value = match value.as_f64().and_then(whole) {
-                Some(whole) if value.is_f64() => Value::from(whole),
-                _ => value,
-            };
-            known.insert(name.clone(), value.clone());
-            params = serde_json::from_value(Value::Object(known)).map_err(|error| {
-                Problem::invalid_parameter(format!(
-                    "Parameter `{name}` cannot be {value}: {error}."
-                ))
-            })?;
-        }
-        if params.seed > MAX_EXACT {
-            let detail = format!("Parameter `seed` must be a whole number from 0 to {MAX_EXACT}.");
-            return Err(Problem::invalid_parameter(detail));
-        }
-        params.seed = seed.map_or(params.seed, |seed| seed.0);
-        Ok(params)
-    }
-}
-
-/// The parameters of these settings: those of `preset` or the default one, with single ones set otherwise.
+/// The boxes of a new session's targets.
 ///
 /// # Errors
-/// See [`ParamOverrides::resolve`].
+/// There is neither a box nor a list of boxes, or both.
+pub fn boxes(target: Option<api::Rect>, targets: Option<api::Boxes>) -> Result<Boxes, Problem> {
+    match (target, targets) {
+        (Some(target), None) => Ok(PerTarget::One(rect(target))),
+        (None, Some(list)) => {
+            let list = list.as_slice().iter().map(|target| rect(*target));
+            Ok(PerTarget::List(list.collect()))
+        }
+        (None, None) => Err(Problem::missing_box()),
+        (Some(_), Some(_)) => {
+            let detail = "Give `box` for one target or `boxes` for several, not both.";
+            Err(Problem::malformed(detail))
+        }
+    }
+}
+
+/// The parameters of these settings: those of the preset or the default one, with single ones set otherwise, and with
+/// `seed`, where there is one. Without any seed a random one is drawn.
+///
+/// # Errors
+/// A parameter is unknown or has the wrong type.
 pub fn resolve(
     preset: Option<PresetName>,
     seed: Option<Seed>,
-    params: Option<ParamOverrides>,
+    overrides: Option<Parameters>,
 ) -> Result<Params, Problem> {
-    let preset = preset.map_or_else(Preset::default, Preset::from);
-    let params = params.unwrap_or_default();
-    params.resolve(preset, seed)
+    let preset = match preset {
+        None => Preset::default(),
+        Some(PresetName::Paper) => Preset::Paper,
+        Some(PresetName::Robust) => Preset::Robust,
+    };
+    let mut params = preset.params();
+    params.seed = random_range(0..=MAX_EXACT);
+    // One at a time, so that a value of the wrong type can be named.
+    for (name, value) in overrides.unwrap_or_default().0 {
+        if !is_public(&name) {
+            return Err(unknown(&name));
+        }
+        let mut known = fields(&params);
+        let value = match value.as_f64().and_then(whole) {
+            Some(whole) if value.is_f64() => Value::from(whole),
+            _ => value,
+        };
+        known.insert(name.clone(), value.clone());
+        params = serde_json::from_value(Value::Object(known)).map_err(|error| {
+            Problem::invalid_parameter(format!("Parameter `{name}` cannot be {value}: {error}."))
+        })?;
+    }
+    if params.seed > MAX_EXACT {
+        let detail = format!("Parameter `seed` must be a whole number from 0 to {MAX_EXACT}.");
+        return Err(Problem::invalid_parameter(detail));
+    }
+    params.seed = seed.map_or(params.seed, |seed| seed.0);
+    Ok(params)
 }
 
-impl From<&Params> for ParamOverrides {
-    /// The values of the parameters that users set.
-    fn from(params: &Params) -> Self {
-        let mut fields = fields(params);
-        fields.retain(|name, _| is_public(name));
-        Self(fields)
-    }
-}
-
-impl ParamOverrides {
-    /// Removes and returns the value of the parameter `name`.
-    pub fn take(&mut self, name: &str) -> Option<Value> {
-        self.0.remove(name)
-    }
+/// The values of the parameters that users set.
+pub fn public(params: &Params) -> Parameters {
+    let mut fields = fields(params);
+    fields.retain(|name, _| is_public(name));
+    Parameters(fields)
 }
 
 /// Whether users set the parameter `name`. The others are the presets' own.

@@ -1,7 +1,6 @@
 //! A request with frames for a live session.
 
 use super::instance::Instance;
-use super::settings::Settings;
 use super::texts::Texts;
 use super::uploaded::Upload;
 use super::uploaded::admit;
@@ -11,6 +10,7 @@ use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Request};
+use bagtrack_api::requests::Settings;
 use bagtrack_sessions::{QueuePermit, SessionPermit};
 
 /// A request with frames for a live session, with its permits.

@@ -1,10 +1,10 @@
 //! Settings as texts, before they are parsed.
 
 use super::misnamed;
-use super::settings::Settings;
 use crate::http::problems::problem::Problem;
 use axum::extract::Query;
 use axum::http::Uri;
+use bagtrack_api::requests::Settings;
 use serde_json::{Map, Value};
 
 /// Most bytes of a setting. All parameters of the tracker together take some hundred.

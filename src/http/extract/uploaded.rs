@@ -4,9 +4,7 @@ use super::body;
 use super::json;
 use super::multipart;
 use super::pace::paced;
-use super::settings::{FrameCount, Settings};
 use super::texts::Texts;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::RequestPermit;
@@ -15,12 +13,13 @@ use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE};
 use axum::http::request::Parts;
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::media_types::SNAPSHOT;
+use bagtrack_api::requests::{FrameCount, Settings};
 use bagtrack_ingest::video::{VideoFormat, video_format};
 use bagtrack_sessions::{Charge, ChargedBytes, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
-/// The media type of session snapshots.
-pub const SNAPSHOT: &str = "application/vnd.bagtrack.snapshot";
 /// What curl calls a body, whatever it is.
 const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
 /// Least bytes of a body that is told to have lost some.

@@ -1,6 +1,6 @@
 //! All metrics, with their names, units and descriptions.
 
-use crate::http::problems::kind::Kind;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::TrackingMetrics;
 use metrics::{Counter, Gauge, Histogram, Key, KeyName, Label, Level, Metadata, Recorder, Unit};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusRecorder};

@@ -1,7 +1,6 @@
 //! Writes the document of a problem that a handler or a layer answered with, and its line in the log.
 
 use crate::http::extract::instance::Instance;
-use crate::http::problems::document::MEDIA_TYPE;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
@@ -11,6 +10,7 @@ use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, RETRY_AFTER};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::media_types::PROBLEM;
 use std::any::Any;
 
 /// The middleware.
@@ -29,7 +29,7 @@ pub async fn answer_problems(
     // The response's own headers stay: it may have some that the problem does not know, like `Allow`.
     let headers = response.headers_mut();
     headers.remove(CONTENT_LENGTH);
-    headers.insert(CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(PROBLEM));
     if let Some(seconds) = problem.retry_seconds() {
         headers.insert(RETRY_AFTER, HeaderValue::from(seconds));
     }

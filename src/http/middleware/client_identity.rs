@@ -1,13 +1,13 @@
 //! Notes which client a request is from, and tells the client what is left of its quotas.
 
 use super::forwarded::address;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::{Client, Peer};
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::clock::sleep;
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;

@@ -8,7 +8,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 /// The header.
-pub const DRAINING: HeaderName = HeaderName::from_static("draining");
+pub const DRAINING: HeaderName = HeaderName::from_static(bagtrack_api::headers::DRAINING);
 
 /// The middleware.
 pub async fn mark_draining(

@@ -1,8 +1,9 @@
 //! The document as it is sent: what the handlers say, and what follows from all of them together.
 
 use super::key_order::InOrder;
+use super::params_schema;
 use super::problem_responses::problem_responses;
-use crate::http::extract::settings::MAX_EXACT;
+use bagtrack_api::requests::MAX_EXACT;
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 
@@ -18,6 +19,7 @@ pub fn document(handlers: &OpenApi, base_path: &str) -> String {
     let document = serde_json::to_value(handlers);
     let mut document = document.expect("the document is plain JSON");
     document["servers"][0]["url"] = base_path.into();
+    document["components"]["schemas"]["Parameters"] = json!(params_schema::parameters());
     share_opening(&mut document);
     let links = links(&document);
     bound_integers(&mut document);

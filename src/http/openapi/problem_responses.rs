@@ -1,8 +1,8 @@
 //! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's faults
 //! and one for the service's.
 
-use crate::http::problems::document::MEDIA_TYPE;
-use crate::http::problems::kind::Kind;
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::media_types::PROBLEM;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -100,7 +100,7 @@ fn kinds(operation_id: &str) -> Vec<Kind> {
 pub(super) fn problem_responses(operation_id: &str) -> Map<String, Value> {
     let mut by_class: BTreeMap<u16, Vec<Kind>> = BTreeMap::new();
     for kind in kinds(operation_id).into_iter().chain([Kind::Internal]) {
-        let class = kind.status().as_u16() / 100;
+        let class = kind.status() / 100;
         by_class.entry(class).or_default().push(kind);
     }
     let responses = by_class.into_iter().map(|(class, mut kinds)| {
@@ -112,13 +112,13 @@ pub(super) fn problem_responses(operation_id: &str) -> Map<String, Value> {
 
 fn response(kinds: &[Kind]) -> Value {
     let links = kinds.iter().map(|kind| {
-        let (slug, status) = (kind.slug(), kind.status().as_u16());
+        let (slug, status) = (kind.slug(), kind.status());
         format!("[{slug}](problems#{slug}) ({status})")
     });
     let links: Vec<String> = links.collect();
     let mut response = json!({
         "description": format!("A problem: {}", links.join(", ")),
-        "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        "content": {PROBLEM: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     });
     if kinds.iter().any(|kind| kind.retry_after().is_some()) {
         response["headers"]["Retry-After"] = json!({

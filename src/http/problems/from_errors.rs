@@ -1,7 +1,7 @@
 //! The problems that the errors of the other modules are.
 
-use super::kind::Kind;
 use super::problem::Problem;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_ingest::IngestError;
 use bagtrack_sessions::{
     ActError, BudgetFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,

@@ -1,6 +1,6 @@
 //! `/docs/problems`: the page that the types of problems lead to, with a section for each kind.
 
-use super::kind::Kind;
+use bagtrack_api::ProblemKind as Kind;
 use std::fmt::Write;
 
 const HEAD: &str = r#"<!doctype html>
@@ -30,7 +30,7 @@ pub fn page() -> String {
     let mut page = HEAD.to_owned();
     page.push_str("<nav><ul>\n");
     for kind in Kind::ALL {
-        let (slug, status) = (kind.slug(), kind.status().as_u16());
+        let (slug, status) = (kind.slug(), kind.status());
         line(
             &mut page,
             format_args!("<li><a href=\"#{slug}\">{status} {slug}</a></li>"),
@@ -38,7 +38,7 @@ pub fn page() -> String {
     }
     page.push_str("</ul></nav>\n");
     for kind in Kind::ALL {
-        let (slug, status) = (kind.slug(), kind.status().as_u16());
+        let (slug, status) = (kind.slug(), kind.status());
         line(
             &mut page,
             format_args!("<section id=\"{slug}\"><h2>{}</h2>", html(kind.title())),

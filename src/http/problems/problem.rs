@@ -1,7 +1,8 @@
 //! What went wrong with a request: one small constructor for each kind of problem that a handler finds itself.
 
-use super::kind::Kind;
+use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::{ProblemDocument, ProblemKind as Kind};
 use std::error::Error;
 use std::sync::Arc;
 use std::time::Duration;
@@ -177,19 +178,29 @@ impl Problem {
         self.kind
     }
 
-    /// What happened this time, and what to do.
-    pub fn detail(&self) -> &str {
-        &self.detail
+    /// The status that it is answered with.
+    pub fn status(&self) -> StatusCode {
+        StatusCode::from_u16(self.kind.status()).expect("the catalogue holds valid status codes")
     }
 
-    /// The number of the next frame, where a frame number was wrong.
-    pub fn expected_frame(&self) -> Option<u64> {
-        self.expected_frame
-    }
-
-    /// Which frame of the request is meant, counted from 0.
-    pub fn index(&self) -> Option<usize> {
-        self.index
+    /// The document of the problem, for the request to this path with this id, of a service below a base path.
+    pub fn document(
+        &self,
+        base_path: &str,
+        instance: String,
+        request_id: String,
+    ) -> ProblemDocument {
+        ProblemDocument {
+            type_uri: self.kind.uri(base_path),
+            title: self.kind.title().to_owned(),
+            status: self.kind.status(),
+            detail: self.detail.clone(),
+            instance,
+            request_id,
+            expected_frame: self.expected_frame,
+            index: self.index,
+            retry_after: None,
+        }
     }
 
     /// The cause and its causes, for the log.
@@ -275,7 +286,7 @@ fixed! {
 impl IntoResponse for Problem {
     /// The status alone: an outer layer writes the document, since it knows the request.
     fn into_response(self) -> Response {
-        let mut response = self.kind.status().into_response();
+        let mut response = self.status().into_response();
         response.extensions_mut().insert(self);
         response
     }

@@ -3,25 +3,15 @@
 use crate::drawing::ContactSheet;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::read_request::ReadRequest;
-use crate::http::openapi::request_bodies::BinaryBody;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::requests::{BagSettings, BinaryBody};
 use bagtrack_sessions::{ChargedBytes, SessionState};
 use std::sync::Arc;
-
-/// The settings of the picture.
-#[derive(Debug, Default, serde::Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct BagSettings {
-    /// Whose bag, counted from 0, in a session that was opened with `boxes`.
-    #[param(value_type = u32, required = false, nullable = false, maximum = 15, default = 0)]
-    target: Option<usize>,
-}
 
 /// See the bag
 ///

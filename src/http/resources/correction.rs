@@ -1,40 +1,17 @@
 //! `PUT /sessions/{id}/target`: the user corrects the box.
 
+use crate::http::extract::overrides::rect;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::{FrameCount, FrameNumber, Settings, TargetNumber};
 use crate::http::openapi::example_frames;
-use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::{Answer, with_standing};
+use crate::http::respond::answer::{answer, with_standing};
 use crate::http::respond::json::Json;
-use crate::http::respond::target_box::{BoxText, TargetBox};
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
+use bagtrack_api::Answer;
+use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, TargetSettings};
 use bagtrack_sessions::{FrameBatch, GivenBox, box_warnings};
-use serde::Deserialize;
-
-/// The settings of a correction.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct TargetSettings {
-    /// The corrected box: `x,y,width,height`, or a JSON object with these names. In the query or in the
-    /// body; that of the body counts.
-    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    r#box: Option<TargetBox>,
-    /// The number of this frame; see `POST /sessions/{id}/frames`.
-    #[param(value_type = FrameNumber, inline, required = false)]
-    frame: Option<FrameNumber>,
-    /// Which target is corrected, counted from 0, in a session that was opened with `boxes`. The others are tracked.
-    #[param(value_type = TargetNumber, inline, required = false)]
-    target: Option<TargetNumber>,
-}
-
-impl Settings for TargetSettings {
-    const FRAMES: FrameCount = FrameCount::One;
-    const SCHEMA_PREFIX: &'static str = "Target";
-}
 
 type TargetForm = FormBody<TargetSettings>;
 type TargetJson = JsonBody<TargetSettings>;
@@ -81,14 +58,14 @@ pub async fn put(
     State(state): State<AppState>,
     request: SessionRequest<TargetSettings>,
 ) -> Result<Response, Problem> {
-    let (number, given) = request.upload.settings.asked()?;
+    let (number, given) = asked(&request.upload.settings)?;
     let batch = FrameBatch::posted(number, request.upload.files, Some(given));
     let permit = request.permit;
     let size = permit.session().source_size();
     let queue = request.queue.for_frames(permit.session().target_count());
     let queue = state.service.wait_for_turn(&permit, queue, number).await?;
     let tracked = state.service.advance(permit, queue, batch).await?;
-    let answer = Answer::from(&tracked.estimates[0]).with_warnings(box_warnings(&[given.to], size));
+    let answer = answer(&tracked.estimates[0], box_warnings(&[given.to], size));
     Ok(with_standing(
         tracked.replayed,
         tracked.checkpoint,
@@ -96,12 +73,10 @@ pub async fn put(
     ))
 }
 
-impl TargetSettings {
-    /// The number of the frame, and the box in it.
-    fn asked(&self) -> Result<(Option<u64>, GivenBox), Problem> {
-        let to = self.r#box.ok_or_else(Problem::missing_box)?.into();
-        let target = self.target.map(|number| number.as_index());
-        let number = self.frame.map(|number| number.0);
-        Ok((number, GivenBox { target, to }))
-    }
+/// The number of the frame, and the box in it.
+fn asked(settings: &TargetSettings) -> Result<(Option<u64>, GivenBox), Problem> {
+    let to = rect(settings.r#box.ok_or_else(Problem::missing_box)?);
+    let target = settings.target.map(|number| number.as_index());
+    let number = settings.frame.map(|number| number.0);
+    Ok((number, GivenBox { target, to }))
 }

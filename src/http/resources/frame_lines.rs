@@ -9,11 +9,12 @@ use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::respond::answer::StreamAnswer;
+use crate::http::respond::answer::stream_answer;
 use crate::http::respond::ndjson::{self, FrameSequence};
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
+use bagtrack_api::StreamAnswer;
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_sessions::clock::{self, Instant, timeout_at};
 use bagtrack_sessions::{
@@ -138,9 +139,12 @@ impl SessionFrames {
         let estimates = &tracked.estimates[0];
         // No other request may come between two frames of this one.
         self.number = Some(estimates.first().frame + 1);
-        let is_draining = self.state.is_draining();
-        let answer = StreamAnswer::new(estimates, 0, tracked.replayed, is_draining);
-        Ok(answer.with_checkpoint(tracked.checkpoint))
+        Ok(StreamAnswer {
+            replayed: tracked.replayed,
+            checkpoint: tracked.checkpoint,
+            draining: self.state.is_draining(),
+            ..stream_answer(estimates, None)
+        })
     }
 
     /// The answer to a frame that was answered before.
@@ -151,7 +155,11 @@ impl SessionFrames {
         let read = service.read::<_, Problem, _>(permit, self.queue.clone(), read);
         let estimates = read.await?;
         self.number = Some(number + 1);
-        let answer = StreamAnswer::new(&estimates, 0, true, self.state.is_draining());
-        Ok(answer.with_checkpoint(self.permit.session().checkpoint()))
+        Ok(StreamAnswer {
+            replayed: true,
+            checkpoint: self.permit.session().checkpoint(),
+            draining: self.state.is_draining(),
+            ..stream_answer(&estimates, None)
+        })
     }
 }

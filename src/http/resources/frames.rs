@@ -3,40 +3,17 @@
 use super::frame_lines;
 use crate::http::extract::answer_form::AnswerForm;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::extract::settings::Switch;
-use crate::http::extract::settings::{FrameCount, FrameNumber, Settings};
 use crate::http::openapi::example_frames;
-use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
-use crate::http::respond::answer::{FrameAnswers, answer_bytes, with_standing};
+use crate::http::respond::answer::{answer_bytes, answers, with_standing};
 use crate::http::respond::json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
+use bagtrack_api::FrameAnswers;
+use bagtrack_api::requests::{BinaryBody, FormBody, FramesSettings, JsonBody};
 use bagtrack_sessions::FrameBatch;
-use serde::Deserialize;
-
-/// The settings of a request with the next frames.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct FramesSettings {
-    /// The number of the (first) frame of this request.
-    #[param(value_type = FrameNumber, inline, required = false)]
-    frame: Option<FrameNumber>,
-    /// Whether the answer is the frame as PNG, with boxes, scores and particles drawn on it. Then the header `Answer`
-    /// has the answer as JSON.
-    #[serde(default)]
-    #[param(value_type = bool, required = false, default = false)]
-    draw: Switch,
-}
-
-impl Settings for FramesSettings {
-    const FRAMES: FrameCount = FrameCount::Several;
-    const TAKES_VIDEO: bool = true;
-    const SCHEMA_PREFIX: &'static str = "Frames";
-}
 
 /// A request with the next frames.
 pub type FramesRequest = SessionRequest<FramesSettings>;
@@ -130,7 +107,7 @@ async fn respond_at_once(state: &AppState, request: FramesRequest) -> Result<Res
     let mut charge = state.charge(&request.client);
     charge.grow(answer_bytes(batch.files.len(), targets))?;
     let tracked = state.service.advance(request.permit, queue, batch).await?;
-    let answers = json::charged(&FrameAnswers::from(&tracked.estimates[..]), charge)?;
+    let answers = json::charged(&answers(&tracked.estimates, None), charge)?;
     Ok(with_standing(tracked.replayed, tracked.checkpoint, answers))
 }
 

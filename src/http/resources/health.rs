@@ -1,25 +1,17 @@
 //! `/healthz` and `/readyz`: whether the process runs, and whether it is ready for requests.
 
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
+use bagtrack_api::Health;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::StoreUnavailable;
-use serde::Serialize;
 
-/// The service runs.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub struct Health {
-    /// `ok`; or `store-full` from `/readyz` while the store of sessions takes frames and no new sessions.
-    #[schema(example = "ok")]
-    status: &'static str,
+fn health(status: &str) -> Json<Health> {
+    let status = status.to_owned();
+    Json(Health { status })
 }
-
-const OK: Json<Health> = Json(Health { status: "ok" });
-const STORE_FULL: Json<Health> = Json(Health {
-    status: "store-full",
-});
 
 /// Whether the process runs
 ///
@@ -29,7 +21,7 @@ const STORE_FULL: Json<Health> = Json(Health {
     responses((status = 200, description = "It runs", body = Health))
 )]
 pub async fn live() -> Json<Health> {
-    OK
+    health("ok")
 }
 
 /// Whether the service wants requests
@@ -68,8 +60,8 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
                 .as_ref()
                 .is_some_and(|store| store.is_full()) =>
         {
-            Ok(STORE_FULL)
+            Ok(health("store-full"))
         }
-        (false, false) => Ok(OK),
+        (false, false) => Ok(health("ok")),
     }
 }

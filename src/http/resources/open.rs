@@ -2,68 +2,28 @@
 
 use crate::http::auth::caller::Caller;
 use crate::http::extract::idempotency_key;
-use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::Switch;
-use crate::http::extract::settings::{FrameCount, Seed, Settings};
+use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
 use crate::http::extract::uploaded::admit;
-use crate::http::openapi::params_schema::ParametersText;
-use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::openapi::{example_frames, param_limits};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::{Account, ClientSessions};
-use crate::http::respond::created_session::{CreatedSession, created};
-use crate::http::respond::target_box::{BoxText, TargetBox};
-use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
+use crate::http::respond::created_session::created;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::response::Response;
+use bagtrack_api::CreatedSession;
+use bagtrack_api::requests::{BinaryBody, CreateSettings, FormBody, JsonBody};
 use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
-use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
 use uuid::Uuid;
 
 /// The format of the digest of a request.
 const DIGEST_FORMAT: u8 = 1;
-
-/// The settings of a new session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct CreateSettings {
-    /// The target's box: `x,y,width,height`, or a JSON object with these names. In the query or in the
-    /// body; that of the body counts.
-    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    pub r#box: Option<TargetBox>,
-    /// In place of `box`, the boxes of several targets, at most 16: `x,y,width,height;x,y,width,height`, or a JSON
-    /// array of boxes. Then answers have an array `targets`, in this order.
-    #[param(value_type = TargetBoxes, inline, required = false)]
-    pub boxes: Option<TargetBoxes>,
-    /// `robust` (the default) or `paper`.
-    #[param(nullable = false)]
-    pub preset: Option<PresetName>,
-    /// Seed of all random draws, which counts before that of `parameters`; a random one when left out.
-    #[param(value_type = Seed, inline, required = false)]
-    pub seed: Option<Seed>,
-    /// A JSON object of parameters that are set otherwise than in the preset. Each has a range, and some have a limit
-    /// together; see the call.
-    #[serde(rename = "parameters")]
-    #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
-    pub params: Option<ParamOverrides>,
-    /// Whether the answer names the tracker's parameters.
-    #[param(value_type = bool, required = false, default = false)]
-    #[serde(default)]
-    pub verbose: Switch,
-}
-
-impl Settings for CreateSettings {
-    const FRAMES: FrameCount = FrameCount::One;
-    const SCHEMA_PREFIX: &'static str = "Create";
-}
 
 type CreateForm = FormBody<CreateSettings>;
 type CreateJson = JsonBody<CreateSettings>;
@@ -212,7 +172,7 @@ impl CreateRequest {
         } else {
             Start::Frame {
                 file,
-                boxes: boxes_of(upload.r#box, upload.boxes.as_ref())?,
+                boxes: overrides::boxes(upload.r#box, upload.boxes)?,
                 params: Box::new(overrides::resolve(
                     upload.preset,
                     upload.seed,

@@ -5,9 +5,9 @@ use super::{
     version,
 };
 use crate::http::openapi::document;
-use crate::http::problems::document::ProblemDocument;
 use crate::http::state::AppState;
 use crate::http::stream::handshake;
+use bagtrack_api::ProblemDocument;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;

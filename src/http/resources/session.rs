@@ -1,36 +1,15 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
-use crate::http::extract::overrides::ParamOverrides;
+use crate::http::extract::overrides;
 use crate::http::extract::query::NoQuery;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::{Answer, ImageSize};
+use crate::http::respond::answer::answer;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::StatusCode;
-use serde::Serialize;
-use uuid::Uuid;
-
-/// The state of a session.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub struct SessionView {
-    /// The session's id.
-    id: Uuid,
-    /// Frames taken, the first one included.
-    #[schema(example = 2)]
-    frames: u64,
-    /// The last answer.
-    answer: Answer,
-    /// The size that all frames of the session have.
-    image: ImageSize,
-    /// The tracker's parameters; with `boxes` the seed is that of the first target.
-    #[serde(rename = "parameters")]
-    params: ParamOverrides,
-    /// When the session ends if no frame comes (RFC 3339); this request does not move it on.
-    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
-    expires_at: String,
-}
+use bagtrack_api::SessionView;
 
 /// See where a session stands
 ///
@@ -50,9 +29,9 @@ pub async fn get(
     Ok(Json(SessionView {
         id: session.id(),
         frames: latest.first().frame + 1,
-        answer: (&latest).into(),
+        answer: answer(&latest, None),
         image: session.source_size().into(),
-        params: session.params().into(),
+        parameters: overrides::public(session.params()),
         expires_at: state.expires_at(&session),
     }))
 }

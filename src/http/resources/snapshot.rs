@@ -2,14 +2,14 @@
 
 use crate::http::extract::query::NoQuery;
 use crate::http::extract::read_request::ReadRequest;
-use crate::http::extract::uploaded::SNAPSHOT;
-use crate::http::openapi::request_bodies::BinaryBody;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::media_types::SNAPSHOT;
+use bagtrack_api::requests::BinaryBody;
 use bagtrack_sessions::ChargedBytes;
 
 /// Take a snapshot

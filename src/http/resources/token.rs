@@ -8,37 +8,11 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
-use serde::{Deserialize, Serialize};
+use bagtrack_api::{self as api, requests::TokenSettings};
 use std::time::Duration;
 
 const DEFAULT_SECONDS: u32 = 3600;
 const MAX_SECONDS: u32 = 86_400;
-
-/// The settings of a token.
-#[derive(Debug, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct TokenSettings {
-    /// Seconds that the token is good for.
-    #[param(
-        required = false,
-        nullable = false,
-        minimum = 1,
-        maximum = 86_400,
-        default = 3600
-    )]
-    seconds: Option<u32>,
-}
-
-/// A session token.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub struct TokenView {
-    /// The token, to be sent as `Authorization: Bearer …`.
-    token: String,
-    /// When it ends (RFC 3339), if the session lives so long.
-    #[schema(format = DateTime, example = "2026-01-31T12:00:00Z")]
-    expires_at: String,
-}
 
 /// Make a session token
 ///
@@ -50,15 +24,15 @@ pub struct TokenView {
         ("id" = Uuid, Path, description = "The session's id"),
         TokenSettings,
     ),
-    responses((status = 200, description = "The token", body = TokenView))
+    responses((status = 200, description = "The token", body = api::SessionToken))
 )]
 pub async fn create(
     State(state): State<AppState>,
     QuerySettings(settings): QuerySettings<TokenSettings>,
     caller: Caller,
     path: SessionPath,
-) -> Result<Json<TokenView>, Problem> {
-    let seconds = settings.seconds()?;
+) -> Result<Json<api::SessionToken>, Problem> {
+    let seconds = seconds(&settings)?;
     caller.require_key()?;
     let session = path.find(&state).await?;
     let expires = state.now() + Duration::from_secs(seconds.into());
@@ -67,19 +41,17 @@ pub async fn create(
         owner: session.owner().clone(),
         expires,
     });
-    Ok(Json(TokenView {
+    Ok(Json(api::SessionToken {
         token,
         expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
     }))
 }
 
-impl TokenSettings {
-    fn seconds(&self) -> Result<u32, Problem> {
-        match self.seconds.unwrap_or(DEFAULT_SECONDS) {
-            seconds @ 1..=MAX_SECONDS => Ok(seconds),
-            _ => Err(Problem::malformed(format!(
-                "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
-            ))),
-        }
+fn seconds(settings: &TokenSettings) -> Result<u32, Problem> {
+    match settings.seconds.unwrap_or(DEFAULT_SECONDS) {
+        seconds @ 1..=MAX_SECONDS => Ok(seconds),
+        _ => Err(Problem::malformed(format!(
+            "`seconds` must be a whole number from 1 to {MAX_SECONDS}."
+        ))),
     }
 }

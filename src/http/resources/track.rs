@@ -3,104 +3,32 @@
 use super::track_video::{Track, VideoTrack};
 use crate::http::auth::caller::Caller;
 use crate::http::extract::instance::Instance;
-use crate::http::extract::overrides::{self, ParamOverrides, PresetName};
-use crate::http::extract::settings::{
-    FrameCount, FrameNumber, Seed, Settings, Switch, TargetNumber,
-};
+use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::{Upload, admit};
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
 use crate::http::extract::video_range::{RangeFrames, VideoRange};
 use crate::http::openapi::example_frames;
-use crate::http::openapi::params_schema::ParametersText;
-use crate::http::openapi::request_bodies::{BinaryBody, FormBody, JsonBody};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::respond::answer::{FrameAnswers, answer_bytes};
+use crate::http::respond::answer::{answer_bytes, answers};
 use crate::http::respond::json::{self, JsonBytes};
 use crate::http::respond::ndjson;
-use crate::http::respond::target_box::{BoxText, TargetBox};
-use crate::http::respond::target_boxes::{TargetBoxes, boxes_of};
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Request, State};
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::Tracked;
+use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, Switch, TrackSettings};
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, Selection, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde::{Deserialize, Serialize};
-
-/// The settings of a request without a session.
-#[derive(Debug, Default, PartialEq, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct TrackSettings {
-    /// Without a snapshot, the target's box in the first frame; with one, a correction, as in
-    /// `PUT /sessions/{id}/target`: `x,y,width,height`, or a JSON object with these names.
-    #[param(value_type = BoxText, inline, required = false, example = "10,20,30,40")]
-    r#box: Option<TargetBox>,
-    /// In place of `box`, the boxes of several targets; see `POST /sessions`. Only without a snapshot.
-    #[param(value_type = TargetBoxes, inline, required = false)]
-    boxes: Option<TargetBoxes>,
-    /// Which target `box` corrects, counted from 0, where there are several. Only with a snapshot.
-    #[param(value_type = TargetNumber, inline, required = false)]
-    target: Option<TargetNumber>,
-    /// `robust` (the default) or `paper`. Only without a snapshot.
-    #[param(nullable = false)]
-    preset: Option<PresetName>,
-    /// Seed of all random draws, which counts before that of `parameters`; a random one when left out. Only without a
-    /// snapshot.
-    #[param(value_type = Seed, inline, required = false)]
-    seed: Option<Seed>,
-    /// A JSON object of parameters that are set otherwise than in the preset. Only without a snapshot.
-    #[serde(rename = "parameters")]
-    #[param(value_type = ParametersText, inline, required = false, example = "{\"seed\": 7}")]
-    params: Option<ParamOverrides>,
-    /// Of a video, the frame in which the boxes hold, counted from 0. Those before it are passed over.
-    #[param(value_type = FrameNumber, inline, required = false)]
-    start: Option<FrameNumber>,
-    /// Of a video, track at most so many frames after the first one.
-    #[param(value_type = FrameNumber, inline, required = false)]
-    count: Option<FrameNumber>,
-    /// Of a video, track from `start` back to frame 0. The frames in between are kept as JPEG files in the memory for
-    /// uploads; where they do not fit, `count` makes them fewer.
-    #[param(value_type = bool, required = false, default = false)]
-    #[serde(default)]
-    backwards: Switch,
-    /// Of a video, end when every target has been lost.
-    #[param(value_type = bool, required = false, default = false)]
-    #[serde(default)]
-    until_lost: Switch,
-    /// Of a video, answer only key frames: between two of them straight lines give every edge of every box to within a
-    /// pixel. Of several targets, the key frames of each.
-    #[param(value_type = bool, required = false, default = false)]
-    #[serde(default)]
-    keyframes: Switch,
-}
-
-impl Settings for TrackSettings {
-    const FRAMES: FrameCount = FrameCount::Several;
-    const TAKES_SNAPSHOT: bool = true;
-    const TAKES_VIDEO: bool = true;
-    const SCHEMA_PREFIX: &'static str = "Track";
-}
 
 type TrackForm = FormBody<TrackSettings>;
 type TrackJson = JsonBody<TrackSettings>;
-
-/// The answers to the frames, and the track up to there.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub struct Tracked {
-    /// The answers.
-    #[serde(flatten)]
-    answers: FrameAnswers,
-    /// The track up to here as base64, to be sent with the next frame.
-    #[schema(content_encoding = "base64", example = "iWJhZ3RyYWNrDQo…")]
-    snapshot: String,
-}
 
 /// Track without a session
 ///
@@ -243,7 +171,7 @@ fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
         return Err(Problem::malformed(detail));
     }
     let params = overrides::resolve(settings.preset, settings.seed, settings.params)?;
-    let boxes = boxes_of(settings.r#box, settings.boxes.as_ref())?;
+    let boxes = overrides::boxes(settings.r#box, settings.boxes)?;
     Ok((boxes, Box::new(params)))
 }
 
@@ -284,7 +212,7 @@ fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Probl
     let target = allowed.target.map(|number| number.as_index());
     let correction = allowed.r#box.map(|to| GivenBox {
         target,
-        to: to.into(),
+        to: overrides::rect(to),
     });
     Ok((TrackFrom::Snapshot(snapshot, correction), files))
 }
@@ -297,7 +225,7 @@ fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<JsonBytes, Problem>
     let targets = estimates.first().map_or(1, |first| first.as_slice().len());
     charge.grow(2 * text + answer_bytes(estimates.len(), targets))?;
     let tracked = Tracked {
-        answers: FrameAnswers::from(estimates).with_warnings(tracked.warnings.clone()),
+        answers: answers(estimates, tracked.warnings.clone()),
         snapshot: STANDARD.encode(snapshot),
     };
     json::charged(&tracked, charge)

@@ -4,10 +4,11 @@ use crate::http::extract::video_place::count_frame;
 use crate::http::extract::video_range::RangeFrames;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
-use crate::http::respond::answer::Answer;
+use crate::http::respond::answer::answer;
 use crate::http::respond::ndjson::FrameSequence;
 use crate::http::state::AppState;
 use axum::body::Bytes;
+use bagtrack_api::Answer;
 use bagtrack_sessions::{Boxes, QueuePermit, Selection, SessionState, Start, box_warnings};
 use bagtrack_tracker::{Estimate, Params};
 use std::sync::Arc;
@@ -91,7 +92,10 @@ impl VideoTrack {
             Some(next) => next.map_err(End::Refused)?,
         };
         let (estimates, answer) = self.track(file).await.map_err(End::Refused)?;
-        let answer = Arc::new(answer.numbered(number));
+        let answer = Arc::new(Answer {
+            frame: number,
+            ..answer
+        });
         let rows = estimates.into_iter().map(|it| (it, answer.clone()));
         Ok(only(self.selection.take(rows)))
     }
@@ -116,7 +120,7 @@ impl VideoTrack {
             Track::Ended => return Err(Problem::missing_frame()),
         };
         let estimates = track.latest();
-        let answer = Answer::from(&estimates).with_warnings(warnings);
+        let answer = answer(&estimates, warnings);
         self.track = Track::At(Box::new(track));
         Ok((estimates.as_slice().to_vec(), answer))
     }

@@ -2,18 +2,7 @@
 
 use crate::http::extract::query::NoQuery;
 use crate::http::respond::json::Json;
-use serde::Serialize;
-
-/// The program that answers.
-#[derive(Debug, Serialize, utoipa::ToSchema)]
-pub struct Version {
-    /// Always `bagtrack`.
-    #[schema(example = "bagtrack")]
-    name: &'static str,
-    /// Its version. Snapshots of another one are refused.
-    #[schema(example = "0.1.0")]
-    version: &'static str,
-}
+use bagtrack_api::Version;
 
 /// See which version answers
 ///
@@ -24,7 +13,7 @@ pub struct Version {
 )]
 pub async fn get(_: NoQuery) -> Json<Version> {
     Json(Version {
-        name: env!("CARGO_PKG_NAME"),
-        version: env!("CARGO_PKG_VERSION"),
+        name: env!("CARGO_PKG_NAME").to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
     })
 }

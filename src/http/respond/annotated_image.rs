@@ -1,6 +1,6 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
-use super::answer::{Answer, with_standing};
+use super::answer::{answer, with_standing};
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
@@ -9,6 +9,7 @@ use axum::body::Bytes;
 use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::headers;
 use bagtrack_sessions::{
     ChargedBytes, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
 };
@@ -16,7 +17,7 @@ use bagtrack_tracker::Diagnostics;
 use std::sync::Arc;
 
 /// The header that has the answer as JSON.
-pub const ANSWER: HeaderName = HeaderName::from_static("answer");
+pub const ANSWER: HeaderName = HeaderName::from_static(headers::ANSWER);
 /// The longer side of a picture at most, in pixels. It bounds the memory that a drawn answer takes.
 const MAX_SIDE: u32 = 2048;
 
@@ -52,14 +53,14 @@ pub async fn answer_drawn(
     next.with_diagnostics = true;
     let mut answered = state.service.advance(permit, queue.clone(), next).await?;
     let (estimates, seen) = (answered.estimates.swap_remove(0), answered.diagnostics);
-    let answer = serde_json::to_string(&Answer::from(&estimates));
-    let answer = answer.map_err(|error| Problem::internal(Arc::new(error)))?;
+    let text = serde_json::to_string(&answer(&estimates, None));
+    let text = text.map_err(|error| Problem::internal(Arc::new(error)))?;
     let draw = move |_: &mut WorkMeter| draw(picture, &estimates, &seen);
     let bytes = state.service.run::<_, Problem, _>(queue, draw).await?;
     let headers = [(CONTENT_TYPE, HeaderValue::from_static("image/png"))];
     let picture = Bytes::from(ChargedBytes::new(bytes, charge));
     let mut response = (headers, picture).into_response();
-    if let Ok(answer) = HeaderValue::from_str(&answer) {
+    if let Ok(answer) = HeaderValue::from_str(&text) {
         response.headers_mut().insert(ANSWER, answer);
     }
     let (replayed, checkpoint) = (answered.replayed, answered.checkpoint);

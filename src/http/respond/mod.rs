@@ -8,5 +8,3 @@ pub mod answer;
 pub mod created_session;
 pub mod json;
 pub mod ndjson;
-pub mod target_box;
-pub mod target_boxes;

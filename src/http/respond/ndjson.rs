@@ -5,13 +5,13 @@
 //! before it has been taken, so a slow reader holds no lines in memory.
 
 use super::json;
-use crate::http::extract::answer_form::LINES;
 use crate::http::extract::instance::Instance;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::media_types::LINES;
 use futures_util::{StreamExt, stream};
 use serde::Serialize;
 use std::convert::Infallible;

@@ -2,10 +2,10 @@
 
 use crate::http::metrics::registry::Metrics;
 use crate::http::middleware::security_headers::{HEADERS, STRICT};
-use crate::http::problems::document::{MEDIA_TYPE, ProblemDocument};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json;
 use axum::http::header::CONTENT_SECURITY_POLICY;
+use bagtrack_api::media_types::PROBLEM;
 use bagtrack_sessions::random::new_id;
 use std::net::IpAddr;
 
@@ -13,9 +13,9 @@ use std::net::IpAddr;
 pub fn answer_of(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8> {
     let id = new_id().to_string();
     metrics.problem(problem.kind());
-    let (kind, status) = (problem.kind().slug(), problem.kind().status().as_u16());
+    let (kind, status) = (problem.kind().slug(), problem.kind().status());
     tracing::info!(id, %client, kind, status, "connection refused");
-    let document = ProblemDocument::new(problem, "", "/".to_owned(), id.clone());
+    let document = problem.document("", "/".to_owned(), id.clone());
     let body = json::line(&document).unwrap_or_default();
     let retry = problem.retry_seconds();
     let retry = retry.map_or(String::new(), |seconds| {
@@ -28,9 +28,9 @@ pub fn answer_of(problem: &Problem, client: IpAddr, metrics: &Metrics) -> Vec<u8
         .map(|(name, value)| format!("{name}: {value}\r\n"))
         .collect();
     let head = format!(
-        "HTTP/1.1 {}\r\ncontent-type: {MEDIA_TYPE}\r\ncontent-length: {}\r\n{retry}x-request-id: {id}\r\n\
+        "HTTP/1.1 {}\r\ncontent-type: {PROBLEM}\r\ncontent-length: {}\r\n{retry}x-request-id: {id}\r\n\
          cache-control: no-store\r\n{security}connection: close\r\n\r\n",
-        problem.kind().status(),
+        problem.status(),
         body.len()
     );
     [head.into_bytes(), body].concat()

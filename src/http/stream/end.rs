@@ -42,7 +42,7 @@ impl End {
             Self::Gone | Self::Silent => return None,
             Self::Shutdown => CloseCode::Away.into(),
             Self::Replaced => REPLACED,
-            Self::Problem(problem) => OF_STATUS + problem.kind().status().as_u16(),
+            Self::Problem(problem) => OF_STATUS + problem.kind().status(),
         };
         Some(CloseFrame {
             code: code.into(),

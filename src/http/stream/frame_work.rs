@@ -1,17 +1,19 @@
 //! One frame of a stream: it gets its permits, then its answer.
 
+use super::message;
 use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::auth::caller::Caller;
-use crate::http::problems::kind::Kind;
+use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::Account;
 use crate::http::state::AppState;
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueueFull, QueuePermit, Session, SessionBusy,
     SessionPermit, StreamPlace, Tracked, box_warnings,
 };
-use bagtrack_tracker::{Diagnostics, Rect};
+use bagtrack_tracker::Diagnostics;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use uuid::Uuid;
@@ -175,7 +177,7 @@ impl FrameWork {
             let next = FrameBatch {
                 number,
                 files: vec![file.clone()],
-                correction: header.correction(),
+                correction: message::correction(&header),
                 min_answers: MAX_KEPT.min(config.max_frames),
                 with_diagnostics: header.see,
                 stream: Some(self.place.clone()),
@@ -183,7 +185,7 @@ impl FrameWork {
             let at = session.session().clone();
             match self.state.service.advance(session, queue, next).await {
                 Ok(answered) => {
-                    let given = header.r#box.map(Rect::from);
+                    let given = header.rect.map(rect);
                     let warnings = box_warnings(given.as_slice(), at.source_size());
                     return Ok(Given::of(answered, shown, warnings));
                 }

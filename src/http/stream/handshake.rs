@@ -9,7 +9,6 @@ use crate::http::auth::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::session_path::SessionPath;
-use crate::http::extract::settings::Switch;
 use crate::http::net::connection_hold::ConnectionHold;
 use crate::http::net::least_rate::LeastRate;
 use crate::http::problems::problem::Problem;
@@ -19,8 +18,8 @@ use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::response::Response;
+use bagtrack_api::requests::StreamSettings;
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
-use serde::Deserialize;
 use std::io;
 use std::sync::{Arc, Mutex};
 use tracing::Instrument;
@@ -29,20 +28,6 @@ use tracing::Instrument;
 const BYTES_PER_PIXEL: usize = 4;
 /// And for what stands beside the pixels.
 const BESIDE_BYTES: usize = 256 << 10;
-
-/// The settings of a stream.
-#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub struct StreamSettings {
-    /// The first frame whose answer the client has not got: the stored answers from it on are sent again.
-    #[param(required = false, nullable = false)]
-    from: Option<u64>,
-    /// Whether a frame that waits is skipped when a newer one comes.
-    #[param(value_type = bool, required = false, default = false)]
-    #[serde(default)]
-    drop: Switch,
-}
 
 /// Send frames over a WebSocket
 ///

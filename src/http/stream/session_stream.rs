@@ -3,15 +3,16 @@
 use super::end::End;
 use super::fragments::MessageTooSlow;
 use super::frame_work::{Done, FrameWork};
-use super::message::{FrameHeader, Hello};
+use super::message;
 use super::upgrade::Socket;
 use super::waiting::ArrivedFrame;
 use crate::http::extract::instance::Instance;
 use crate::http::net::connection_hold::ConnectionHold;
-use crate::http::problems::kind::Kind;
 use crate::http::problems::problem::Problem;
-use crate::http::respond::answer::StreamAnswer;
+use crate::http::respond::answer::{particles, stream_answer};
 use axum::body::Bytes;
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::{FrameHeader, Hello, StreamAnswer};
 use bagtrack_sessions::clock::{self, interval_at, timeout};
 use bagtrack_sessions::{BudgetFull, Charge, ChargedBytes, Estimates};
 use futures_util::stream::FusedStream;
@@ -149,8 +150,12 @@ impl SessionStream {
         let next = self.stand.next;
         self.send(socket, &Hello { next }).await?;
         for estimates in std::mem::take(&mut self.stand.stored) {
-            let answer = self.answer(&estimates, 0, true);
-            let answer = answer.with_checkpoint(self.stand.checkpoint);
+            let answer = StreamAnswer {
+                replayed: true,
+                checkpoint: self.stand.checkpoint,
+                draining: self.work.state.is_draining(),
+                ..stream_answer(&estimates, None)
+            };
             self.send(socket, &answer).await?;
         }
         Ok(())
@@ -167,7 +172,7 @@ impl SessionStream {
             None | Some(Ok(Message::Close(_))) => return Some(End::Gone),
             Some(Ok(Message::Text(text))) => {
                 drop(socket.get_mut().take_charge());
-                *header = FrameHeader::parse(&text);
+                *header = message::parse(&text);
             }
             Some(Ok(Message::Binary(file))) => {
                 let header = std::mem::replace(header, Ok(FrameHeader::default()));
@@ -195,12 +200,15 @@ impl SessionStream {
         match answer {
             Ok(given) => {
                 counts.answered += 1;
-                let answer = self.answer(&given.estimates, skipped, given.replayed);
-                let answer = answer
-                    .with_seen(given.seen)
-                    .with_checkpoint(given.checkpoint);
-                self.send(socket, &answer.with_warnings(given.warnings))
-                    .await?;
+                let answer = StreamAnswer {
+                    skipped,
+                    replayed: given.replayed,
+                    checkpoint: given.checkpoint,
+                    draining: self.work.state.is_draining(),
+                    seen: given.seen.map(particles),
+                    ..stream_answer(&given.estimates, given.warnings)
+                };
+                self.send(socket, &answer).await?;
             }
             Err(problem) if ends_stream(problem.kind()) => return Ok(Some(End::Problem(problem))),
             Err(problem) => {
@@ -217,10 +225,6 @@ impl SessionStream {
         received.increment(file.len() as u64);
         let file = ChargedBytes::new(file, charge).into();
         ArrivedFrame { header, file }
-    }
-
-    fn answer(&self, estimates: &Estimates, skipped: u64, replayed: bool) -> StreamAnswer {
-        StreamAnswer::new(estimates, skipped, replayed, self.work.state.is_draining())
     }
 
     async fn send(&self, socket: &mut Socket, message: &impl Serialize) -> Result<(), Error> {

@@ -1,8 +1,8 @@
 //! The frames of a stream that have come and wait for their turn.
 
-use super::message::FrameHeader;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
+use bagtrack_api::FrameHeader;
 use std::collections::VecDeque;
 
 /// Frames that wait behind the one at work. The next one is there when that is done; more would only wait here in place
@@ -31,7 +31,7 @@ impl Arrived {
     /// A correction is never skipped for a frame without one.
     fn is_correction(&self) -> bool {
         let frame = self.frame.as_ref();
-        frame.is_ok_and(|frame| frame.header.r#box.is_some())
+        frame.is_ok_and(|frame| frame.header.rect.is_some())
     }
 }
 
@@ -92,10 +92,10 @@ mod tests {
     use super::*;
 
     fn frame(name: &'static str, corrects: bool) -> Result<ArrivedFrame, Problem> {
-        let r#box = corrects.then(|| "1,2,3,4".parse().unwrap());
+        let rect = corrects.then(|| "1,2,3,4".parse().unwrap());
         Ok(ArrivedFrame {
             header: FrameHeader {
-                r#box,
+                rect,
                 ..FrameHeader::default()
             },
             file: Bytes::from_static(name.as_bytes()),

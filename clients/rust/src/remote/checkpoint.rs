@@ -1,10 +1,11 @@
 //! What is done after each answer, so that the session can go on elsewhere: snapshots, and leaving a service that is
 //! about to end.
 
-use super::{Created, Remote};
-use crate::answer::Answer;
-use crate::transport::{Query, SNAPSHOT};
+use super::Remote;
+use crate::transport::{Query, Standing};
 use crate::upload::Origin;
+use bagtrack_api::CreatedSession;
+use bagtrack_api::media_types::SNAPSHOT;
 use std::time::Duration;
 use tokio::time::Instant;
 
@@ -13,16 +14,20 @@ const MOVE_EVERY: Duration = Duration::from_secs(1);
 
 impl Remote {
     /// Makes sure, after the answer to a frame, that the session can go on elsewhere.
-    pub(super) async fn checkpoint(&mut self, answer: &Answer) {
-        if let Some(stored) = answer.checkpoint {
+    pub(super) async fn checkpoint(&mut self) {
+        let Standing {
+            checkpoint,
+            draining,
+        } = self.standing;
+        if let Some(stored) = checkpoint {
             // A store has the session up to there: any replica goes on with it.
             self.kept.forget_until(stored);
-        } else if answer.draining && self.may_try_to_move() {
+        } else if draining && self.may_try_to_move() {
             self.move_on().await;
         } else if self.snapshot_every == 0 {
-            self.kept.forget_until(answer.frame);
+            self.kept.forget_until(self.answered);
         } else {
-            let since = |origin: &Origin| answer.frame.saturating_sub(origin.frame);
+            let since = |origin: &Origin| self.answered.saturating_sub(origin.frame);
             let origin = self.kept.origin();
             if origin.is_none_or(|origin| since(origin) >= self.snapshot_every) {
                 self.renew_origin().await;
@@ -52,7 +57,9 @@ impl Remote {
             _ => None,
         };
         match created {
-            Some(Created { id, frame, .. }) => (self.id, self.last_acknowledged) = (id, frame),
+            Some(CreatedSession { id, frame, .. }) => {
+                (self.id, self.last_acknowledged) = (id, frame)
+            }
             None => self.transport.used = here,
         }
     }

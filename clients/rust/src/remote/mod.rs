@@ -3,16 +3,15 @@
 
 mod checkpoint;
 
-use crate::answer::Answer;
 use crate::backoff::Backoff;
 use crate::error::ClientError;
 use crate::kept::{Kept, MOST};
-use crate::problem::Problem;
-use crate::transport::{FRAME, Reply, Request, Transport};
+use crate::transport::{Request, Standing, Transport};
 use crate::upload::{Origin, Upload};
+use bagtrack_api::media_types::FRAME;
+use bagtrack_api::{Answer, CreatedSession, FrameAnswers, Parameters, ProblemDocument as Problem};
 use bytes::Bytes;
 use reqwest::Method;
-use serde::Deserialize;
 use tokio::time::Instant;
 use uuid::Uuid;
 
@@ -25,48 +24,16 @@ pub struct Remote {
     answered: u64,
     /// The last frame that the service has, as far as is known.
     last_acknowledged: u64,
+    /// What the last answer said beside it.
+    standing: Standing,
     kept: Kept,
     snapshot_every: u64,
     resent: u64,
     tried_to_move: Option<Instant>,
 }
 
-/// The answer to what opens a session.
-#[derive(Deserialize)]
-struct Created {
-    id: Uuid,
-    frame: u64,
-    parameters: Parameters,
-}
-
-#[derive(Deserialize)]
-struct Parameters {
-    seed: u64,
-}
-
-/// The answer to a request with frames.
-#[derive(Deserialize)]
-struct FrameAnswers {
-    #[serde(flatten)]
-    last: Answer,
-    #[serde(default)]
-    answers: Vec<Answer>,
-}
-
-/// The answers to the frames of a request, at least one.
-fn answers(reply: &Reply) -> Result<Vec<Answer>, ClientError> {
-    let FrameAnswers { last, mut answers } = serde_json::from_slice(&reply.body)?;
-    if answers.is_empty() {
-        answers.push(last);
-    }
-    for answer in &mut answers {
-        answer.note(&reply.headers);
-    }
-    Ok(answers)
-}
-
 /// Opens a session; asks until there is an answer.
-async fn create(transport: &mut Transport, origin: &Origin) -> Result<Created, ClientError> {
+async fn create(transport: &mut Transport, origin: &Origin) -> Result<CreatedSession, ClientError> {
     let request = origin.request(transport.carrier.new_id());
     let reply = transport.call(&request).await?;
     Ok(serde_json::from_slice(&reply.checked()?.body)?)
@@ -84,7 +51,8 @@ impl Remote {
         if origin.media_type == FRAME {
             // The same boxes come again only with the seed that was drawn.
             query.retain(|(name, _)| *name != "seed");
-            query.push(("seed", created.parameters.seed.to_string()));
+            let seed = created.parameters.as_ref().and_then(Parameters::seed);
+            query.extend(seed.map(|seed| ("seed", seed.to_string())));
         }
         let mut kept = Kept::default();
         if snapshot_every > 0 {
@@ -99,6 +67,7 @@ impl Remote {
             id: created.id,
             answered: created.frame,
             last_acknowledged: created.frame,
+            standing: Standing::default(),
             kept,
             snapshot_every: u64::from(snapshot_every).min(MOST as u64 / 2),
             resent: 0,
@@ -112,6 +81,10 @@ impl Remote {
 
     pub fn answered(&self) -> u64 {
         self.answered
+    }
+
+    pub fn standing(&self) -> Standing {
+        self.standing
     }
 
     pub fn resent(&self) -> u64 {
@@ -131,7 +104,7 @@ impl Remote {
         let answers = delivered?;
         if let Some(last) = answers.last() {
             self.answered = last.frame;
-            self.checkpoint(last).await;
+            self.checkpoint().await;
         }
         Ok(answers)
     }
@@ -153,7 +126,9 @@ impl Remote {
                     if last < number {
                         continue;
                     }
-                    return answers(&reply);
+                    self.standing = reply.standing();
+                    let answers: FrameAnswers = serde_json::from_slice(&reply.body)?;
+                    return Ok(answers.into_all());
                 }
                 Err(problem) => problem,
             };

@@ -98,7 +98,7 @@ async fn make(
     let given = match call {
         Call::Open { .. } => unreachable!("see above"),
         Call::Track { track } => opened.track(track.clone()).await.map(|answer| {
-            assert_eq!(answer.rect.x, answer.frame as f64);
+            assert_eq!(answer.first.rect.x, answer.frame as f64);
             json!({"frame": answer.frame})
         }),
         Call::Correct {

@@ -34,18 +34,21 @@ impl Reply {
     }
 }
 
+const BOX: &str = r#"{"x": 1.0, "y": 2.0, "width": 30.5, "height": 40.0}"#;
+
 /// The answer to what opens a session.
 pub fn created(frame: u64) -> Reply {
-    let id = "00000000-0000-4000-8000-000000000000";
-    let body = format!(r#"{{"id": "{id}", "frame": {frame}, "parameters": {{"seed": 7}}}}"#);
+    let body = format!(
+        r#"{{"id": "00000000-0000-4000-8000-000000000000", "frame": {frame}, "box": {BOX},
+            "image": {{"width": 320, "height": 240}}, "parameters": {{"seed": 7}},
+            "expires_at": "2026-01-31T12:00:00Z"}}"#
+    );
     Reply::new(201, &body)
 }
 
 /// The answer to a frame.
 pub fn answer(frame: u64) -> Reply {
-    let target = r#"{"x": 1.0, "y": 2.0, "width": 30.5, "height": 40.0}"#;
-    let body =
-        format!(r#"{{"frame": {frame}, "box": {target}, "score": 0.5, "status": "tracking"}}"#);
+    let body = format!(r#"{{"frame": {frame}, "box": {BOX}, "score": 0.5, "status": "tracking"}}"#);
     Reply::new(200, &body)
 }
 

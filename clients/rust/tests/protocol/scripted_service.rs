@@ -184,7 +184,9 @@ impl Script {
             if told.created.is_some() {
                 let seed: u64 = self.seed.as_ref().unwrap().parse().unwrap();
                 answer["id"] = id.into();
+                answer["image"] = json!({"width": 320, "height": 240});
                 answer["parameters"] = json!({"seed": seed});
+                answer["expires_at"] = "2026-01-31T12:00:00Z".into();
             }
             content = answer.to_string();
         }

@@ -1,9 +1,9 @@
 //! The bodies that have frames and settings in them, as a form and as JSON.
 
-use crate::http::extract::overrides::{ParamOverrides, PresetName};
-use crate::http::extract::settings::{FrameCount, Settings};
-use crate::http::respond::target_box::TargetBox;
-use bagtrack_sessions::MAX_TARGETS;
+use super::{FrameCount, Settings};
+use crate::boxes::MAX_TARGETS;
+use crate::parameters::{Parameters, PresetName};
+use crate::rect::Rect;
 use std::borrow::Cow;
 use std::marker::PhantomData;
 use utoipa::openapi::path::{Parameter, ParameterIn};
@@ -150,7 +150,7 @@ fn in_json(setting: Parameter) -> RefOr<Schema> {
         schema.description = description.clone().unwrap_or_default();
         OneOfBuilder::new().item(schema).item(null.clone()).into()
     };
-    let target = || Ref::from_schema_name(TargetBox::name());
+    let target = || Ref::from_schema_name(Rect::name());
     let mut schema = match setting.schema {
         Some(RefOr::T(Schema::Object(schema))) => schema,
         Some(RefOr::Ref(schema)) => return reference(schema),
@@ -166,7 +166,7 @@ fn in_json(setting: Parameter) -> RefOr<Schema> {
             return choice(list.into());
         }
         Some(SchemaFormat::Custom(format)) if format == "json" => {
-            return reference(Ref::from_schema_name(ParamOverrides::name()));
+            return reference(Ref::from_schema_name(Parameters::name()));
         }
         _ => {}
     }

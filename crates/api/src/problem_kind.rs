@@ -1,10 +1,8 @@
 //! The catalogue of problem kinds: each has a status, a name and a title that never change, its usual causes and their
 //! cure. The answers, the OpenAPI document and the page `/docs/problems` are made from it.
 
-use axum::http::StatusCode;
-
 /// The page that tells of all kinds, below the service's base path.
-pub const PAGE: &str = "/docs/problems";
+pub const PROBLEMS_PAGE: &str = "/docs/problems";
 
 /// What the catalogue says of a kind.
 struct Entry {
@@ -15,16 +13,16 @@ struct Entry {
     cure: &'static str,
 }
 
-/// Makes [`Kind`] and its entries from one list, so that none lacks anything.
+/// Makes [`ProblemKind`] and its entries from one list, so that none lacks anything.
 macro_rules! kinds {
     ($($name:ident: $status:literal $slug:literal $title:literal cause: $cause:literal cure: $cure:literal)*) => {
         /// A kind of problem: one problem type of the interface.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum Kind {
+        pub enum ProblemKind {
             $(#[doc = $title] $name,)*
         }
 
-        impl Kind {
+        impl ProblemKind {
             /// All kinds, by their statuses.
             pub const ALL: &'static [Self] = &[$(Self::$name,)*];
 
@@ -173,7 +171,7 @@ kinds! {
         cure: "Send the request again after `Retry-After`, with its number (`?frame=N`)."
 }
 
-impl Kind {
+impl ProblemKind {
     /// Its name: the last part of the problem type.
     pub fn slug(self) -> &'static str {
         self.entry().slug
@@ -181,12 +179,12 @@ impl Kind {
 
     /// The problem type: the address of its section of the page, of a service below this path.
     pub fn uri(self, base_path: &str) -> String {
-        format!("{base_path}{PAGE}#{}", self.slug())
+        format!("{base_path}{PROBLEMS_PAGE}#{}", self.slug())
     }
 
-    /// The status it is answered with.
-    pub fn status(self) -> StatusCode {
-        StatusCode::from_u16(self.entry().status).expect("the catalogue holds valid status codes")
+    /// The status code that it is answered with.
+    pub fn status(self) -> u16 {
+        self.entry().status
     }
 
     /// What it is, in a few words; the same for every occurrence.

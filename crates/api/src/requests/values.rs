@@ -1,32 +1,12 @@
-//! What the settings of a route are to the parsers and to the OpenAPI document.
+//! The types of single settings, each read from its text, and their schemas.
 
-use bagtrack_sessions::MAX_TARGETS;
-use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
+use crate::boxes::MAX_TARGETS;
+use crate::parameters::Parameters;
+use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, Schema, SchemaFormat, SchemaType, Type};
-use utoipa::{IntoParams, Number, PartialSchema, ToSchema};
-
-/// How many frames a route takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameCount {
-    /// Exactly one.
-    One,
-    /// One or more, up to the configured maximum.
-    Several,
-}
-
-/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` describes them.
-pub trait Settings: DeserializeOwned + IntoParams + Send + 'static {
-    /// How many frames the route takes.
-    const FRAMES: FrameCount;
-    /// Whether a snapshot may come beside the frames.
-    const TAKES_SNAPSHOT: bool = false;
-    /// Whether a video may come in place of the frames.
-    const TAKES_VIDEO: bool = false;
-    /// What the names of the schemas of its bodies begin with.
-    const SCHEMA_PREFIX: &'static str;
-}
+use utoipa::{Number, PartialSchema, ToSchema};
 
 /// Off, unless it is given: as `name`, `name=true` or `name=1`. Python clients write `True` and `False`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -104,5 +84,66 @@ impl<const MAX: u64> PartialSchema for WholeNumber<MAX> {
     /// As a text in the query and in forms.
     fn schema() -> RefOr<Schema> {
         number_schema(Type::Integer, MAX).build().into()
+    }
+}
+
+/// A number in `x,y,width,height`; the last two are above 0.
+const NUMBER: &str = r"(?:[0-9]{1,5}(?:\.[0-9]{1,4})?)";
+
+/// The schema of a text of this format.
+fn text_of(format: &str) -> ObjectBuilder {
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::Custom(format.to_owned())))
+}
+
+/// A box as a text, in the query and in forms. A JSON object or array in a text is taken, too.
+#[derive(Debug)]
+pub struct BoxText;
+
+impl ToSchema for BoxText {}
+
+impl PartialSchema for BoxText {
+    fn schema() -> RefOr<Schema> {
+        let pattern = format!("^-?{NUMBER},-?{NUMBER},{NUMBER},{NUMBER}$");
+        let text = text_of("box").pattern(Some(pattern));
+        text.examples(["10,20,30,40"]).build().into()
+    }
+}
+
+/// A list of boxes as a text. A JSON array in a text is taken, too.
+#[derive(Debug)]
+pub struct BoxesText;
+
+impl ToSchema for BoxesText {}
+
+impl PartialSchema for BoxesText {
+    fn schema() -> RefOr<Schema> {
+        let one = format!("-?{NUMBER},-?{NUMBER},{NUMBER},{NUMBER}");
+        let more = MAX_TARGETS - 1;
+        let text = text_of("boxes").pattern(Some(format!("^{one}(?:;{one}){{0,{more}}}$")));
+        text.build().into()
+    }
+}
+
+/// The parameters as a text, in the query and in forms.
+#[derive(Debug)]
+pub struct ParametersText;
+
+impl ToSchema for ParametersText {}
+
+impl PartialSchema for ParametersText {
+    fn schema() -> RefOr<Schema> {
+        let words = "A JSON object; its properties are those of the schema `Parameters`.";
+        text_of("json").description(Some(words)).build().into()
+    }
+}
+
+impl ToSchema for Parameters {}
+
+impl PartialSchema for Parameters {
+    /// An object. Which parameters there are is the tracker's: the service puts them in.
+    fn schema() -> RefOr<Schema> {
+        ObjectBuilder::new().into()
     }
 }

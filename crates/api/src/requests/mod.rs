@@ -1,0 +1,41 @@
+//! What the calls take: the settings of each, as the service reads them, and the bodies that have them.
+//!
+//! In: the texts of settings, from the query, a form or a JSON object. Out: a struct for each call. Its schema, and those
+//! of the [bodies](bodies) with the same settings, go into the OpenAPI document; so the document says what is read.
+//!
+//! What can go wrong: a setting is unknown or no value of its type, which reading refuses with the setting's name.
+
+mod bodies;
+mod settings;
+mod values;
+
+pub use bodies::{BinaryBody, FormBody, JsonBody};
+pub use settings::{
+    BagSettings, CreateSettings, FramesSettings, StreamSettings, TargetSettings, TokenSettings,
+    TrackSettings,
+};
+pub use values::{FrameNumber, MAX_EXACT, Seed, Switch, TargetNumber, number_schema, whole};
+
+use serde::de::DeserializeOwned;
+use utoipa::IntoParams;
+
+/// How many frames a route takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameCount {
+    /// Exactly one.
+    One,
+    /// One or more, up to the configured maximum.
+    Several,
+}
+
+/// The settings of one route. They are parsed from their texts, by `Deserialize`; `IntoParams` describes them.
+pub trait Settings: DeserializeOwned + IntoParams + Send + 'static {
+    /// How many frames the route takes.
+    const FRAMES: FrameCount;
+    /// Whether a snapshot may come beside the frames.
+    const TAKES_SNAPSHOT: bool = false;
+    /// Whether a video may come in place of the frames.
+    const TAKES_VIDEO: bool = false;
+    /// What the names of the schemas of its bodies begin with.
+    const SCHEMA_PREFIX: &'static str;
+}

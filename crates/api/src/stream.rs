@@ -1,0 +1,92 @@
+//! The text messages of a stream, and the lines of an answer by lines.
+
+use super::answer::Answer;
+use super::rect::Rect;
+use serde::{Deserialize, Serialize};
+
+/// What a client says of the frame that comes next.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FrameHeader {
+    /// Its number.
+    pub frame: Option<u64>,
+    /// The box in it, where the user corrects it.
+    #[serde(rename = "box")]
+    pub rect: Option<Rect>,
+    /// Which target is corrected, or is told about, counted from 0.
+    pub target: Option<usize>,
+    /// Whether the answer shall tell what the tracker saw.
+    pub see: bool,
+}
+
+/// The first message of the service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// The number of the next frame.
+    pub next: u64,
+}
+
+/// The answer to a frame in a stream or as a line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StreamAnswer {
+    /// The answer.
+    #[serde(flatten)]
+    pub answer: Answer,
+    /// Frames before it that were skipped, with `drop=true`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub skipped: u64,
+    /// Whether it was given before.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub replayed: bool,
+    /// With a store: the last frame whose state is in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<u64>,
+    /// Whether the service is about to end.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub draining: bool,
+    /// What the tracker saw, where that was asked for.
+    #[serde(flatten)]
+    pub seen: Option<Particles>,
+}
+
+/// What the tracker saw in a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Particles {
+    /// For the likeliest particles, likeliest first: centre (x, y), width, and weight.
+    pub particles: Vec<[f64; 4]>,
+    /// For each entry of the bag, oldest first, its share of the vote for the best particle.
+    pub votes: Vec<f64>,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_has_a_number_or_a_box_in_any_notation() {
+        let parse = |text: &str| serde_json::from_str::<FrameHeader>(text);
+        let expected = "1,2,30,40".parse().ok();
+        for text in [
+            r#"{"box": {"x": 1, "y": 2, "width": 30, "height": 40}}"#,
+            r#"{"box": [1, 2, 30, 40], "frame": 3}"#,
+            r#"{"box": "1,2,30,40"}"#,
+        ] {
+            assert_eq!(parse(text).unwrap().rect, expected, "{text}");
+        }
+        assert_eq!(parse(r#"{"frame": 7}"#).unwrap().frame, Some(7));
+        assert_eq!(parse(r#"{"box": null}"#).unwrap().rect, None);
+        for text in [
+            "",
+            "7",
+            r#"{"box": 1}"#,
+            r#"{"colour": 1}"#,
+            r#"{"frame": -1}"#,
+        ] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+}
