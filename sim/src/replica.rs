@@ -99,6 +99,7 @@ impl Replica {
         let parts = Parts {
             clock: clock.clone(),
             store,
+            expert: None,
             executor: executor(setup, &life),
         };
         let service = Service::new(config(setup), parts).expect("the settings are valid");

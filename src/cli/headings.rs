@@ -32,6 +32,7 @@ const HEADINGS: [(&str, &[&str]); 10] = [
             "session_idle",
             "session_first",
             "max_session_bytes",
+            "model",
         ],
     ),
     (

@@ -5,6 +5,7 @@ mod help;
 mod sample_track;
 mod serve;
 mod track_formats;
+mod track_model;
 mod track_propagation;
 mod track_signals;
 mod track_video;

@@ -1,12 +1,14 @@
 //! What the programs `bagtrack` and `bagtrack-eval` have in common on the command line.
 //!
-//! [`ParamFlags`] choose the tracker's parameters (`--preset`, `--set NAME=VALUE`), [`progress`] draws bars on standard
+//! [`ParamFlags`] choose the tracker's parameters (`--preset`, `--set NAME=VALUE`), [`ModelFlag`] the network of a second
+//! opinion (`--model`), [`progress`] draws bars on standard
 //! error, and [`output`] writes new folders and standard output. [`frames`] lists the frames of a folder, and
 //! [`read_boxes`] reads its annotations in the OTB layout.
 
 mod assignment;
 mod boxes;
 pub mod frames;
+mod model;
 pub mod output;
 mod params;
 pub mod progress;
@@ -14,5 +16,6 @@ mod sequence_error;
 
 pub use assignment::{AssignError, Assignment, assign, parse_assignment};
 pub use boxes::{BOXES, parse_boxes, read_boxes};
+pub use model::{ModelFiles, ModelFlag};
 pub use params::ParamFlags;
 pub use sequence_error::SequenceError;

@@ -2,7 +2,7 @@
 //!
 //! Exit status: 0, or 1 after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
-use bagtrack_cli::{ParamFlags, frames, output, progress, read_boxes};
+use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, progress, read_boxes};
 use bagtrack_eval::plots::{self, Evaluated};
 use bagtrack_eval::{
     Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns, Variant,
@@ -27,6 +27,8 @@ struct Args {
     dirs: Vec<PathBuf>,
     #[command(flatten)]
     params: ParamFlags,
+    #[command(flatten)]
+    model: ModelFlag,
     /// Runs of each sequence, with the seeds 0, 1, 2 …
     #[arg(long, default_value = "1")]
     seeds: NonZeroUsize,
@@ -155,6 +157,7 @@ fn evaluate(
     base: &Params,
     variants: &[Variant],
 ) -> Result<Vec<Evaluated>, Box<dyn Error>> {
+    let expert = args.model.load()?;
     let dirs: Vec<&PathBuf> = args.dirs.iter().filter(|dir| !dir.is_file()).collect();
     // A wrong path should be told now, not after the sequences before it.
     for dir in &dirs {
@@ -184,7 +187,7 @@ fn evaluate(
             let same = params[..index].iter().position(|before| before == set);
             done.push(match same {
                 Some(before) => done[before].clone(),
-                None => bagtrack_eval::run(&sequence, set, args.seeds, args.jobs)?,
+                None => bagtrack_eval::run(&sequence, set, expert.as_ref(), args.seeds, args.jobs)?,
             });
             bar.inc(1);
         }

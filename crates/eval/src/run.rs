@@ -3,8 +3,9 @@
 use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
 use bagtrack_cli::SequenceError;
-use bagtrack_tracker::{Evidence, Frame, Params, Rect, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Evidence, Expert, Frame, Params, Rect, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -86,7 +87,12 @@ impl SequenceRuns {
 }
 
 impl SeedRun {
-    fn track(sequence: &Sequence, frames: &[Frame], params: Params) -> Result<Self, EvalError> {
+    fn track(
+        sequence: &Sequence,
+        frames: &[Frame],
+        params: Params,
+        expert: Option<Arc<dyn Expert>>,
+    ) -> Result<Self, EvalError> {
         let refuse = |frame: usize| {
             move |source| EvalError::Tracker {
                 sequence: sequence.name.clone(),
@@ -96,7 +102,8 @@ impl SeedRun {
         };
         let nothing = || EvalError::NothingToScore(sequence.name.clone());
         let first = sequence.boxes[0].ok_or_else(nothing)?;
-        let mut tracker = Tracker::new(&frames[0], first, params).map_err(refuse(0))?;
+        let tracker = Tracker::beside(&frames[0], first, params, expert);
+        let mut tracker = tracker.map_err(refuse(0))?;
         let mut scored = Vec::new();
         let mut boxes = vec![first];
         let mut step_time = Duration::ZERO;
@@ -131,13 +138,14 @@ impl SeedRun {
 }
 
 /// Tracks through a sequence with the seeds 0 to `seeds` − 1, on `jobs` threads. Times are reliable with
-/// one job only, because parallel jobs compete for the processor.
+/// one job only, because parallel jobs compete for the processor. `expert` gives a second opinion, where there is one.
 ///
 /// # Errors
 /// See [`EvalError`]; of several, that of the lowest seed.
 pub fn run(
     sequence: &Sequence,
     params: &Params,
+    expert: Option<&Arc<dyn Expert>>,
     seeds: NonZeroUsize,
     jobs: NonZeroUsize,
 ) -> Result<SequenceRuns, EvalError> {
@@ -150,7 +158,7 @@ pub fn run(
             seed: seed as u64,
             ..params.clone()
         };
-        SeedRun::track(sequence, &frames, params)
+        SeedRun::track(sequence, &frames, params, expert.cloned())
     };
     let next = AtomicUsize::new(0);
     let work = || {

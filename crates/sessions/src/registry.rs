@@ -226,8 +226,15 @@ mod tests {
             height: 16.0,
         };
         let (print, params) = (Fingerprint::of(b"first"), Preset::Paper.params());
-        let state = SessionState::start(&frame, print, &PerTarget::One(target), &params, || Ok(()))
-            .unwrap();
+        let state = SessionState::start(
+            &frame,
+            print,
+            &PerTarget::One(target),
+            &params,
+            None,
+            || Ok(()),
+        )
+        .unwrap();
         let new = NewSession {
             id: crate::random::new_id(),
             opening: registry.opening([0; 32], &state),

@@ -15,11 +15,12 @@ use super::mac::{MAC_BYTES, MacKeys};
 use super::per_target::{MAX_TARGETS, PerTarget};
 use super::replay::{Answered, Fingerprint, TargetAnswer};
 use super::targets::Targets;
-use bagtrack_tracker::{SNAPSHOT_MAGIC as TRACKER_MAGIC, Tracker, TrackerError};
+use bagtrack_tracker::{Expert, SNAPSHOT_MAGIC as TRACKER_MAGIC, Tracker, TrackerError};
 use postcard::take_from_bytes;
 use serde::Serialize;
 use serde::de::Deserialize;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// The first bytes of every session snapshot.
 pub const MAGIC: &[u8] = b"\x89bagtrack\r\n";
@@ -72,7 +73,8 @@ impl SessionSnapshot {
         bytes
     }
 
-    /// The session of `bytes`, with the last `max_recent` of its stored answers.
+    /// The session of `bytes`, with the last `max_recent` of its stored answers. One with a second opinion is that of
+    /// `expert`.
     ///
     /// # Errors
     /// See [`SnapshotError`].
@@ -80,9 +82,10 @@ impl SessionSnapshot {
         bytes: &[u8],
         keys: &MacKeys,
         max_recent: usize,
+        expert: Option<&Arc<dyn Expert>>,
     ) -> Result<Self, SnapshotError> {
         if bytes.starts_with(TRACKER_MAGIC) {
-            return Self::of_tracker(bytes, keys);
+            return Self::of_tracker(bytes, keys, expert);
         }
         check_version(bytes)?;
         let (content, code) = bytes
@@ -91,15 +94,19 @@ impl SessionSnapshot {
         if !keys.verify(content, code) {
             return Err(SnapshotError::NotAuthentic);
         }
-        Self::read(content, max_recent)
+        Self::read(content, max_recent, expert)
     }
 
     /// The session of a tracker that was elsewhere until now. Which bytes its last frame had is not known.
-    fn of_tracker(bytes: &[u8], keys: &MacKeys) -> Result<Self, SnapshotError> {
+    fn of_tracker(
+        bytes: &[u8],
+        keys: &MacKeys,
+        expert: Option<&Arc<dyn Expert>>,
+    ) -> Result<Self, SnapshotError> {
         if !keys.accept_unsigned() {
             return Err(SnapshotError::Unsigned);
         }
-        let trackers = PerTarget::One(Tracker::restore(bytes)?);
+        let trackers = PerTarget::One(Tracker::restore_beside(bytes, expert.cloned())?);
         let targets = Targets::restored(trackers).ok_or(SnapshotError::Damaged)?;
         let answers = targets.estimates().map(|&estimate| TargetAnswer {
             given: None,
@@ -141,7 +148,11 @@ impl SessionSnapshot {
     }
 
     /// The session of bytes without a code.
-    pub(super) fn read(bytes: &[u8], max_recent: usize) -> Result<Self, SnapshotError> {
+    pub(super) fn read(
+        bytes: &[u8],
+        max_recent: usize,
+        expert: Option<&Arc<dyn Expert>>,
+    ) -> Result<Self, SnapshotError> {
         let (version, compressed) = check_version(bytes)?;
         let content = compression::decompress(compressed).ok_or(SnapshotError::Damaged)?;
         let mut rest = &content[..];
@@ -157,7 +168,7 @@ impl SessionSnapshot {
         let trackers = per_target(count, || {
             let tracker;
             (tracker, rest) = take::<&[u8]>(rest)?;
-            Ok(Tracker::restore(tracker)?)
+            Ok(Tracker::restore_beside(tracker, expert.cloned())?)
         })?;
         let targets = Targets::restored(trackers).ok_or(SnapshotError::Damaged)?;
         let recent = recent(rest, count, max_recent)?;

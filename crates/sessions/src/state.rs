@@ -5,7 +5,8 @@ use super::replay::{self, Answered, Fingerprint, ReplayDecision, ReplayError, Ta
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use super::snapshot::{SessionSnapshot, SnapshotError};
 use super::targets::{Boxes, Correction, Estimates, StartError, Targets, TargetsError};
-use bagtrack_tracker::{BagEntry, Diagnostics, Frame, FrameFormat, Params, TrackerError};
+use bagtrack_tracker::{BagEntry, Diagnostics, Expert, Frame, FrameFormat, Params, TrackerError};
+use std::sync::Arc;
 
 /// The part of a session that changes from frame to frame.
 #[derive(Debug, Clone)]
@@ -35,7 +36,8 @@ pub enum StepError<E> {
 }
 
 impl SessionState {
-    /// A session that starts with `boxes` in `frame`, whose file has this digest. Before each target `check` says whether
+    /// A session that starts with `boxes` in `frame`, whose file has this digest, and with `expert` beside its trackers where
+    /// there is one. Before each target `check` says whether
     /// to go on.
     ///
     /// # Errors
@@ -45,9 +47,10 @@ impl SessionState {
         fingerprint: Fingerprint,
         boxes: &Boxes,
         params: &Params,
+        expert: Option<&Arc<dyn Expert>>,
         check: impl FnMut() -> Result<(), Stopped>,
     ) -> Result<Self, StartError> {
-        let targets = Targets::start(frame, boxes, params, check)?;
+        let targets = Targets::start(frame, boxes, params, expert, check)?;
         let estimates = targets.estimates();
         let first = boxes.try_map(|target, given| {
             let estimate = estimates.as_slice()[target];
@@ -61,7 +64,7 @@ impl SessionState {
         Ok(Self { targets, recent })
     }
 
-    /// The session that a snapshot holds, with at most `max_recent` stored answers.
+    /// The session that a snapshot holds, with at most `max_recent` stored answers; `expert` is the one of this process.
     ///
     /// # Errors
     /// See [`SnapshotError`].
@@ -69,9 +72,10 @@ impl SessionState {
         snapshot: &[u8],
         keys: &MacKeys,
         max_recent: usize,
+        expert: Option<&Arc<dyn Expert>>,
     ) -> Result<Self, SnapshotError> {
         let SessionSnapshot { targets, recent } =
-            SessionSnapshot::decode(snapshot, keys, max_recent)?;
+            SessionSnapshot::decode(snapshot, keys, max_recent, expert)?;
         Ok(Self { targets, recent })
     }
 
@@ -84,8 +88,12 @@ impl SessionState {
     ///
     /// # Errors
     /// See [`SnapshotError`].
-    pub fn from_stored(bytes: &[u8], max_recent: usize) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { targets, recent } = SessionSnapshot::read(bytes, max_recent)?;
+    pub fn from_stored(
+        bytes: &[u8],
+        max_recent: usize,
+        expert: Option<&Arc<dyn Expert>>,
+    ) -> Result<Self, SnapshotError> {
+        let SessionSnapshot { targets, recent } = SessionSnapshot::read(bytes, max_recent, expert)?;
         Ok(Self { targets, recent })
     }
 

@@ -6,8 +6,9 @@
 use super::per_target::PerTarget;
 use super::scheduler::work_limit::{Stopped, WorkMeter};
 use bagtrack_tracker::{
-    Diagnostics, Estimate, Frame, FrameFormat, Params, Rect, Tracker, TrackerError,
+    Diagnostics, Estimate, Expert, Frame, FrameFormat, Params, Rect, Tracker, TrackerError,
 };
+use std::sync::Arc;
 
 /// Most bytes that the trackers of a list of targets keep together. The work on a frame holds a copy of them.
 pub const MAX_LIST_BYTES: usize = 8 << 20;
@@ -83,7 +84,7 @@ pub fn largest_format(formats: impl Iterator<Item = FrameFormat>) -> FrameFormat
 }
 
 impl Targets {
-    /// A tracker for each box in `frame`. Before each of them `check` says whether to go on.
+    /// A tracker for each box in `frame`, with `expert` beside it where there is one. Before each of them `check` says whether to go on.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -91,6 +92,7 @@ impl Targets {
         frame: &Frame,
         boxes: &Boxes,
         params: &Params,
+        expert: Option<&Arc<dyn Expert>>,
         mut check: impl FnMut() -> Result<(), Stopped>,
     ) -> Result<Self, StartError> {
         let count = boxes.as_slice().len();
@@ -99,7 +101,7 @@ impl Targets {
         }
         let start = |target: usize, given: &Rect| {
             check().map_err(StartError::Stopped)?;
-            Tracker::new(frame, *given, params.of_target(target))
+            Tracker::beside(frame, *given, params.of_target(target), expert.cloned())
                 .map_err(|error| StartError::Refused { target, error })
         };
         boxes.try_map(start).map(Self)

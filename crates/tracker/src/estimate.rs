@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::confidence::score::UNCERTAIN_BELOW;
 use crate::image::rect::Rect;
 
 /// Whether the tracker believes its own box.
@@ -14,6 +15,17 @@ pub enum Status {
     Uncertain,
     /// The target is out of sight; the box is the best guess.
     Lost,
+}
+
+impl Status {
+    /// The status of an answer with this `score` that an expert had a part in; `lost` when the filter had lost the target.
+    pub(crate) fn of_both(score: f32, lost: bool) -> Self {
+        match (score >= UNCERTAIN_BELOW, lost) {
+            (true, _) => Self::Tracking,
+            (false, false) => Self::Uncertain,
+            (false, true) => Self::Lost,
+        }
+    }
 }
 
 /// The answer to one frame.

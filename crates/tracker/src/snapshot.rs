@@ -6,9 +6,11 @@
 //! allow.
 //!
 //! Layout: the magic `BAGTRACK`, the version and the CRC-32 of the rest (both little-endian 32-bit), the state in
-//! postcard's encoding.
+//! postcard's encoding. With an expert the version is another one, and the second opinion follows.
 
 use crate::error::TrackerError;
+use crate::expert::opinion::Expert;
+use crate::expert::second_opinion::SecondOpinion;
 use crate::image::resolution::MAX_WORKING_SIDE;
 use crate::input;
 use crate::motion::orientation;
@@ -21,7 +23,14 @@ use crate::workspace;
 pub const MAGIC: &[u8; 8] = b"BAGTRACK";
 /// Grows with every change of [`State`] or of what its numbers mean.
 const VERSION: u32 = 17;
+/// Of a state with a second opinion.
+const EXPERT_VERSION: u32 = 0x1_0000 + VERSION;
 const HEADER: usize = 16;
+
+const NO_EXPERT: &str =
+    "the session has a second opinion by a network, which is not loaded here: give it with --model";
+const OTHER_EXPERT: &str = "the session has a second opinion by another network than the one that is loaded here: give the \
+    same files with --model";
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
 const MAX_FEATURE: f32 = 1e3;
@@ -30,17 +39,23 @@ const FRAMES: u64 = 1 << 53;
 
 /// The snapshot of `state`.
 pub(crate) fn write(state: &State) -> Vec<u8> {
-    let body = postcard::to_stdvec(state).expect("the state has no type that postcard refuses");
+    const PLAIN: &str = "the state has no type that postcard refuses";
+    let mut body = postcard::to_stdvec(state).expect(PLAIN);
+    let mut version = VERSION;
+    if let Some(opinion) = &state.second_opinion {
+        version = EXPERT_VERSION;
+        body = postcard::to_extend(opinion, body).expect(PLAIN);
+    }
     let mut bytes = Vec::with_capacity(HEADER + body.len());
     bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&VERSION.to_le_bytes());
+    bytes.extend_from_slice(&version.to_le_bytes());
     bytes.extend_from_slice(&crc32fast::hash(&body).to_le_bytes());
     bytes.extend_from_slice(&body);
     bytes
 }
 
-/// The state in `bytes`, fully checked.
-pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
+/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`.
+pub(crate) fn read(bytes: &[u8], expert: Option<&dyn Expert>) -> Result<State, TrackerError> {
     let damaged = TrackerError::Snapshot("is damaged");
     let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
         return Err(TrackerError::Snapshot("is too short"));
@@ -51,19 +66,43 @@ pub(crate) fn read(bytes: &[u8]) -> Result<State, TrackerError> {
     if header[..8] != MAGIC[..] {
         return Err(TrackerError::Snapshot("is not one of this program"));
     }
-    if word(8) != VERSION {
+    let has_opinion = word(8) == EXPERT_VERSION;
+    if word(8) != VERSION && !has_opinion {
         return Err(TrackerError::Snapshot("is of another version"));
     }
     if word(12) != crc32fast::hash(body) {
         return Err(damaged);
     }
-    match postcard::take_from_bytes::<State>(body) {
-        Ok((mut state, [])) => {
-            check(&state)?;
-            restore(&mut state);
-            Ok(state)
-        }
-        _ => Err(damaged),
+    let Ok((mut state, rest)) = postcard::take_from_bytes::<State>(body) else {
+        return Err(damaged);
+    };
+    if has_opinion {
+        state.second_opinion = Some(read_opinion(rest, state.format.size, expert)?);
+    } else if !rest.is_empty() {
+        return Err(damaged);
+    }
+    check(&state)?;
+    restore(&mut state);
+    Ok(state)
+}
+
+/// The second opinion of a session with working images of `size`.
+fn read_opinion(
+    bytes: &[u8],
+    size: (u32, u32),
+    expert: Option<&dyn Expert>,
+) -> Result<SecondOpinion, TrackerError> {
+    let Ok((opinion, [])) = postcard::take_from_bytes::<SecondOpinion>(bytes) else {
+        return Err(TrackerError::Snapshot("is damaged"));
+    };
+    let expert = expert.ok_or(TrackerError::Expert(NO_EXPERT))?;
+    if expert.fingerprint() != opinion.fingerprint {
+        return Err(TrackerError::Expert(OTHER_EXPERT));
+    }
+    if opinion.is_valid_for(expert.template_len(), size) {
+        Ok(opinion)
+    } else {
+        Err(TrackerError::Snapshot("holds a state that cannot be"))
     }
 }
 
@@ -130,6 +169,7 @@ fn check_particles(state: &State) -> bool {
     let has_cloud = state.params.search == Search::Resampled;
     let cloud = state.cloud.as_ref();
     cloud.is_some() == has_cloud
+        && (state.second_opinion.is_none() || state.params.takes_expert())
         && is_clamped(&state.answer, state)
         && cloud.is_none_or(|cloud| {
             let mut particles = cloud.particles.iter();

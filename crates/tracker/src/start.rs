@@ -10,6 +10,8 @@ use crate::classifier::ridge::Discriminant;
 use crate::confidence::score::DistanceBaseline;
 use crate::confidence::update_gate::UpdateGate;
 use crate::estimate::{Estimate, Status};
+use crate::expert::opinion::Expert;
+use crate::expert::second_opinion::SecondOpinion;
 use crate::features::extractor::Extractor;
 use crate::image::frame::{Frame, FrameFormat};
 use crate::image::rect::Rect;
@@ -40,6 +42,7 @@ impl State {
         format: FrameFormat,
         target: Rect,
         params: Params,
+        expert: Option<&dyn Expert>,
         workspace: &mut Workspace,
     ) -> Self {
         let source = frame.source_size();
@@ -62,22 +65,35 @@ impl State {
             baseline: DistanceBaseline::default(),
             orientation: 0.0,
             frames_lost: 0,
+            second_opinion: None,
         };
-        state.begin(frame, given(0, target), workspace);
+        state.begin(frame, given(0, target), expert, workspace);
         state
     }
 
     /// Takes `target` (checked) as the box in `frame`, the next one.
-    pub fn retarget(&mut self, frame: &Frame, target: Rect, workspace: &mut Workspace) {
+    pub fn retarget(
+        &mut self,
+        frame: &Frame,
+        target: Rect,
+        expert: Option<&dyn Expert>,
+        workspace: &mut Workspace,
+    ) {
         let number = self.estimate.frame + 1;
         (self.bounds, self.answer) = Self::place(self.source, self.format.size, &target);
         self.orientation = 0.0;
         self.frames_lost = 0;
-        self.begin(frame, given(number, target), workspace);
+        self.begin(frame, given(number, target), expert, workspace);
     }
 
     /// Starts from the answer, which is the box `given` in `frame`. The bag keeps its entries.
-    fn begin(&mut self, frame: &Frame, given: Estimate, workspace: &mut Workspace) {
+    fn begin(
+        &mut self,
+        frame: &Frame,
+        given: Estimate,
+        expert: Option<&dyn Expert>,
+        workspace: &mut Workspace,
+    ) {
         let Workspace { views, scratch } = workspace;
         let image = self.working_view(frame, &mut views.downsampled);
         // All particles are there, with equal weights.
@@ -99,6 +115,8 @@ impl State {
         model.restart(features, &self.params, appearance);
         self.update_gate = UpdateGate::default();
         self.estimate = given;
+        let area = self.bounds.area(&self.answer);
+        self.second_opinion = expert.map(|expert| SecondOpinion::new(expert, frame, &area));
     }
 
     /// Fits the models of the target against its surroundings to a box that the user gave, in frame `number`.

@@ -8,6 +8,7 @@ use crate::classifier::ridge::Discriminant;
 use crate::confidence::score::DistanceBaseline;
 use crate::confidence::update_gate::UpdateGate;
 use crate::estimate::Estimate;
+use crate::expert::second_opinion::SecondOpinion;
 use crate::image::frame::FrameFormat;
 use crate::image::rect::Rect;
 use crate::input;
@@ -51,6 +52,9 @@ pub(crate) struct State {
     pub orientation: f64,
     /// For how many frames nothing has spoken for the box of a lost target, less those in which its particles did.
     pub frames_lost: u32,
+    /// With an expert beside the filter. A snapshot carries it after the rest.
+    #[serde(skip)]
+    pub second_opinion: Option<SecondOpinion>,
 }
 
 impl State {

@@ -5,15 +5,25 @@
 use crate::confidence::score::Evidence;
 use crate::confidence::update_gate;
 use crate::estimate::{Estimate, Status};
+use crate::expert::fusion::Voice;
+use crate::expert::opinion::Expert;
 use crate::image::frame::Frame;
+use crate::input;
 use crate::learn::Localization;
+use crate::motion::particles::Particle;
 use crate::motion::random::{self, Draws};
 use crate::state::State;
 use crate::workspace::Workspace;
 
 impl State {
-    /// Finds the target in `frame`, the next one, and learns from it. Returns also what the score is made of.
-    pub fn step(&mut self, frame: &Frame, workspace: &mut Workspace) -> (Estimate, Evidence) {
+    /// Finds the target in `frame`, the next one, and learns from it. Returns also what the filter's score is made of.
+    /// `expert` is the one that the session began with.
+    pub fn step(
+        &mut self,
+        frame: &Frame,
+        expert: Option<&dyn Expert>,
+        workspace: &mut Workspace,
+    ) -> (Estimate, Evidence) {
         let Workspace { views, scratch } = workspace;
         let number = self.estimate.frame + 1;
         let displacement = self.displacement(frame, scratch);
@@ -38,7 +48,7 @@ impl State {
         let is_lost = self.update_gate.is_lost(
             candidates.score_of(best),
             first_distance,
-            self.estimate.status == Status::Lost,
+            self.was_lost(),
             search.spread,
             &self.params,
         );
@@ -49,7 +59,7 @@ impl State {
             (self.measure_scale(views.rectified, mean, scratch), true)
         };
         let answer = self.bounds.clamp(search.in_frame(rectified));
-        let found = Localization {
+        let mut found = Localization {
             number,
             answer,
             rectified,
@@ -62,19 +72,60 @@ impl State {
             .candidates
             .evidence(best, mean_distance, answer.scale);
         let (score, status, may_learn) = self.judge(number, &evidence, is_lost);
-
-        // (C) Learn: what is remembered of the frame.
-        self.remember(&found, is_lost, is_followed, scratch);
-        if may_learn {
-            self.learn(&views, &found, scratch);
-        }
         self.estimate = Estimate {
             frame: number,
             target: self.target_of(&answer),
             score,
             status,
         };
+        let is_moved = self.consult(expert, frame, &mut found, is_lost);
+
+        // (C) Learn: what is remembered of the frame.
+        self.remember(&found, is_lost, is_followed, scratch);
+        if may_learn && !is_moved {
+            self.learn(&views, &found, scratch);
+        }
         (self.estimate, evidence)
+    }
+
+    /// Whether the filter had lost the target, which its expert may still have seen.
+    fn was_lost(&self) -> bool {
+        match &self.second_opinion {
+            Some(opinion) => opinion.filter_lost,
+            None => self.estimate.status == Status::Lost,
+        }
+    }
+
+    /// Asks `expert` for its opinion of the answer, which is that of the filter until then. Returns whether what was
+    /// `found` is moved to the expert's place.
+    fn consult(
+        &mut self,
+        expert: Option<&dyn Expert>,
+        frame: &Frame,
+        found: &mut Localization,
+        is_lost: bool,
+    ) -> bool {
+        let (Some(expert), Some(opinion)) = (expert, &mut self.second_opinion) else {
+            return false;
+        };
+        let filter = Voice {
+            target: self.bounds.area(&found.answer),
+            score: self.estimate.score,
+        };
+        let consultation = opinion.consult(expert, frame, &filter, is_lost);
+        let (horizontal, vertical) = input::to_working(self.source, self.format.size);
+        self.estimate.target = consultation.target.scaled(1.0 / horizontal, 1.0 / vertical);
+        self.estimate.score = consultation.score;
+        self.estimate.status = Status::of_both(consultation.score, is_lost);
+        if let Some((x, y)) = consultation.moved {
+            let moved = Particle {
+                x,
+                y,
+                ..found.answer
+            };
+            found.answer = self.bounds.clamp(moved);
+        }
+        consultation.moved.is_some()
     }
 
     /// The score and the status of the answer to frame `number`, and whether the frame may be learned from. Updates the

@@ -1,6 +1,7 @@
 //! The tracker of one session, as the rest of the program sees it.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use crate::bag_view::BagEntry;
 use crate::candidates::Candidates;
@@ -8,6 +9,7 @@ use crate::confidence::score::Evidence;
 use crate::diagnostics::Diagnostics;
 use crate::error::TrackerError;
 use crate::estimate::Estimate;
+use crate::expert::opinion::Expert;
 use crate::image::frame::{Frame, FrameFormat};
 use crate::image::rect::Rect;
 use crate::input;
@@ -16,6 +18,9 @@ use crate::snapshot;
 use crate::state::State;
 use crate::workspace;
 
+const NO_PROBABILITY: &str = "a second opinion goes with the preset robust: without a discriminant there is no score \
+    that it could be weighed by";
+
 /// Follows one object.
 ///
 /// An error of any method leaves the tracker as it was.
@@ -23,6 +28,8 @@ use crate::workspace;
 pub struct Tracker {
     state: State,
     evidence: Option<Evidence>,
+    /// There where the state has a second opinion.
+    expert: Option<Arc<dyn Expert>>,
 }
 
 impl Tracker {
@@ -33,17 +40,35 @@ impl Tracker {
     /// finite, has a side below [`MIN_BOX_SIDE`](crate::MIN_BOX_SIDE) pixels (or below one pixel of the
     /// working image) or above four times the frame's longer side, or lies outside the frame.
     pub fn new(frame: &Frame, target: Rect, params: Params) -> Result<Self, TrackerError> {
+        Self::beside(frame, target, params, None)
+    }
+
+    /// As [`new`](Self::new), with an expert beside the filter, which is asked in every frame. Without one this is `new`.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new); also an expert with parameters that take none ([`Params::takes_expert`]), as those of
+    /// [`Preset::Paper`](crate::Preset::Paper).
+    pub fn beside(
+        frame: &Frame,
+        target: Rect,
+        params: Params,
+        expert: Option<Arc<dyn Expert>>,
+    ) -> Result<Self, TrackerError> {
         params.validate()?;
+        if expert.is_some() && !params.takes_expert() {
+            return Err(TrackerError::Expert(NO_PROBABILITY));
+        }
         let source = frame.source_size();
         let mut format = params.frame_format(source, &target);
         input::check_target(source, format.size, &target)?;
         format.has_color &= frame.has_color();
         let frame = frame.in_format(format).ok_or(TrackerError::Reduced)?;
         Ok(workspace::with(|workspace| {
-            let state = State::new(&frame, format, target, params, workspace);
+            let state = State::new(&frame, format, target, params, expert.as_deref(), workspace);
             Self {
                 state,
                 evidence: None,
+                expert,
             }
         }))
     }
@@ -76,7 +101,8 @@ impl Tracker {
     ) -> Result<(Estimate, T), TrackerError> {
         let frame = self.checked(frame)?;
         workspace::with(|workspace| {
-            let (estimate, evidence) = self.state.step(&frame, workspace);
+            let expert = self.expert.as_deref();
+            let (estimate, evidence) = self.state.step(&frame, expert, workspace);
             self.evidence = Some(evidence);
             Ok((estimate, look(&self.state, &workspace.scratch.candidates)))
         })
@@ -90,7 +116,8 @@ impl Tracker {
     pub fn retarget(&mut self, frame: &Frame, target: Rect) -> Result<Estimate, TrackerError> {
         let frame = self.checked(frame)?;
         input::check_target(self.state.source, self.state.format.size, &target)?;
-        workspace::with(|workspace| self.state.retarget(&frame, target, workspace));
+        let expert = self.expert.as_deref();
+        workspace::with(|workspace| self.state.retarget(&frame, target, expert, workspace));
         self.evidence = None;
         Ok(self.state.estimate)
     }
@@ -164,10 +191,24 @@ impl Tracker {
     /// # Errors
     /// Bytes that are not a snapshot of this version, are damaged, or hold a state that no tracker can be in.
     pub fn restore(snapshot: &[u8]) -> Result<Self, TrackerError> {
-        let state = snapshot::read(snapshot)?;
+        Self::restore_beside(snapshot, None)
+    }
+
+    /// As [`restore`](Self::restore), with the expert that the session may have begun with. A session that began without
+    /// one goes on without.
+    ///
+    /// # Errors
+    /// As for [`restore`](Self::restore); also a session that began with another expert, or with one where none is given.
+    pub fn restore_beside(
+        snapshot: &[u8],
+        expert: Option<Arc<dyn Expert>>,
+    ) -> Result<Self, TrackerError> {
+        let state = snapshot::read(snapshot, expert.as_deref())?;
+        let expert = expert.filter(|_| state.second_opinion.is_some());
         Ok(Self {
             state,
             evidence: None,
+            expert,
         })
     }
 }

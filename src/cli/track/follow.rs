@@ -7,10 +7,11 @@ use super::rows::Rows;
 use super::targets::Targets;
 use crate::cli::formats::{Clip, Row};
 use bagtrack_sessions::Selection;
-use bagtrack_tracker::{Params, Rect};
+use bagtrack_tracker::{Expert, Params, Rect};
 use indicatif::ProgressBar;
 use std::error::Error;
 use std::io::{self, ErrorKind};
+use std::sync::Arc;
 
 /// What there is to do.
 pub struct Job {
@@ -20,6 +21,8 @@ pub struct Job {
     pub boxes: Vec<Rect>,
     /// The parameters of all trackers.
     pub params: Params,
+    /// What gives a second opinion, where it is wanted.
+    pub expert: Option<Arc<dyn Expert>>,
     /// Where drawn frames go, if they are wanted.
     pub destination: Option<Destination>,
     /// How many frames are tracked after the first one, at most.
@@ -111,7 +114,12 @@ impl Job {
                 targets
             }
             None => {
-                let started = Targets::start(&frame.bytes, &self.boxes, &self.params);
+                let started = Targets::start(
+                    &frame.bytes,
+                    &self.boxes,
+                    &self.params,
+                    self.expert.as_ref(),
+                );
                 let started = started.map_err(named)?;
                 if let Some(destination) = &self.destination {
                     *drawn = Some(destination.open(self.frames.rate(), frame)?);

@@ -18,7 +18,7 @@ mod video_file;
 mod video_info;
 
 use super::formats::{Columns, Format};
-use bagtrack_cli::{BOXES, ParamFlags, progress, read_boxes};
+use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
 use drawn::Destination;
@@ -66,6 +66,8 @@ pub struct Args {
     keyframes: bool,
     #[command(flatten)]
     params: ParamFlags,
+    #[command(flatten)]
+    model: ModelFlag,
     /// Seed of all random draws: the same seed gives the same boxes.
     #[arg(long)]
     seed: Option<u64>,
@@ -88,6 +90,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     let mut params = args.params.params()?;
     params.seed = args.seed.unwrap_or(params.seed);
     check(&args)?;
+    let expert = args.model.load()?;
     let destination = args.draw.as_deref().map(Destination::of).transpose()?;
     let direction = match args.backwards {
         true => Direction::Backwards,
@@ -115,6 +118,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
         frames,
         boxes,
         params,
+        expert,
         destination,
         rows,
         name: name_of(&args.path),

@@ -2,8 +2,9 @@
 
 use bagtrack_ingest::Limits;
 use bagtrack_sessions::{PerTarget, frame_format, largest_format};
-use bagtrack_tracker::{Estimate, Frame, Params, Rect, Tracker, TrackerError};
+use bagtrack_tracker::{Estimate, Expert, Frame, Params, Rect, Tracker, TrackerError};
 use std::error::Error;
+use std::sync::Arc;
 
 /// A tracker for each target.
 pub struct Targets {
@@ -13,16 +14,22 @@ pub struct Targets {
 
 impl Targets {
     /// Trackers that start with `boxes` in a frame. They are those of a session of the service with these boxes.
-    pub fn start(bytes: &[u8], boxes: &[Rect], params: &Params) -> Result<Self, Box<dyn Error>> {
+    /// `expert` gives a second opinion of each, where there is one.
+    pub fn start(
+        bytes: &[u8],
+        boxes: &[Rect],
+        params: &Params,
+        expert: Option<&Arc<dyn Expert>>,
+    ) -> Result<Self, Box<dyn Error>> {
         let list = PerTarget::List(boxes.to_vec());
         let format = |source| frame_format(params, source, &list);
         let frame = bagtrack_ingest::decode_to(bytes, &Limits::default(), &format)?;
         let start = |(target, given): (usize, &Rect)| {
-            Tracker::new(&frame, *given, params.of_target(target)).map_err(|error| {
-                match boxes.len() {
-                    1 => error.to_string(),
-                    _ => format!("target {target}: {error}"),
-                }
+            let params = params.of_target(target);
+            let tracker = Tracker::beside(&frame, *given, params, expert.cloned());
+            tracker.map_err(|error| match boxes.len() {
+                1 => error.to_string(),
+                _ => format!("target {target}: {error}"),
             })
         };
         let trackers = boxes.iter().enumerate().map(start);

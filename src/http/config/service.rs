@@ -7,6 +7,7 @@ use super::settings::{ConfigError, delay, in_range, moment, origins, permits, po
 use super::store::StoreConfig;
 #[cfg(feature = "tls")]
 use super::tls::TlsConfig;
+use bagtrack_cli::ModelFiles;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::time::Duration;
@@ -54,6 +55,9 @@ settings! {
         /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
         /// commas; `*` for all. Requests of other pages are refused.
         cors_origins: Vec<String> = Vec::new(), |values| origins(values);
+        /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its head.
+        /// Sessions that were opened with one go on with the same one alone.
+        model: Option<ModelFiles> = None, as "nanotrack:BACKBONE,HEAD";
         /// The path of the service on a host that it shares with others, like `/tracker`.
         base_path: BasePath = BasePath::default();
         /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for

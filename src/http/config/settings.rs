@@ -5,6 +5,7 @@
 
 use super::base_path::BasePath;
 use super::flag_values::{parse_duration, parse_listen, parse_network};
+use bagtrack_cli::ModelFiles;
 use bagtrack_sessions::Durability;
 use clap::builder::{BoolishValueParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
@@ -101,6 +102,12 @@ impl Value for PathBuf {
     const NAME: Option<&'static str> = Some("FILE");
     fn parser() -> ValueParser {
         value_parser!(PathBuf)
+    }
+}
+
+impl Value for ModelFiles {
+    fn parser() -> ValueParser {
+        value_parser!(ModelFiles).into()
     }
 }
 

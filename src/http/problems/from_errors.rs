@@ -94,7 +94,11 @@ impl From<StartError> for Problem {
 impl From<SnapshotError> for Problem {
     fn from(error: SnapshotError) -> Self {
         let advice = "Send the bytes of GET /sessions/{id}/snapshot unchanged, to a service with the same keys.";
-        let detail = format!("{error}. {advice}");
+        let detail = match &error {
+            // These bytes are whole: it is this service that cannot go on from them.
+            SnapshotError::Tracker(TrackerError::Expert(reason)) => format!("{reason}."),
+            error => format!("{error}. {advice}"),
+        };
         Self::new(Kind::InvalidSnapshot, detail).caused_by(Arc::new(error))
     }
 }
@@ -195,6 +199,10 @@ impl From<ActError> for Problem {
             ActError::Stopped(error) => error.into(),
             ActError::Panicked(error) => error.into(),
             ActError::TooManySessions(error) => error.into(),
+            ActError::StoredState(SnapshotError::Tracker(TrackerError::Expert(reason))) => {
+                let detail = format!("This replica cannot go on with the session: {reason}.");
+                Self::new(Kind::StoreUnavailable, detail)
+            }
             ActError::StoredState(error) => Self::internal(Arc::new(error)),
         }
     }

@@ -21,6 +21,7 @@ use crate::http::net::handshake::Security;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
+use bagtrack_cli::ModelFiles;
 use bagtrack_sessions::clock::{sleep, timeout};
 use bagtrack_sessions::{Clock, Executor, FileStoreError};
 use std::io::{self, Write};
@@ -58,6 +59,9 @@ pub enum BindError {
     /// The folder of the store cannot be used.
     #[error("{0} (--store, BAGTRACK_STORE)")]
     Store(#[from] FileStoreError),
+    /// The network of the second opinion cannot be used.
+    #[error("{0} (--model, BAGTRACK_MODEL)")]
+    Model(String),
     /// The system gives no threads.
     #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
     Workers(io::Error),
@@ -111,10 +115,13 @@ impl Application {
         let listener = TcpListener::bind(address).await;
         let listener = listener.map_err(|source| BindError::Listen { address, source })?;
         let store = store::connect(&config.store, clock.clone()).await?;
+        let expert = config.model.as_ref().map(ModelFiles::load);
+        let expert = expert.transpose().map_err(BindError::Model)?;
         let executor = Executor::threads(config.worker_count()).map_err(BindError::Workers)?;
         let parts = Parts {
             clock,
             store,
+            expert,
             executor,
         };
         Ok(Self {

@@ -9,6 +9,7 @@ use crate::http::state::AppState;
 use axum::{Extension, Router};
 use bagtrack_sessions::clock::interval;
 use bagtrack_sessions::{Clock, Executor, SessionStore};
+use bagtrack_tracker::Expert;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,6 +21,8 @@ pub struct Parts {
     pub clock: Clock,
     /// What keeps them. The store that the settings name is not looked at.
     pub store: Option<Arc<dyn SessionStore>>,
+    /// What gives a second opinion. The network that the settings name is not looked at.
+    pub expert: Option<Arc<dyn Expert>>,
     /// What decodes and tracks.
     pub executor: Executor,
 }
@@ -46,9 +49,10 @@ impl Service {
         let Parts {
             clock,
             store,
+            expert,
             executor,
         } = parts;
-        let state = AppState::new(config, access, clock, store, executor);
+        let state = AppState::new(config, access, clock, store, expert, executor);
         Self { state }
     }
 

@@ -13,6 +13,7 @@ use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,
     Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
+use bagtrack_tracker::Expert;
 use saturation::Saturation;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -55,12 +56,14 @@ impl std::ops::Deref for AppState {
 }
 
 impl AppState {
-    /// The state of a service with these settings and keys, this clock, and what its work is done by.
+    /// The state of a service with these settings and keys, this clock, and what its work is done by. `expert`
+    /// gives a second opinion in every session.
     pub fn new(
         config: Config,
         access: Access,
         clock: Clock,
         store: Option<Arc<dyn SessionStore>>,
+        expert: Option<Arc<dyn Expert>>,
         executor: Executor,
     ) -> Self {
         let metrics = Metrics::new();
@@ -78,6 +81,7 @@ impl AppState {
             streams: OpenStreams::default(),
             opened: IdempotencyStore::new(2 * (config.max_sessions + config.queue)),
             keys: access.snapshots.clone(),
+            expert,
             tracking: metrics.tracking.clone(),
             queue_wait: metrics.queue_wait.clone(),
             draining: AtomicBool::new(false),

@@ -2,6 +2,7 @@
 
 mod command;
 mod fit_score;
+mod model;
 mod playback;
 mod program;
 mod program_more;

@@ -36,7 +36,7 @@ fn the_default_parameters_hold_the_targets_of_the_eight_videos() {
     let runs = MEASURED.map(|(name, ..)| {
         let folder = Path::new(&root).join(name);
         let sequence = Sequence::load(&folder, &Limits::default()).expect("a whole video");
-        run(&sequence, &preset.params(), seeds, jobs).expect("a box in every first frame")
+        run(&sequence, &preset.params(), None, seeds, jobs).expect("a box in every first frame")
     });
     let report = Report::new(preset, &runs).expect("eight videos");
     println!("{report}");

@@ -100,8 +100,9 @@ impl SessionService {
     async fn decode(&self, record: Record, flow: Flow) -> Result<(SessionState, Record), ActError> {
         let queue = self.admission.enter(flow, Box::new(()))?;
         let max_recent = self.settings.max_frames;
+        let expert = self.expert.clone();
         self.run(queue, move |_| {
-            let state = SessionState::from_stored(&record.state, max_recent);
+            let state = SessionState::from_stored(&record.state, max_recent, expert.as_ref());
             let state = state.map_err(ActError::StoredState)?;
             Ok((state, record))
         })

@@ -4,6 +4,7 @@ use super::idempotency::IdempotencyStore;
 use super::tracking_metrics::TrackingMetrics;
 use crate::streams::OpenStreams;
 use crate::{Admission, MacKeys, Registry, SessionStore};
+use bagtrack_tracker::Expert;
 use metrics::Histogram;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,6 +48,8 @@ pub struct ServiceParts {
     pub opened: IdempotencyStore,
     /// The keys that sign snapshots.
     pub keys: Arc<MacKeys>,
+    /// What gives a second opinion in every session that is opened, where there is one.
+    pub expert: Option<Arc<dyn Expert>>,
     /// What decoding and tracking measure.
     pub tracking: TrackingMetrics,
     /// Time in the queue.

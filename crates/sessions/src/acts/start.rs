@@ -49,10 +49,16 @@ impl Start {
         service: &SessionService,
         meter: &mut WorkMeter,
     ) -> Result<SessionState, OpenError> {
+        let expert = service.expert.as_ref();
         let (file, boxes, params) = match self {
             Self::Snapshot(bytes) => {
                 let max_recent = service.settings.max_frames;
-                return Ok(SessionState::restore(bytes, &service.keys, max_recent)?);
+                return Ok(SessionState::restore(
+                    bytes,
+                    &service.keys,
+                    max_recent,
+                    expert,
+                )?);
             }
             Self::Frame {
                 file,
@@ -73,7 +79,15 @@ impl Start {
             })?;
         }
         let check = || meter.check();
-        let started = SessionState::start(frame, Fingerprint::of(file), boxes, params, check);
+        let started = SessionState::start(
+            frame,
+            Fingerprint::of(file),
+            boxes,
+            params,
+            // Sessions with the paper's equations have none.
+            expert.filter(|_| params.takes_expert()),
+            check,
+        );
         started.map_err(|error| match error {
             crate::StartError::Stopped(stopped) => Stopped::into(stopped),
             error => OpenError::Start {

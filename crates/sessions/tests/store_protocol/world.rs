@@ -107,6 +107,7 @@ impl Replica {
             admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
             streams: OpenStreams::default(),
             opened: IdempotencyStore::new(64),
+            expert: None,
             keys: Arc::new(MacKeys::new("bagtrack tests of stores", &["secret"])),
             tracking: TrackingMetrics {
                 decode: Histogram::noop(),

@@ -30,7 +30,7 @@ const MAX_LOST: f64 = 0.1;
 const HALF_RATIO: f64 = 3.0;
 
 /// Below this score the target counts as uncertain, and (without a discriminant) below the next as lost.
-const UNCERTAIN_BELOW: f64 = 0.5;
+pub(crate) const UNCERTAIN_BELOW: f32 = 0.5;
 const LOST_BELOW: f64 = 0.2;
 
 /// The share of the newest frame in the running mean.
@@ -118,7 +118,7 @@ impl DistanceBaseline {
         let score = ScoreModel::TRACKER.score(&predictors, lost);
         let status = if lost {
             Status::Lost
-        } else if score < UNCERTAIN_BELOW || !near {
+        } else if score < f64::from(UNCERTAIN_BELOW) || !near {
             Status::Uncertain
         } else {
             Status::Tracking
@@ -132,7 +132,7 @@ impl DistanceBaseline {
         let score = 1.0 / (1.0 + ratio * ratio);
         let status = if score < LOST_BELOW {
             Status::Lost
-        } else if score < UNCERTAIN_BELOW {
+        } else if score < f64::from(UNCERTAIN_BELOW) {
             Status::Uncertain
         } else {
             Status::Tracking

@@ -164,6 +164,13 @@ impl Frame {
         &self.luma.pixels
     }
 
+    /// Cb and Cr of Rec. 601 in full range, row by row, in pixels twice as large as those of the luma
+    /// ([`ycbcr::chroma_size`]); none where the frame is gray.
+    pub fn chroma(&self) -> Option<[&[u8]; 2]> {
+        let [cb, cr] = self.chroma.as_ref()?;
+        Some([&cb.pixels, &cr.pixels])
+    }
+
     /// Whether it has chroma.
     pub fn has_color(&self) -> bool {
         self.chroma.is_some()

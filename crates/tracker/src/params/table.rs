@@ -218,6 +218,11 @@ parameters! {
 }
 
 impl Params {
+    /// Whether a tracker may have an expert beside it: its score must be a probability, and its search begin at the answer.
+    pub fn takes_expert(&self) -> bool {
+        self.discriminant_weight > 0.0 && self.search == Search::Answer
+    }
+
     /// How a session sees frames of the size `source` (width and height, above 0) that starts with `target`, a box in
     /// their pixels.
     pub fn frame_format(&self, source: (u32, u32), target: &Rect) -> FrameFormat {

@@ -5,6 +5,7 @@ mod color;
 mod degenerate;
 mod diagnostics;
 mod evaluation;
+mod expert;
 mod flow;
 mod lost;
 mod memory;

@@ -1,0 +1,75 @@
+//! The network of a second opinion, from the command line.
+
+use std::fs;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use bagtrack_siamese::NanoTrack;
+use bagtrack_tracker::Expert;
+
+/// The flag that gives a network.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct ModelFlag {
+    /// A network that gives a second opinion of every frame, as KIND:FILE,FILE. The one kind is `nanotrack`, with the ONNX
+    /// files of its backbone and its head. docs/ACCURACY.md says where they are and what they bring.
+    #[arg(long, value_name = "nanotrack:BACKBONE,HEAD")]
+    model: Option<ModelFiles>,
+}
+
+impl ModelFlag {
+    /// The network; none without the flag.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no such network, as a line of text that names the file.
+    pub fn load(&self) -> Result<Option<Arc<dyn Expert>>, String> {
+        self.model.as_ref().map(ModelFiles::load).transpose()
+    }
+}
+
+/// The files of a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelFiles {
+    backbone: PathBuf,
+    head: PathBuf,
+}
+
+impl FromStr for ModelFiles {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let files = match text.split_once(':') {
+            Some(("nanotrack", files)) => files,
+            Some((kind, _)) => return Err(format!("there is no kind {kind}: there is nanotrack")),
+            None => return Err("it must be nanotrack:BACKBONE,HEAD".to_owned()),
+        };
+        match files.split(',').collect::<Vec<_>>()[..] {
+            [backbone, head] if !backbone.is_empty() && !head.is_empty() => Ok(Self {
+                backbone: backbone.into(),
+                head: head.into(),
+            }),
+            _ => Err(
+                "it must name two files, the backbone and the head, with a comma between"
+                    .to_owned(),
+            ),
+        }
+    }
+}
+
+impl ModelFiles {
+    /// The network in these files.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no such network, as a line of text that names the file.
+    pub fn load(&self) -> Result<Arc<dyn Expert>, String> {
+        let read = |path: &PathBuf| {
+            fs::read(path).map_err(|error| format!("--model: {}: {error}", path.display()))
+        };
+        let (backbone, head) = (read(&self.backbone)?, read(&self.head)?);
+        let network = NanoTrack::from_onnx(&backbone, &head).map_err(|error| {
+            let (backbone, head) = (self.backbone.display(), self.head.display());
+            format!("--model: {backbone} and {head} are no NanoTrack: {error}")
+        })?;
+        Ok(Arc::new(network))
+    }
+}

@@ -1,0 +1,18 @@
+//! Siamese tracking networks as experts beside the tracker: [`NanoTrack`].
+//!
+//! The user gives the network as ONNX files; no weights are part of this crate. What a file may hold is little: the
+//! operations of small convolutional networks over one image (`network`). They run on one thread, on any machine.
+//!
+//! | room | holds |
+//! |---|---|
+//! | `onnx` | the graph in a file |
+//! | `network` | a graph that runs |
+//! | `nanotrack` | a picture cut out of a frame, the network's answer, and what is made of it |
+
+mod error;
+mod nanotrack;
+mod network;
+mod onnx;
+
+pub use error::ModelError;
+pub use nanotrack::tracker::NanoTrack;
