@@ -9,6 +9,7 @@ use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::Config;
 use image::{GrayImage, ImageFormat, Luma};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -471,4 +472,49 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
         .await
         .unwrap();
     assert_eq!(expect(view, StatusCode::OK).await["frames"], frame + 1);
+}
+
+/// Begins requests from this address, none of which ends, until a connection is refused.
+async fn hold_connections(app: &TestApplication, from: IpAddr) -> Vec<RawConnection> {
+    let mut held = Vec::new();
+    loop {
+        let mut connection = RawConnection::open_from(from, app.address).await;
+        let head = "POST /sessions?box=1,1,20,20 HTTP/1.1\r\nHost: localhost\r\nContent-Type: image/png\r\n\
+                    Content-Length: 1000\r\nExpect: 100-continue\r\n\r\n";
+        let _ = connection.try_send(head).await;
+        let answer = connection.read_some().await;
+        if !answer.starts_with("HTTP/1.1 100") {
+            assert!(answer.starts_with("HTTP/1.1 429"), "{answer}");
+            return held;
+        }
+        held.push(connection);
+    }
+}
+
+#[tokio::test]
+async fn the_share_of_connections_shrinks_with_each_address_and_the_next_one_still_gets_one() {
+    let app = TestApplication::start_with(|config| {
+        config.max_connections = 32;
+        config.queue = 256;
+    });
+    let app = app.await;
+    let address = |last: u8| IpAddr::from([127, 0, 1, last]);
+    let mut held = Vec::new();
+    for last in 1..=6 {
+        held.push(hold_connections(&app, address(last)).await);
+    }
+    // Four addresses once had all of them, and nobody else was answered.
+    let counts: Vec<usize> = held.iter().map(Vec::len).collect();
+    assert_eq!(counts, [8, 8, 8, 4, 2, 1]);
+    let mut next = RawConnection::open_from(address(7), app.address).await;
+    let request = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+    next.send(request).await;
+    let answer = next.read_to_end().await;
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    // What is given back may be had again.
+    held[0].clear();
+    let mut later = Vec::new();
+    while later.len() < 4 {
+        later.extend(hold_connections(&app, address(8)).await);
+    }
 }

@@ -28,25 +28,29 @@ pub struct Activity {
     streams: AtomicBool,
     /// Told when the connection is to end.
     pub shed: Notify,
+    /// To tell that the connection has become idle.
+    idle: Arc<Notify>,
 }
 
 impl Activity {
-    /// A new connection is idle.
-    pub fn new() -> Arc<Self> {
+    /// A new connection is idle. `idle` is told each time that it becomes idle again.
+    pub fn new(idle: Arc<Notify>) -> Arc<Self> {
         let activity = Self {
             state: AtomicU8::new(IDLE),
             idle_since: AtomicU64::new(0),
             streams: AtomicBool::new(false),
             shed: Notify::new(),
+            idle,
         };
-        activity.idle();
+        activity.note_idle();
         Arc::new(activity)
     }
 
-    fn idle(&self) {
+    fn note_idle(&self) {
         let now = u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX);
         self.idle_since.store(now, Ordering::Relaxed);
         self.state.store(IDLE, Ordering::Release);
+        self.idle.notify_one();
     }
 
     /// Since when no request has been in progress, from some fixed moment; none while one is. A head that has begun is
@@ -86,7 +90,7 @@ impl Activity {
             Body::new(WatchedBody {
                 body,
                 activity: self.clone(),
-                at_end: Activity::idle,
+                at_end: Activity::note_idle,
                 ended: false,
                 ends_on_drop: true,
             })

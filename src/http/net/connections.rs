@@ -1,13 +1,19 @@
 //! The open connections: how many there are, whose they are, and which one makes room for a new one.
 //!
-//! When all are taken, or all of one address, the one that was idle longest is closed; of several addresses, one of the
-//! address that has most. A connection with a request in progress is never closed for another one.
+//! A client has at most its maximum, and at most as many as are free or idle (a dynamic threshold, as in
+//! [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy connections leave some to each further one. The
+//! IPv6 networks that a client is in may hold as many as one client, and beyond that as many as are free or idle.
+//!
+//! Whoever may have no more loses the one of its own that was idle longest. When all are taken, it is one of the client
+//! that has most. A connection with a request in progress is never closed for another one.
 
 use super::activity::Activity;
 use crate::http::quotas::client::Client;
+use ipnet::Ipv6Net;
 use metrics::Counter;
 use std::cmp::Reverse;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Notify;
@@ -15,7 +21,7 @@ use tokio::sync::Notify;
 /// Why there is no room for a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoRoom {
-    /// All connections of the address are busy.
+    /// All connections that the address may have are busy.
     Address,
     /// All connections are busy.
     All,
@@ -27,8 +33,8 @@ pub struct Connections {
     max: usize,
     max_of_address: usize,
     open: Mutex<Open>,
-    /// Told when one has ended.
-    pub ended: Notify,
+    /// Told when one has ended or has become idle.
+    pub freed: Arc<Notify>,
     /// Counts those that were closed for others.
     shed: Counter,
 }
@@ -37,7 +43,22 @@ pub struct Connections {
 struct Open {
     next: u64,
     connections: HashMap<u64, (Client, Arc<Activity>)>,
-    counts: HashMap<Client, usize>,
+    counts: HashMap<Holder, usize>,
+}
+
+/// Whose connections are counted.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Holder {
+    Client(Client),
+    Network(Ipv6Net),
+}
+
+impl Holder {
+    /// The client, and the networks that it is in.
+    fn all_of(client: &Client) -> impl Iterator<Item = Self> {
+        let networks = client.networks().map(Self::Network);
+        std::iter::once(Self::Client(client.clone())).chain(networks)
+    }
 }
 
 /// A place for a connection, given back when this is dropped.
@@ -56,7 +77,7 @@ impl Connections {
             max,
             max_of_address,
             open: Mutex::default(),
-            ended: Notify::new(),
+            freed: Arc::default(),
             shed,
         })
     }
@@ -72,25 +93,43 @@ impl Connections {
     ) -> Result<ConnectionPermit, NoRoom> {
         let client = Client::at(address);
         let mut open = self.open();
-        let of_address = open.counts.get(&client).copied().unwrap_or(0);
-        if !shared && of_address >= self.max_of_address {
+        let free = self.max.saturating_sub(open.connections.len());
+        let has_share = shared
+            || self.leaves_room(&open, &client, free)
+            || self.leaves_room(&open, &client, free + open.idle());
+        if !has_share {
             let shed = open.shed(|other| *other == client);
             shed.ok_or(NoRoom::Address)?;
             self.shed.increment(1);
-        } else if open.connections.len() >= self.max {
+        } else if free == 0 {
             open.shed(|_| true).ok_or(NoRoom::All)?;
             self.shed.increment(1);
         }
         let number = open.next;
         open.next += 1;
-        let activity = Activity::new();
-        let connection = (client.clone(), activity.clone());
-        open.connections.insert(number, connection);
-        *open.counts.entry(client).or_default() += 1;
+        let activity = Activity::new(self.freed.clone());
+        for holder in Holder::all_of(&client) {
+            *open.counts.entry(holder).or_default() += 1;
+        }
+        open.connections.insert(number, (client, activity.clone()));
         Ok(ConnectionPermit {
             connections: self.clone(),
             number,
             activity,
+        })
+    }
+
+    /// Whether a client may have one more where so many are free.
+    fn leaves_room(&self, open: &Open, client: &Client, free: usize) -> bool {
+        let is_alone = open.count(&Holder::Client(client.clone())) == open.connections.len();
+        Holder::all_of(client).all(|holder| {
+            let most = match holder {
+                // Whoever is alone may have what is left over.
+                Holder::Client(_) if is_alone => self.max_of_address,
+                Holder::Client(_) => self.max_of_address.min(free),
+                Holder::Network(_) => self.max_of_address.max(free),
+            };
+            open.count(&holder) < most
         })
     }
 
@@ -101,6 +140,17 @@ impl Connections {
 }
 
 impl Open {
+    fn count(&self, holder: &Holder) -> usize {
+        self.counts.get(holder).copied().unwrap_or(0)
+    }
+
+    /// How many are idle.
+    fn idle(&self) -> usize {
+        let activities = self.connections.values();
+        let idle = activities.filter(|(_, activity)| activity.idle_since().is_some());
+        idle.count()
+    }
+
     /// Closes an idle connection of those clients, if there is one.
     fn shed(&mut self, of: impl Fn(&Client) -> bool) -> Option<()> {
         let idle = self
@@ -108,7 +158,8 @@ impl Open {
             .iter()
             .filter_map(|(number, (client, activity))| {
                 let since = activity.idle_since().filter(|_| of(client))?;
-                Some((self.counts.get(client), Reverse((since, *number))))
+                let count = self.count(&Holder::Client(client.clone()));
+                Some((count, Reverse((since, *number))))
             });
         let (_, Reverse((_, number))) = idle.max()?;
         self.remove(number)?.shed.notify_one();
@@ -117,10 +168,12 @@ impl Open {
 
     fn remove(&mut self, number: u64) -> Option<Arc<Activity>> {
         let (client, activity) = self.connections.remove(&number)?;
-        if let Some(count) = self.counts.get_mut(&client) {
-            *count -= 1;
-            if *count == 0 {
-                self.counts.remove(&client);
+        for holder in Holder::all_of(&client) {
+            if let Entry::Occupied(mut count) = self.counts.entry(holder) {
+                *count.get_mut() -= 1;
+                if *count.get() == 0 {
+                    count.remove();
+                }
             }
         }
         Some(activity)
@@ -130,7 +183,7 @@ impl Open {
 impl Drop for ConnectionPermit {
     fn drop(&mut self) {
         self.connections.open().remove(self.number);
-        self.connections.ended.notify_one();
+        self.connections.freed.notify_one();
     }
 }
 
@@ -160,8 +213,27 @@ mod tests {
         let _fourth = enter(1).unwrap();
         let _fifth = enter(1).unwrap();
         // Its own idle ones went for them.
-        assert_eq!(connections.open().counts[&Client::at(address(1))], 2);
+        let first = Holder::Client(Client::at(address(1)));
+        assert_eq!(connections.open().count(&first), 2);
         drop(idle);
         assert!(numbers().contains(&busy.number), "a busy one is not closed");
+    }
+
+    #[test]
+    fn the_addresses_of_one_network_share_what_is_free() {
+        let connections = Connections::new(32, 8, Counter::noop());
+        let held: Vec<ConnectionPermit> = (0..100)
+            .filter_map(|number: u16| {
+                let address = IpAddr::from([0x2001, 0xdb8, 1, number, 0, 0, 0, 1]);
+                let permit = connections.enter(address, false).ok()?;
+                let never = futures_util::stream::pending::<Result<Vec<u8>, std::io::Error>>();
+                // Its body never ends, so it is never idle.
+                std::mem::forget(permit.activity.receive(Body::from_stream(never)));
+                Some(permit)
+            })
+            .collect();
+        assert_eq!(held.len(), 16);
+        let other = IpAddr::from([0x2001, 0xdb8, 2, 0, 0, 0, 0, 1]);
+        assert!(connections.enter(other, false).is_ok());
     }
 }

@@ -254,7 +254,7 @@ async fn accept(
         let permit = loop {
             match connections.enter(peer.ip(), is_proxy) {
                 Err(NoRoom::All) => {
-                    let _ = timeout(RETRY, connections.ended.notified()).await;
+                    connections.freed.notified().await;
                 }
                 other => break other,
             }
