@@ -7,8 +7,13 @@ use crate::server::{Process, free_port, wait_for};
 use crate::tracking_client::Track;
 use bagtrack_testing::command::program;
 use reqwest::{Client, StatusCode};
+use rustix::fs::statvfs;
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
+use serde_json::Value;
+use std::fs::File;
+use std::io::Write;
 use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -172,6 +177,62 @@ impl Limited {
         let answer = reqwest::get(format!("http://{}/readyz", self.address)).await;
         answer.expect("it listens").status()
     }
+}
+
+/// A process whose store is on a disk of its own, in memory, which nobody else sees.
+fn on_a_disk_of(megabytes: usize, folder: &Path) -> (Process, SocketAddr) {
+    let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
+    let mut command = Command::new("unshare");
+    command.args(["--map-root-user", "--mount", "sh", "-c"]);
+    command.arg("mount -t tmpfs -o size=$1m none \"$2\" && shift 2 && exec \"$@\"");
+    command.args(["sh", &megabytes.to_string()]).arg(folder);
+    command.arg(program("bagtrack"));
+    command.args(["serve", "--log", "warn", "--listen", &address.to_string()]);
+    let store = format!("file:{}", folder.join("sessions").display());
+    command.args(["--store", &store]).args(SECRET);
+    command.stdout(Stdio::null());
+    let mut process = Process(command.spawn().expect("there is unshare"));
+    wait_for(address, &mut process.0);
+    (process, address)
+}
+
+#[tokio::test]
+async fn on_a_nearly_full_disk_sessions_are_refused_and_frames_are_taken() {
+    let clip = Clip::of(0, 8);
+    let folder = tempfile::tempdir().expect("a folder");
+    let (process, address) = on_a_disk_of(256, folder.path());
+    let base = format!("http://{address}");
+    let mut track = Track::open(base.clone(), Client::new(), 0, clip.clone()).await;
+    // The disk, as the process sees it.
+    let disk = PathBuf::from(format!("/proc/{}/root", process.0.id()));
+    let disk = disk.join(folder.path().strip_prefix("/").unwrap());
+    let mut filler = File::create(disk.join("filler")).unwrap();
+    let is_nearly_full = || {
+        let statistics = statvfs(&disk).unwrap();
+        statistics.f_bavail * 16 < statistics.f_blocks
+    };
+    while !is_nearly_full() {
+        filler.write_all(&vec![7; 1 << 20]).unwrap();
+    }
+    let query = format!("{base}/sessions?box={}", clip.first_box);
+    let open = || async {
+        let request = Client::new().post(&query).body(clip.frames[0].clone());
+        request.send().await.unwrap().status()
+    };
+    assert_eq!(open().await, StatusCode::SERVICE_UNAVAILABLE);
+    while track.advance().await {}
+    let is_ready_as = |status: &'static str| {
+        let url = format!("{base}/readyz");
+        async move {
+            let answer = reqwest::get(url).await.unwrap();
+            assert_eq!(answer.status(), StatusCode::OK);
+            answer.json::<Value>().await.unwrap()["status"] == status
+        }
+    };
+    while !is_ready_as("store-full").await {}
+    filler.set_len(0).unwrap();
+    assert_eq!(open().await, StatusCode::CREATED);
+    while !is_ready_as("ok").await {}
 }
 
 /// The bytes of the journal without the zeros at its end.

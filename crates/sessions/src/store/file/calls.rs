@@ -160,6 +160,10 @@ impl SessionStore for FileStore {
         self.health.is_up.load(Ordering::Acquire)
     }
 
+    fn is_full(&self) -> bool {
+        self.health.is_full.load(Ordering::Relaxed)
+    }
+
     fn failures(&self) -> u64 {
         self.health.failures.load(Ordering::Relaxed)
     }

@@ -23,6 +23,10 @@ const CACHE_BYTES: u64 = 8 << 20;
 const JOURNAL_BYTES: u64 = 64 << 20;
 /// Space is given back when as many bytes of states were dropped.
 const COMPACTED_BYTES: u64 = 8 << 20;
+/// Of a disk's bytes, one of so many has to be free for a further session, and at most [`MAX_RESERVE`] of them: the frames
+/// of the sessions that are there need it, and the tables when they are rewritten.
+const RESERVE: u64 = 10;
+const MAX_RESERVE: u64 = 1 << 30;
 /// Most rows that are dropped in one transaction.
 const SWEPT_ROWS: usize = 1024;
 
@@ -104,6 +108,7 @@ impl Tables {
 
 /// The open database.
 pub(super) struct Database {
+    folder: PathBuf,
     /// Has handles of the others, so it is waited for before they are dropped.
     compaction: Option<JoinHandle<()>>,
     is_closing: Arc<AtomicBool>,
@@ -170,6 +175,7 @@ impl Database {
         // told here when to write tables.
         let options = || KeyspaceCreateOptions::default().max_memtable_size(u64::MAX);
         Ok(Self {
+            folder: folder.to_owned(),
             tables: Tables {
                 rows: inner.keyspace("rows", options)?,
                 states: inner.keyspace("states", options)?,
@@ -185,9 +191,19 @@ impl Database {
         })
     }
 
+    /// Whether the disk is nearly full. One that does not say counts as empty.
+    pub(super) fn is_nearly_full(&self) -> bool {
+        let Ok(disk) = rustix::fs::statvfs(&self.folder) else {
+            return false;
+        };
+        let bytes = |blocks: u64| blocks.saturating_mul(disk.f_frsize);
+        bytes(disk.f_bavail) < (bytes(disk.f_blocks) / RESERVE).min(MAX_RESERVE)
+    }
+
     pub(super) fn begin(&self, now: u64) -> Transaction<'_> {
         Transaction {
             inner: self.inner.write_tx(),
+            database: self,
             tables: &self.tables,
             now,
             promises: false,

@@ -10,6 +10,7 @@
 //! - The last write is torn. The database drops it, and the log says how many bytes.
 //! - The files are damaged. Opening them fails with a text that names the folder, or the one session that is hit is told
 //!   as unreadable. Each block and each write has a checksum.
+//! - The disk is nearly full. Further sessions are refused, so that there is room for the frames of those in it.
 //! - The disk is full, or writing fails otherwise. The calls are answered
 //!   [`StoreUnavailable`](super::session_store::StoreUnavailable), nothing of them counts, and the database is opened
 //!   again until it takes writes.

@@ -2,7 +2,7 @@
 
 use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
-use super::database::Tables;
+use super::database::{Database, Tables};
 use super::row::Row;
 use crate::owner::Owner;
 use fjall::{PersistMode, Readable, SingleWriterWriteTx};
@@ -62,6 +62,7 @@ impl From<Commit<'_>> for OwnedCommit {
 /// nothing. In damaged tables the row and the state of a session may be of different frames: that is found out.
 pub(super) struct Transaction<'a> {
     pub(super) inner: SingleWriterWriteTx<'a>,
+    pub(super) database: &'a Database,
     pub(super) tables: &'a Tables,
     /// Milliseconds since 1970.
     pub(super) now: u64,
@@ -236,6 +237,9 @@ impl Transaction<'_> {
         let incarnation = record.opening.incarnation;
         if self.has_ended(SessionName { id, incarnation })? {
             return Ok(Outcome::Tombstoned);
+        }
+        if self.database.is_nearly_full() {
+            return Ok(Outcome::Full);
         }
         self.put(id, &Row::of(record, self.expiry(record.ttl)));
         self.put_state(id, record.version.frame, &record.state);

@@ -25,6 +25,8 @@ const REOPEN: (Duration, Duration) = (Duration::from_millis(250), Duration::from
 #[derive(Debug, Default)]
 pub(super) struct Health {
     pub(super) is_up: AtomicBool,
+    /// Whether the disk was nearly full when it was looked at last.
+    pub(super) is_full: AtomicBool,
     pub(super) failures: AtomicU64,
 }
 
@@ -234,6 +236,8 @@ impl Writer {
             }
         }
         if begun >= self.sweep_due {
+            let is_full = database.is_nearly_full();
+            self.health.is_full.store(is_full, Ordering::Relaxed);
             let time = self.time.now();
             let swept = catch_unwind(AssertUnwindSafe(|| database.sweep(time)));
             let took = begun.elapsed();
