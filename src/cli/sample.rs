@@ -1,7 +1,7 @@
 //! `bagtrack sample`.
 
 use bagtrack_cli::{output, progress};
-use bagtrack_sample::{Clip, Format, Scene, Settings};
+use bagtrack_sample::{Attributes, Clip, Format, Scene, Settings};
 use std::path::PathBuf;
 
 /// Flags of `sample`.
@@ -26,9 +26,61 @@ pub struct Args {
     /// Chooses the path, the textures and the noise: the same seed draws the same clip.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    attributes: AttributeFlags,
     /// How frames are stored.
     #[arg(long, value_enum, default_value_t = FormatFlag::Jpeg)]
     format: FormatFlag,
+}
+
+/// What makes the clip hard, by the names of the attributes of OTB and UAV123.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "What makes it hard")]
+struct AttributeFlags {
+    /// Factor on both sides of the target, 0.05 to 2.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    low_resolution: f64,
+    /// Factor on the target's speed in the default scene, 0 to 20: 1 is about 4 pixels a frame at 320 x 240.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    fast_motion: f64,
+    /// Share of the time between two frames for which the shutter is open, 0 to 1.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    motion_blur: f64,
+    /// How far the camera shakes from frame to frame, in shorter sides of the frame, 0 to 0.25.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    camera_motion: f64,
+    /// Factor on both sides of the target that is reached in the last frame, 0.1 to 10.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    scale_variation: f64,
+    /// Factor on the target's width that is reached half way, 0.1 to 1, as if it turned out of the plane and back.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    out_of_plane_rotation: f64,
+    /// Degrees a frame by which the target turns, -90 to 90; the true box is the upright one around it.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    in_plane_rotation: f64,
+    /// Objects that look like the target and move behind it, 0 to 8.
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    similar_objects: u32,
+}
+
+impl From<AttributeFlags> for Attributes {
+    fn from(flags: AttributeFlags) -> Self {
+        Self {
+            low_resolution: flags.low_resolution,
+            fast_motion: flags.fast_motion,
+            motion_blur: flags.motion_blur,
+            camera_motion: flags.camera_motion,
+            scale_variation: flags.scale_variation,
+            out_of_plane_rotation: flags.out_of_plane_rotation,
+            in_plane_rotation: flags.in_plane_rotation,
+            similar_objects: flags.similar_objects,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -64,6 +116,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         width: args.width,
         height: args.height,
         seed: args.seed,
+        attributes: args.attributes.into(),
     })?;
     output::new_folder(&args.out)?;
     let bar = progress::bar(u64::from(args.frames), "drawing");

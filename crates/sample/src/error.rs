@@ -12,7 +12,7 @@ pub enum SampleError {
         /// Name of the setting.
         name: &'static str,
         /// The value given.
-        value: u32,
+        value: String,
         /// The range it must be in.
         expected: String,
     },

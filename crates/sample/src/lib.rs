@@ -1,6 +1,7 @@
 //! Synthetic clips with exact ground truth: a textured card moves in front of a textured wall.
 //!
-//! In: [`Settings`], which are the [`Scene`], the number and size of the frames, and a seed. In the default scene the
+//! In: [`Settings`], which are the [`Scene`], the number and size of the frames, a seed, and [`Attributes`] that make the
+//! clip hard: a small, fast, blurred, growing or turning card, a shaken camera, cards that look alike. In the default scene the
 //! card moves in smooth turns, comes nearer, passes through a dim spell and is half covered for a while. In the others
 //! it goes out of sight and comes back. Patches with a pattern like the card's hang on the wall, and every pixel has
 //! sensor noise.
@@ -22,17 +23,20 @@
 //! # Ok::<(), bagtrack_sample::SampleError>(())
 //! ```
 
+mod attributes;
 mod clip;
 mod draw;
 mod error;
 mod folder;
 mod format;
+mod pose;
 mod scene;
 mod settings;
 mod smoothstep;
 mod texture;
 mod timeline;
 
+pub use attributes::Attributes;
 pub use clip::Clip;
 pub use error::SampleError;
 pub use format::Format;

@@ -1,5 +1,6 @@
 //! What a clip is to be, and the ranges of its settings.
 
+use super::attributes::Attributes;
 use super::error::SampleError;
 use super::scene::Scene;
 
@@ -9,7 +10,7 @@ pub const MIN_SIDE: u32 = 64;
 pub const MAX_SIDE: u32 = 4096;
 
 /// What the clip is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// What happens.
     pub scene: Scene,
@@ -21,6 +22,8 @@ pub struct Settings {
     pub height: u32,
     /// Chooses the path, the textures and the noise.
     pub seed: u64,
+    /// What makes it hard.
+    pub attributes: Attributes,
 }
 
 impl Default for Settings {
@@ -31,6 +34,7 @@ impl Default for Settings {
             width: 320,
             height: 240,
             seed: 0,
+            attributes: Attributes::default(),
         }
     }
 }
@@ -38,10 +42,10 @@ impl Default for Settings {
 impl Settings {
     /// Checks every setting against its range.
     pub(super) fn check(&self) -> Result<(), SampleError> {
-        let out_of_range = |name, value, expected| {
+        let out_of_range = |name, value: u32, expected| {
             Err(SampleError::Setting {
                 name,
-                value,
+                value: value.to_string(),
                 expected,
             })
         };
@@ -55,6 +59,6 @@ impl Settings {
                 return out_of_range(name, side, format!("{MIN_SIDE} to {MAX_SIDE} pixels"));
             }
         }
-        Ok(())
+        self.attributes.check()
     }
 }

@@ -5,6 +5,7 @@ mod covered;
 mod default;
 mod leaves;
 
+use super::pose::Pose;
 use super::scene::Scene;
 use super::settings::Settings;
 use bagtrack_tracker::Rect;
@@ -26,11 +27,47 @@ impl Timeline {
         }
     }
 
+    /// The upright box around the card.
     pub(super) fn target(&self, index: u32) -> Rect {
-        match self.course.settings.scene {
+        self.card(index).bounds()
+    }
+
+    /// How the card lies.
+    pub(super) fn card(&self, index: u32) -> Pose {
+        let area = match self.course.settings.scene {
             Scene::Default => default::target(&self.course, index),
             Scene::Covered => self.course.mirrored(covered::target(&self.course, index)),
             Scene::Leaves => self.course.mirrored(leaves::target(&self.course, index)),
+        };
+        self.posed(area, index)
+    }
+
+    /// How the cards lie that look like it.
+    pub(super) fn similar(&self, index: u32) -> impl Iterator<Item = Pose> {
+        let others = 1..=self.course.settings.attributes.similar_objects;
+        others.map(move |number| self.posed(default::on_path(&self.course, index, number), index))
+    }
+
+    /// A card there, as it is turned and as the camera sees it.
+    fn posed(&self, area: Rect, index: u32) -> Pose {
+        let degrees = self.course.settings.attributes.in_plane_rotation * f64::from(index);
+        Pose {
+            angle: degrees.to_radians(),
+            ..Pose::of(self.seen(area, index))
+        }
+    }
+
+    /// How far the camera has moved the picture, in whole pixels to the right and down.
+    pub(super) fn camera(&self, index: u32) -> (i32, i32) {
+        self.course.camera(index)
+    }
+
+    fn seen(&self, area: Rect, index: u32) -> Rect {
+        let (right, down) = self.camera(index);
+        Rect {
+            x: area.x + f64::from(right),
+            y: area.y + f64::from(down),
+            ..area
         }
     }
 
@@ -44,11 +81,12 @@ impl Timeline {
 
     /// What stands before the card.
     pub(super) fn board(&self, index: u32) -> Option<Rect> {
-        match self.course.settings.scene {
+        let board = match self.course.settings.scene {
             Scene::Default => default::board(&self.course, index),
             Scene::Covered => Some(self.course.mirrored(covered::post(&self.course))),
             Scene::Leaves => None,
-        }
+        };
+        Some(self.seen(board?, index))
     }
 
     /// The share of the card that the board covers.

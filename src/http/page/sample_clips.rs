@@ -54,7 +54,7 @@ impl Drawn {
             frames: FRAMES,
             width: SIZE.0,
             height: SIZE.1,
-            seed: 0,
+            ..Settings::default()
         };
         Self {
             name,

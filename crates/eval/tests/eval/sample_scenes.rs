@@ -2,7 +2,7 @@
 //! not.
 
 use bagtrack_cli::read_boxes;
-use bagtrack_sample::{Clip, Format, Scene, Settings};
+use bagtrack_sample::{Attributes, Clip, Format, Scene, Settings};
 use image::RgbImage;
 
 /// More than any two pictures of the same thing differ by through the sensor's noise (2.5 of 255 a channel).
@@ -167,4 +167,116 @@ fn frames_out_of_sight_are_not_annotated_in_the_folder() {
             assert_eq!(seen, "1", "frame {index}");
         }
     }
+}
+
+/// A clip that is hard in this way.
+fn hard(change: impl Fn(&mut Attributes)) -> Clip {
+    let mut settings = Settings {
+        frames: 40,
+        ..Settings::default()
+    };
+    change(&mut settings.attributes);
+    Clip::new(settings).expect("the attributes are in their ranges")
+}
+
+/// The sums of the differences between a picture and itself moved by so many pixels.
+fn misfit(before: &RgbImage, after: &RgbImage, (right, down): (i64, i64)) -> u64 {
+    let (width, height) = before.dimensions();
+    let inside =
+        |x: i64, y: i64| (0..i64::from(width)).contains(&x) && (0..i64::from(height)).contains(&y);
+    let mut sum = 0;
+    for (x, y, pixel) in before.enumerate_pixels() {
+        let (x, y) = (i64::from(x) + right, i64::from(y) + down);
+        if inside(x, y) {
+            let moved = after.get_pixel(x as u32, y as u32);
+            sum += u64::from(pixel.0[1].abs_diff(moved.0[1]));
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_true_box_follows_each_attribute() {
+    let plain = hard(|_| ());
+    let (first, last) = (plain.target(0), plain.target(39));
+    let small = hard(|attributes| attributes.low_resolution = 0.2);
+    assert!((small.target(0).width - 0.2 * first.width).abs() < 1e-9);
+    let fast = hard(|attributes| attributes.fast_motion = 4.0);
+    assert!((fast.target(5).center().0 - plain.target(20).center().0).abs() < 1e-9);
+    let growing = hard(|attributes| attributes.scale_variation = 3.0);
+    assert!((growing.target(0).height - first.height).abs() < 1e-9);
+    assert!((growing.target(39).height - 3.0 * last.height).abs() < 1e-9);
+    let thin = hard(|attributes| attributes.out_of_plane_rotation = 0.3);
+    let aspects = [0, 19, 39].map(|index| thin.target(index).width / thin.target(index).height);
+    assert!(aspects[1] < 0.31 * aspects[0] && (aspects[2] - aspects[0]).abs() < 1e-9);
+    let turning = hard(|attributes| attributes.in_plane_rotation = 9.0);
+    // After ten frames width and height have changed places.
+    let (upright, lying) = (plain.target(10), turning.target(10));
+    assert!(
+        (lying.width - upright.height).abs() < 1e-6 && (lying.height - upright.width).abs() < 1e-6
+    );
+}
+
+#[test]
+fn a_shaken_camera_moves_the_wall_and_the_true_box_by_the_same_pixels() {
+    let (still, shaken) = (
+        hard(|_| ()),
+        hard(|attributes| attributes.camera_motion = 0.05),
+    );
+    let mut moved = 0;
+    for index in [3, 17, 31] {
+        let (from, to) = (still.target(index), shaken.target(index));
+        let offset = (
+            (to.x - from.x).round() as i64,
+            (to.y - from.y).round() as i64,
+        );
+        moved += offset.0.abs() + offset.1.abs();
+        let (before, after) = (still.draw(index), shaken.draw(index));
+        let fits = misfit(&before, &after, offset);
+        for wrong in [
+            (offset.0 + 1, offset.1),
+            (offset.0, offset.1 - 1),
+            (-offset.0, offset.1),
+        ] {
+            if wrong != offset {
+                assert!(
+                    2 * fits < misfit(&before, &after, wrong),
+                    "frame {index}: {wrong:?}"
+                );
+            }
+        }
+    }
+    assert!(moved > 0, "it stands still");
+}
+
+#[test]
+fn a_blurred_card_has_softer_edges_and_a_look_alike_shows_the_same_card_elsewhere() {
+    let fast = |blur: f64| {
+        hard(|attributes| (attributes.fast_motion, attributes.motion_blur) = (6.0, blur))
+    };
+    let contrast = |clip: &Clip| {
+        let (picture, card) = (clip.draw(9), clip.target(9));
+        let (left, top) = (card.x as u32, card.y as u32);
+        let (right, bottom) = (left + card.width as u32, top + card.height as u32);
+        let mut sum = 0u64;
+        for y in top..bottom {
+            for x in left..right {
+                let next = picture.get_pixel(x + 1, y).0[1];
+                sum += u64::from(picture.get_pixel(x, y).0[1].abs_diff(next));
+            }
+        }
+        sum
+    };
+    assert!(contrast(&fast(1.0)) * 10 < contrast(&fast(0.0)) * 7);
+    let (alone, among) = (
+        hard(|_| ()),
+        hard(|attributes| attributes.similar_objects = 2),
+    );
+    let card = alone.target(0).area() as usize;
+    let more = changed(&alone.draw(0), &among.draw(0));
+    assert!(
+        more > card && more < 5 * card / 2,
+        "{more} pixels of {card}"
+    );
+    assert_eq!(alone.target(0), among.target(0));
 }

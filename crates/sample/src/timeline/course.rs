@@ -5,9 +5,12 @@ use crate::smoothstep::smoothstep;
 use bagtrack_tracker::Rect;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
 
 /// Width of the card by its height.
 const ASPECT: f64 = 0.8;
+/// The streams of random numbers of the camera begin here, after those of the sensor's noise.
+const CAMERA: u64 = 1 << 40;
 /// Height of the card by the shorter side of the frame, at the start and at the end.
 const HEIGHT: (f64, f64) = (0.24, 0.36);
 
@@ -49,8 +52,25 @@ impl Course {
     pub(super) fn card(&self, index: u32) -> (f64, f64) {
         let (width, height) = self.size();
         let grown = smoothstep(self.progress(index));
+        let attributes = &self.settings.attributes;
+        // A ratio of sizes grows evenly by its logarithm.
+        let factor = attributes.low_resolution * attributes.scale_variation.powf(grown);
         let card = width.min(height) * (HEIGHT.0 + (HEIGHT.1 - HEIGHT.0) * grown);
-        (card * ASPECT, card)
+        let turned = (PI * self.progress(index)).sin();
+        let aspect = ASPECT * (1.0 - (1.0 - attributes.out_of_plane_rotation) * turned);
+        (factor * card * aspect, factor * card)
+    }
+
+    /// How far the camera has moved the picture in a frame, in whole pixels to the right and down.
+    pub(super) fn camera(&self, index: u32) -> (i32, i32) {
+        let most = self.size().0.min(self.size().1) * self.settings.attributes.camera_motion;
+        if most == 0.0 {
+            return (0, 0);
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        random.set_stream(CAMERA + u64::from(index));
+        let mut offset = || (most * (2.0 * random.random::<f64>() - 1.0)).round() as i32;
+        (offset(), offset())
     }
 
     /// `area` seen in a mirror, left for right, for half of the seeds.

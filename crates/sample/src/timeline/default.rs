@@ -7,13 +7,22 @@ use std::f64::consts::TAU;
 
 /// Frames that the path takes to come back in x and in y: about 4 pixels a frame at 320 x 240.
 const PERIOD: (f64, f64) = (140.0, 97.0);
+/// Of a turn, between two cards that look alike: less than a half by the golden ratio, so that none come together.
+const APART: f64 = 0.381_966_011_250_105;
 /// Shares of the clip's length between which it is dim, and between which the card is half covered.
 const DIM: (f64, f64) = (0.25, 0.48);
 const COVERED: (f64, f64) = (0.58, 0.76);
 
 pub(super) fn target(course: &Course, index: u32) -> Rect {
+    on_path(course, index, 0)
+}
+
+/// The place of the target, or of the card `number` that looks like it.
+pub(super) fn on_path(course: &Course, index: u32, number: u32) -> Rect {
     let ((frame_width, frame_height), (width, height)) = (course.size(), course.card(index));
-    let turn = |period: f64, phase: f64| (TAU * (f64::from(index) / period + phase)).sin();
+    let time = f64::from(index) * course.settings.attributes.fast_motion;
+    let apart = f64::from(number) * APART;
+    let turn = |period: f64, phase: f64| (TAU * (time / period + phase + apart)).sin();
     let center_x = frame_width * (0.5 + 0.3 * turn(PERIOD.0, course.phase.0));
     let center_y = frame_height * (0.5 + 0.2 * turn(PERIOD.1, course.phase.1));
     Rect::centered(center_x, center_y, width, height)
