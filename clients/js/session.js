@@ -302,13 +302,12 @@ export class Session {
         while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1);
         return await call(number);
       } catch (error) {
-        if (!this.canRecover(error, number)) throw error;
+        const next = this.recovery(error, number);
         // Where every replica loses the session again, this ends with the time for retries.
         const pausing = tries === 0 ? 0 : backoff.next();
         if (pausing === undefined) throw error;
         if (pausing > 0) await pause(pausing);
-        if (error.isGone) this.lastAcknowledged = await this.reopen(error);
-        else this.lastAcknowledged = Number(error.expectedFrame) - 1;
+        this.lastAcknowledged = next === undefined ? await this.reopen(/** @type {Problem} */ (error)) : next - 1;
       }
     }
   }
@@ -323,18 +322,23 @@ export class Session {
   }
 
   /**
-   * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
+   * The frame to go on with after an error; undefined: the session is to be opened again. Throws the error where neither
+   * helps.
    * @param {unknown} error
    * @param {number} number The first frame that the call does not need.
-   * @returns {error is Problem}
+   * @returns {number | undefined}
    */
-  canRecover(error, number) {
-    if (!(error instanceof Problem)) return false;
+  recovery(error, number) {
+    if (!(error instanceof Problem)) throw error;
     const { expectedFrame, isGone } = error;
-    if (isGone || expectedFrame === undefined) return isGone;
+    if (isGone) return undefined;
+    if (expectedFrame === undefined) throw error;
     const sent = this.lastAcknowledged + 1;
-    if (expectedFrame < sent) return this.kept.find(expectedFrame) !== undefined;
-    return sent < expectedFrame && expectedFrame <= number;
+    // One that is not kept: a copy of the session older than its origin, such as another replica has.
+    if (expectedFrame < sent) return this.kept.find(expectedFrame) ? expectedFrame : undefined;
+    // The service has frames already that were sent again, the caller's perhaps among them.
+    if (sent < expectedFrame && sent < number) return Math.min(expectedFrame, number);
+    throw error;
   }
 
   /**

@@ -119,9 +119,8 @@ class Session:
                     return reply
                 continue
             problem = ServiceError(reply.status, reply.document)
-            expected = reply.document.get("expected_frame", number)
-            if reply.status not in GONE and not self._has_from(expected, number, until):
-                raise problem
+            # None where the session is to be opened again.
+            go_on_with = None if reply.status in GONE else self._recovery(problem, number, until)
             if not is_first:
                 # Where every replica loses the session again, this ends with the time for retries.
                 pause = backoff.next()
@@ -129,17 +128,24 @@ class Session:
                     raise problem
                 yield Pause(pause)
             is_first = False
-            if reply.status in GONE:
+            if go_on_with is None:
                 yield from self.restore(problem)
             else:
-                self.last_acknowledged = expected - 1
+                self.last_acknowledged = go_on_with - 1
 
-    def _has_from(self, expected: int, number: int, until: int) -> bool:
-        """Whether the client can go on with the frame that the service expects in place of `number`."""
+    def _recovery(self, problem: ServiceError, number: int, until: int) -> Optional[int]:
+        """The frame to go on with after `number` was refused on the way to frame `until`; None: open the session again.
+
+        Raises the problem where neither helps.
+        """
+        expected = problem.document.get("expected_frame", number)
         if expected < number:
-            return expected in self._uploads
-        # The service has frames already that were sent again.
-        return number < expected <= until
+            # One that is not kept: a copy of the session older than its origin, such as another replica has.
+            return expected if expected in self._uploads else None
+        if expected > number and number < until:
+            # The service has frames already that were sent again, the caller's perhaps among them.
+            return min(expected, until)
+        raise problem
 
     def resend_from(self, number: int, problem: ServiceError) -> None:
         """The service has no frames from this one on; it is sent next. Raises the problem where it is not kept."""

@@ -36,8 +36,6 @@ pub struct Caller {
     pub is_quiet: Arc<AtomicBool>,
     /// How long a session lives without a frame.
     pub idle: Duration,
-    /// Whether replicas share a store.
-    pub has_store: bool,
 }
 
 /// A session, as its caller sees it.
@@ -57,9 +55,6 @@ struct Account {
 enum Ended {
     /// It has expired, which may be.
     Expired,
-    /// Without a store, a request to open it that had no answer has left another one with its id at another replica, at
-    /// which the client has come. Known (docs/RELIABILITY.md).
-    Orphan,
     /// It has not, and is gone.
     Lost(String),
 }
@@ -289,11 +284,6 @@ impl Caller {
                     false => Err(Ended::Lost(format!("{problem:?}"))),
                 }
             }
-            ClientError::Refused(problem)
-                if !self.has_store && problem.kind() == "frame-out-of-order" =>
-            {
-                Err(Ended::Orphan)
-            }
             ClientError::Unavailable(_) | ClientError::Transport(_) if !self.is_quiet() => Ok(()),
             error => Err(Ended::Lost(format!("{error:?}"))),
         }
@@ -307,7 +297,6 @@ impl Caller {
         let how = match ended {
             None => "as it should",
             Some(Ended::Expired) => "since it has expired",
-            Some(Ended::Orphan) => "since another one has its id",
             Some(Ended::Lost(_)) => "too early",
         };
         let expected = replay::answers(account.opening, &account.sent);

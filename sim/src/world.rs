@@ -125,7 +125,6 @@ fn callers(
                 journal: journal.clone(),
                 is_quiet: is_quiet.clone(),
                 idle: replica::IDLE,
-                has_store: setup.store.is_some(),
             };
             (name, tokio::spawn(caller.run()))
         })

@@ -26,7 +26,7 @@
 //! | what happens | what a session does |
 //! |---|---|
 //! | the line breaks, or 408, 429, 502, 503, 504 | sends the frame again, for [`ClientBuilder::retry_for`] |
-//! | 409 with `expected_frame` | sends the frames from there on again, as far as they are kept |
+//! | 409 with `expected_frame` | sends the frames from there on again, or opens the session again where they are not kept |
 //! | the session is gone (404, 410) | opens it again from the last snapshot or first frame, sends the frames after it |
 //! | `Draining: true` | takes a snapshot and goes on at the next address, or through the same one |
 //! | any other refusal | [`ClientError::Refused`]; the session is as it was |

@@ -12,6 +12,7 @@ use bagtrack_api::media_types::FRAME;
 use bagtrack_api::{Answer, CreatedSession, FrameAnswers, Parameters, ProblemDocument as Problem};
 use bytes::Bytes;
 use reqwest::Method;
+use std::cmp::Ordering;
 use tokio::time::Instant;
 use uuid::Uuid;
 
@@ -30,6 +31,12 @@ pub struct Remote {
     snapshot_every: u64,
     resent: u64,
     tried_to_move: Option<Instant>,
+}
+
+/// What brings a session back after a refusal.
+enum Recovery {
+    GoOnWith(u64),
+    Reopen,
 }
 
 /// Opens a session; asks until there is an answer.
@@ -132,25 +139,36 @@ impl Remote {
                 }
                 Err(problem) => problem,
             };
-            let expected = problem
-                .expected_frame
-                .filter(|&expected| match expected < next {
-                    true => self.kept.from(expected).is_some(),
-                    // It has frames already that were sent again.
-                    false => next < expected && expected <= number,
-                });
-            if !is_gone(&problem) && expected.is_none() {
+            let Some(recovery) = self.recovery(&problem, next, number) else {
                 return Err(problem.into());
-            }
+            };
             // Where every replica loses the session again, this ends with the time for retries.
             if has_recovered && !backoff.wait(None).await {
                 return Err(problem.into());
             }
             has_recovered = true;
-            match expected {
-                Some(expected) => self.last_acknowledged = expected.saturating_sub(1),
-                None => self.reopen(problem).await?,
+            match recovery {
+                Recovery::GoOnWith(frame) => self.last_acknowledged = frame.saturating_sub(1),
+                Recovery::Reopen => self.reopen(problem).await?,
             }
+        }
+    }
+
+    /// What to do after this answer to frame `next`, sent for the caller's frame `number`.
+    fn recovery(&self, problem: &Problem, next: u64, number: u64) -> Option<Recovery> {
+        if is_gone(problem) {
+            return Some(Recovery::Reopen);
+        }
+        let expected = problem.expected_frame?;
+        match expected.cmp(&next) {
+            Ordering::Less if self.kept.from(expected).is_some() => {
+                Some(Recovery::GoOnWith(expected))
+            }
+            // A copy of the session that is older than its origin, such as another replica has.
+            Ordering::Less => Some(Recovery::Reopen),
+            // It has frames already that were sent again, the caller's perhaps among them.
+            Ordering::Greater if next < number => Some(Recovery::GoOnWith(expected.min(number))),
+            Ordering::Equal | Ordering::Greater => None,
         }
     }
 
