@@ -87,12 +87,14 @@ def test_python(document: str, heading: str, tmp_path: Path) -> None:
 
 
 def test_python_with_a_service(start_server: Callable[..., Server], tmp_path: Path) -> None:
-    run("sample", "--out", tmp_path / "clip", "--frames", 2)
+    # With fewer frames the target moves further from one to the next.
+    run("sample", "--out", tmp_path / "clip", "--frames", 20)
     script = block("docs/QUICKSTART.md", "Python", "python", at=1)
     assert ADDRESS in script
     script = script.replace(ADDRESS, start_server().url)
     finished = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
-    assert finished.stdout.startswith("(True, (43."), finished.stdout + finished.stderr
+    found = re.fullmatch(r"\(True, \(([\d.]+), .*\)\)\n", finished.stdout)
+    assert found and abs(float(found[1]) - 43) < 5, finished.stdout + finished.stderr
 
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="there is no openssl")
