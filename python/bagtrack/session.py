@@ -138,7 +138,7 @@ class Session:
 
         Raises the problem where neither helps.
         """
-        expected = problem.document.get("expected_frame", number)
+        expected = int(problem.problem.get("expected_frame", number))
         if expected < number:
             # One that is not kept: a copy of the session older than its origin, such as another replica has.
             return expected if expected in self._uploads else None
