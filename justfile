@@ -16,6 +16,10 @@ build:
 test *filter:
     cargo test {{filter}}
 
+# Locks and threads of sessions, in orders that shuttle chooses.
+interleavings:
+    cargo test --package bagtrack-sessions --features shuttle --lib interleavings --target-dir target/shuttle
+
 # Everything that is checked before a change lands.
 ci:
     .ci/run

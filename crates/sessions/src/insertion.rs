@@ -8,6 +8,7 @@ use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
 use super::session::Session;
 use super::state::SessionState;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
@@ -99,8 +100,11 @@ impl Registry {
         let count = oldest.len().div_ceil(EVICTED);
         oldest.sort_unstable();
         for (_, id) in oldest.into_iter().take(count) {
-            // What is freed is freed after the lock.
-            let _evicted = self.map().remove(&id);
+            // It may be in use by now, or another session may have its id. What is freed is freed after the lock.
+            let _evicted = match self.map().entry(id) {
+                Entry::Occupied(entry) if idle(&entry.get()) => Some(entry.remove()),
+                _ => None,
+            };
         }
     }
 }

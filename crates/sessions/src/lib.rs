@@ -25,6 +25,8 @@ pub mod clock;
 mod compression;
 mod expired;
 mod insertion;
+#[cfg(all(test, feature = "shuttle"))]
+mod interleavings;
 mod lease;
 mod mac;
 mod new_session;
@@ -44,6 +46,7 @@ mod snapshot;
 mod state;
 mod store;
 mod streams;
+mod sync;
 mod targets;
 
 pub use acts::{

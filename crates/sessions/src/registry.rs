@@ -6,9 +6,11 @@ use super::lease::Lease;
 use super::owner::Owner;
 use super::scheduler::budget::Budget;
 use super::session::Session;
+use super::store::SessionName;
+use super::sync::{Mutex, MutexGuard, PoisonError};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::SystemTime;
 use uuid::Uuid;
 
@@ -128,9 +130,12 @@ impl Registry {
     }
 
     /// Ends a session. Work that has begun on it still gets its answer; requests that wait for it do not. False if
-    /// there is no such session.
-    pub fn remove(&self, id: Uuid) -> bool {
-        let removed = self.map().remove(&id);
+    /// there is no such session: another one that has its id by now stays.
+    pub fn remove(&self, name: SessionName) -> bool {
+        let removed = match self.map().entry(name.id) {
+            Entry::Occupied(entry) if entry.get().name() == name => Some(entry.remove()),
+            _ => None,
+        };
         let Some(session) = removed else { return false };
         let live = !self.has_ended(&session);
         session.close();
@@ -178,8 +183,9 @@ impl Registry {
     }
 
     pub(super) fn has_ended(&self, session: &Session) -> bool {
-        let expired = self.clock.now() >= session.expires();
-        session.is_closed() || (expired && !session.is_busy())
+        // Whoever was at it has renewed it before going, so whether it has expired is looked at last.
+        let is_busy = session.is_busy();
+        session.is_closed() || (!is_busy && self.clock.now() >= session.expires())
     }
 
     /// Closes a session that has ended and is no longer in the map.
@@ -248,7 +254,7 @@ mod tests {
     }
 
     /// A session in a new registry, which notes whether the map's lock was free when the session was freed.
-    fn watched() -> (Arc<Registry>, Clock, Uuid, mpsc::Receiver<bool>) {
+    fn watched() -> (Arc<Registry>, Clock, SessionName, mpsc::Receiver<bool>) {
         let clock = Clock::default();
         let registry = Arc::new(Registry::new(9, 9, LEASE, clock.clone()));
         let session = insert(&registry);
@@ -256,22 +262,22 @@ mod tests {
         let map = registry.clone();
         let probe = move || freed.send(map.sessions.try_lock().is_ok()).unwrap();
         *session.on_drop.lock().unwrap() = Some(Box::new(probe));
-        (registry, clock, session.id(), was_free)
+        (registry, clock, session.name(), was_free)
     }
 
     #[test]
     fn no_session_is_freed_under_the_lock_of_the_map() {
-        let (registry, clock, id, was_free) = watched();
+        let (registry, clock, SessionName { id, .. }, was_free) = watched();
         clock.advance(IDLE);
         let owner = Owner::default();
         assert_eq!(registry.find(id, &owner).unwrap_err(), NoSession::Expired);
         assert_eq!(was_free.try_recv(), Ok(true), "when it is looked up");
 
-        let (registry, _, id, was_free) = watched();
-        assert!(registry.remove(id));
+        let (registry, _, name, was_free) = watched();
+        assert!(registry.remove(name));
         assert_eq!(was_free.try_recv(), Ok(true), "when it is removed");
 
-        let (registry, clock, id, was_free) = watched();
+        let (registry, clock, SessionName { id, .. }, was_free) = watched();
         clock.advance(IDLE);
         assert_eq!(registry.sweep(), 1);
         assert_eq!(was_free.try_recv(), Ok(true), "when it is swept");

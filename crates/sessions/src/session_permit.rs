@@ -7,9 +7,9 @@
 use super::session::Session;
 use super::state::SessionState;
 use super::store::Version;
+use super::sync::atomic::Ordering;
 use crate::clock::timeout;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::sync::{OwnedMutexGuard, OwnedSemaphorePermit};
 

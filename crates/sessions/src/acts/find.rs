@@ -149,7 +149,10 @@ impl SessionService {
                 self.registry.forget(session);
                 return Ok(false);
             }
+            // It may have left memory meanwhile.
+            self.registry.remove(session.name());
+            return Ok(true);
         }
-        Ok(self.registry.remove(session.id()))
+        Ok(self.registry.remove(session.name()))
     }
 }

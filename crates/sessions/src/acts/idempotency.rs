@@ -5,8 +5,9 @@
 //! are served one after the other. Problems are not stored: the request can be sent again after them.
 
 use crate::Owner;
+use crate::sync::{Mutex, MutexGuard, PoisonError};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use tokio::sync::Mutex as AsyncMutex;
 use uuid::Uuid;
 

@@ -11,10 +11,11 @@ use super::flows::Flow;
 use super::places::Places;
 use super::queue_permit::{QueuePermit, Reservation, Ticket};
 use crate::planted::PlantedFault;
+use crate::sync::{Mutex, PoisonError};
 use std::any::Any;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
 
@@ -69,7 +70,7 @@ fn take<W>(waiting: &Mutex<Option<W>>) -> Option<W> {
 #[derive(Debug, Clone)]
 pub struct Admission {
     queue: Arc<Places>,
-    workers: FairQueue,
+    pub(super) workers: FairQueue,
     executor: Executor,
 }
 

@@ -4,8 +4,8 @@
 //! So each further client finds half of what those before it left, and no number of greedy ones takes all. The networks
 //! that a client is in may hold no more than is free either, so that many addresses of one network are no many shares.
 
+use crate::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Something of which so many may be held at the same time. Clones are the same budget.
 #[derive(Debug, Clone)]

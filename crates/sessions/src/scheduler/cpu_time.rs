@@ -22,7 +22,7 @@ impl CpuClock {
 }
 
 /// Processor time of this thread since some fixed moment.
-#[cfg(unix)]
+#[cfg(all(unix, not(feature = "shuttle")))]
 fn thread_cpu_time() -> Duration {
     use rustix::time::{ClockId, clock_gettime};
     let time = clock_gettime(ClockId::ThreadCPUTime);
@@ -32,10 +32,22 @@ fn thread_cpu_time() -> Duration {
 }
 
 /// Elsewhere the time of day stands in for it.
-#[cfg(not(unix))]
+#[cfg(all(not(unix), not(feature = "shuttle")))]
 fn thread_cpu_time() -> Duration {
     use crate::clock::{self, Instant};
     use std::sync::OnceLock;
     static START: OnceLock<Instant> = OnceLock::new();
     START.get_or_init(clock::now).elapsed()
+}
+
+/// Where a test chooses the order of threads, it chooses what they take too: some milliseconds between two questions.
+#[cfg(feature = "shuttle")]
+fn thread_cpu_time() -> Duration {
+    use shuttle::rand::{Rng, thread_rng};
+    use std::cell::Cell;
+    thread_local! {
+        static TAKEN: Cell<u64> = const { Cell::new(0) };
+    }
+    TAKEN.set(TAKEN.get() + thread_rng().gen_range(0..8));
+    Duration::from_millis(TAKEN.get())
 }

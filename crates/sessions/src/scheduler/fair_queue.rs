@@ -14,8 +14,9 @@
 
 use super::cpu_time::CpuClock;
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
+use crate::sync::{self, Mutex, MutexGuard, PoisonError};
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
 
@@ -188,7 +189,7 @@ impl FairQueue {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Flows<Give>> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Flows<Give>> {
         // Nothing panics while it is held.
         self.flows.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -253,7 +254,7 @@ impl WorkerSlot {
         };
         // Its worker was handed on.
         self.queue = None;
-        let turn = given.blocking_recv();
+        let turn = sync::wait_for(given);
         *self = turn.expect("every flow with requests is served in the end");
         self.begin();
     }

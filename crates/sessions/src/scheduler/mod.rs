@@ -15,6 +15,8 @@ mod cpu_time;
 pub(crate) mod executor;
 pub(crate) mod fair_queue;
 pub(crate) mod flows;
+#[cfg(all(test, feature = "shuttle"))]
+mod interleavings;
 mod places;
 pub(crate) mod queue_permit;
 pub(crate) mod work_limit;

@@ -4,8 +4,9 @@
 //! So some clients with all the requests that they may have in flight do not close the service to the others.
 
 use super::flows::Flow;
+use crate::sync::{Mutex, MutexGuard, PoisonError};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// The places in the queue, and how many of them each client has.

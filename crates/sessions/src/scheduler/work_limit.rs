@@ -6,8 +6,8 @@
 use super::cpu_time::CpuClock;
 use super::fair_queue::WorkerSlot;
 use crate::clock::{self, Instant};
+use crate::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Why work was stopped. What it had done was undone.

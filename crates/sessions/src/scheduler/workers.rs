@@ -4,8 +4,9 @@
 //! last: its buffers are most likely still in the caches of its core.
 
 use super::executor::{AfterWork, Work};
+use crate::sync::{Condvar, Mutex, MutexGuard, PoisonError, thread};
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::{fmt, io};
 
 /// The threads. When this is dropped each ends after its current job, once no job waits.
@@ -32,7 +33,7 @@ impl Workers {
         let workers = Self(Arc::default());
         for _ in 0..threads {
             let shared = workers.0.clone();
-            let thread = std::thread::Builder::new().name("bagtrack-worker".to_owned());
+            let thread = thread::Builder::new().name("bagtrack-worker".to_owned());
             thread.spawn(move || shared.serve(niceness))?;
         }
         Ok(workers)
@@ -105,7 +106,9 @@ impl Shared {
 /// Lowers the priority of this thread. Elsewhere than in Linux it would be that of the process.
 #[cfg(target_os = "linux")]
 fn lower_priority(niceness: i32) {
+    // With the feature all threads are the test's.
     if niceness > 0
+        && cfg!(not(feature = "shuttle"))
         && let Err(error) = rustix::process::nice(niceness)
     {
         tracing::warn!(%error, "slow work has the priority of quick work");
