@@ -6,6 +6,7 @@ import pathlib
 import time
 
 import axe_playwright_python
+from playwright.sync_api import TimeoutError
 
 AXE = next(pathlib.Path(axe_playwright_python.__file__).parent.rglob("axe.min.js")).read_text()
 FRAMES_A_SECOND = 25
@@ -133,6 +134,18 @@ def saved(page, button):
 
 def rows(page):
     return list(csv.DictReader(io.StringIO(saved(page, "#save-csv").decode())))
+
+
+def kept_rows(page):
+    """The rows, once the browser keeps them. The frame that was under way when the run was stopped may come late."""
+    for _ in range(6):
+        found = rows(page)
+        try:
+            page.locator("#kept-text").filter(has_text=f", {len(found)} rows").wait_for(timeout=5000)
+            return found
+        except TimeoutError:
+            pass
+    raise AssertionError(f"of {len(found)} rows the page says: {page.locator('#kept-text').text_content()}")
 
 
 def numbers(row):

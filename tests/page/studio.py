@@ -6,7 +6,20 @@ import re
 import xml.etree.ElementTree
 import zipfile
 
-from browser import FRAMES_A_SECOND, begin_at, choose, drag, frames, near, numbers, rows, said, saved, to_the_end
+from browser import (
+    FRAMES_A_SECOND,
+    begin_at,
+    choose,
+    drag,
+    frames,
+    kept_rows,
+    near,
+    numbers,
+    rows,
+    said,
+    saved,
+    to_the_end,
+)
 from service import Service
 
 CORRECTED = 100
@@ -156,7 +169,7 @@ def tracked_backwards(checks):
     drag(page, truth[KEY])
     frames(page, 10)
     page.locator("#stop").click()
-    before = rows(page)
+    before = kept_rows(page)
     page.locator("#timeline").focus()
     page.keyboard.press("Home")
     shown(page, KEY)
@@ -180,7 +193,7 @@ def saved_to_the_service(checks):
         drag(page, checks.clips["card"]["truth"][0])
         frames(page, 20)
         page.locator("#stop").click()
-        table = rows(page)
+        table = kept_rows(page)
         page.locator("#hand-over").click()
         said(page, says)
         session = page.locator("#handed a").get_attribute("href")
