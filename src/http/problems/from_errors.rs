@@ -203,6 +203,13 @@ impl From<ActError> for Problem {
                 let detail = format!("This replica cannot go on with the session: {reason}.");
                 Self::new(Kind::StoreUnavailable, detail)
             }
+            // Another version of the program has it.
+            ActError::StoredState(
+                error @ (SnapshotError::Version(_) | SnapshotError::Tracker(_)),
+            ) => {
+                let detail = format!("This replica cannot read the session's state: {error}.");
+                Self::new(Kind::StoreUnavailable, detail)
+            }
             ActError::StoredState(error) => Self::internal(Arc::new(error)),
         }
     }

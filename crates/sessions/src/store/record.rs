@@ -87,8 +87,13 @@ struct Head {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum UnreadableRecord {
     /// Another version wrote it: replicas of that version, which run meanwhile, can read it.
-    #[error("the record has format {0}, and this service reads {HEAD_FORMAT}")]
-    Format(u8),
+    #[error("the record has format {found}, and this service reads {read}")]
+    Format {
+        /// That of the record.
+        found: u8,
+        /// The one that this version reads.
+        read: u8,
+    },
     /// It is damaged.
     #[error("the record is damaged")]
     Damaged,
@@ -124,7 +129,10 @@ impl Record {
             Some((&HEAD_FORMAT, content)) => {
                 postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)?
             }
-            Some((&other, _)) => return Err(UnreadableRecord::Format(other)),
+            Some((&found, _)) => {
+                let read = HEAD_FORMAT;
+                return Err(UnreadableRecord::Format { found, read });
+            }
             None => return Err(UnreadableRecord::Damaged),
         };
         Ok(Self {
@@ -180,9 +188,13 @@ pub(crate) mod tests {
         let head = written.head();
         assert_eq!(read(&head), Ok(written.clone()));
         // Before records had a format they began with whether there is an owner.
-        assert_eq!(read(&head[1..]), Err(UnreadableRecord::Format(1)));
+        let format = |found| UnreadableRecord::Format {
+            found,
+            read: HEAD_FORMAT,
+        };
+        assert_eq!(read(&head[1..]), Err(format(1)));
         let newer = [&[HEAD_FORMAT + 1], &head[1..]].concat();
-        assert_eq!(read(&newer), Err(UnreadableRecord::Format(HEAD_FORMAT + 1)));
+        assert_eq!(read(&newer), Err(format(HEAD_FORMAT + 1)));
         let cut = &head[..head.len() - 3];
         assert_eq!(read(cut), Err(UnreadableRecord::Damaged));
         assert_eq!(read(&[]), Err(UnreadableRecord::Damaged));

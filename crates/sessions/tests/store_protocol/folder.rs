@@ -107,7 +107,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-fn copy(from: &Path) -> TempDir {
+pub fn copy(from: &Path) -> TempDir {
     let to = tempfile::tempdir().unwrap();
     for file in files(from) {
         let target = to.path().join(file.strip_prefix(from).unwrap());

@@ -4,6 +4,7 @@
 //! delays, drops, repeats and forgets.
 
 mod folder;
+mod formats;
 mod hostile;
 mod memory;
 mod pictures;

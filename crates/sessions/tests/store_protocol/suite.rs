@@ -213,13 +213,13 @@ async fn the_store_in_memory_keeps_to_the_rules() {
 }
 
 /// A Redis that ends with the test.
-struct Redis {
+pub struct Redis {
     process: Child,
-    port: u16,
+    pub port: u16,
 }
 
 impl Redis {
-    fn start() -> Self {
+    pub fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let port = listener.local_addr().expect("it is bound").port();
         drop(listener);

@@ -6,7 +6,7 @@ use bagtrack_sessions::{
     ActError, Admission, Boxes, Clock, CreationKey, Estimates, Flow, FrameBatch, FramesError,
     IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Owner, Registry,
     ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
-    Start, StoreShare, StreamPlace, TrackingMetrics,
+    SessionStore, Start, StoreShare, StreamPlace, TrackingMetrics,
 };
 use metrics::{Counter, Histogram};
 use std::sync::atomic::AtomicBool;
@@ -57,8 +57,13 @@ pub enum Answer {
     Nothing(String),
 }
 
+/// The keys of snapshots.
+pub fn keys() -> MacKeys {
+    MacKeys::new("bagtrack tests of stores", &["secret"])
+}
+
 #[derive(Debug)]
-struct NoQuota;
+pub struct NoQuota;
 
 impl SessionQuota for NoQuota {
     fn check(&self) -> Result<(), OpenError> {
@@ -86,42 +91,46 @@ pub struct Replica {
     pub stream: Option<Arc<StreamPlace>>,
 }
 
+/// A replica with this store, if any.
+pub fn service(store: Option<Arc<dyn SessionStore>>, store_every: u64) -> SessionService {
+    let lease = Lease {
+        first: LONG,
+        idle: LONG,
+    };
+    let counter = Counter::noop;
+    SessionService::new(ServiceParts {
+        settings: ServiceSettings {
+            work_timeout: LONG,
+            max_request_cpu: LONG,
+            frame: bagtrack_ingest::Limits::default(),
+            max_request_pixels: u64::MAX,
+            max_frames: 64,
+            store_every,
+        },
+        registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
+        store,
+        admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
+        streams: OpenStreams::default(),
+        opened: IdempotencyStore::new(64),
+        expert: None,
+        keys: Arc::new(keys()),
+        tracking: TrackingMetrics {
+            decode: Histogram::noop(),
+            step: Histogram::noop(),
+            tracking: counter(),
+            uncertain: counter(),
+            lost: counter(),
+            losses: counter(),
+        },
+        queue_wait: Histogram::noop(),
+        draining: AtomicBool::new(false),
+    })
+}
+
 impl Replica {
     pub fn new(store: &HostileStore, store_every: u64) -> Self {
-        let lease = Lease {
-            first: LONG,
-            idle: LONG,
-        };
-        let counter = Counter::noop;
-        let service = SessionService::new(ServiceParts {
-            settings: ServiceSettings {
-                work_timeout: LONG,
-                max_request_cpu: LONG,
-                frame: bagtrack_ingest::Limits::default(),
-                max_request_pixels: u64::MAX,
-                max_frames: 64,
-                store_every,
-            },
-            registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
-            store: Some(Arc::new(store.clone())),
-            admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
-            streams: OpenStreams::default(),
-            opened: IdempotencyStore::new(64),
-            expert: None,
-            keys: Arc::new(MacKeys::new("bagtrack tests of stores", &["secret"])),
-            tracking: TrackingMetrics {
-                decode: Histogram::noop(),
-                step: Histogram::noop(),
-                tracking: counter(),
-                uncertain: counter(),
-                lost: counter(),
-                losses: counter(),
-            },
-            queue_wait: Histogram::noop(),
-            draining: AtomicBool::new(false),
-        });
         Self {
-            service,
+            service: service(Some(Arc::new(store.clone())), store_every),
             job: None,
             opens: false,
             stream: None,

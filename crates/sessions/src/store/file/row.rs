@@ -62,7 +62,10 @@ impl Row {
             Some((&FORMAT, content)) => {
                 postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)
             }
-            Some((&other, _)) => Err(UnreadableRecord::Format(other)),
+            Some((&found, _)) => Err(UnreadableRecord::Format {
+                found,
+                read: FORMAT,
+            }),
             None => Err(UnreadableRecord::Damaged),
         }
     }

@@ -29,7 +29,7 @@ impl Fault {
         match self {
             Self::Database(fjall::Error::Io(_))
             | Self::Database(fjall::Error::Storage(fjall::LsmError::Io(_)))
-            | Self::Record(UnreadableRecord::Format(_)) => false,
+            | Self::Record(UnreadableRecord::Format { .. }) => false,
             Self::Database(_) | Self::Record(UnreadableRecord::Damaged) => true,
         }
     }
