@@ -72,12 +72,3 @@ fn print_target(file: &str, bytes: &[u8], target: Rect) {
         times[1] * 1e3
     );
 }
-
-/// Decodes `file` `count` times.
-pub fn repeat(count: usize, file: &str) {
-    let bytes = read(file);
-    for _ in 0..count {
-        let frame = bagtrack_ingest::decode(black_box(&bytes), &Limits::default());
-        bagtrack_ingest::recycle(black_box(decoded(frame, file)));
-    }
-}

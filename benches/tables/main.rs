@@ -6,7 +6,6 @@
 //! - `decode FILE...`: decoding each file against a step;
 //! - `forms`: processor time of a multipart form that comes in pieces of four bytes, against its size;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers;
-//! - `repeat step PRESET COUNT`, `repeat decode COUNT FILE`: nothing but the work, for callgrind.
 
 mod decode;
 mod fit;
@@ -47,15 +46,10 @@ fn main() {
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
-        ["repeat", "step", "paper", count] => repeat_step(Preset::Paper, number(count)),
-        ["repeat", "step", "robust", count] => repeat_step(Preset::Robust, number(count)),
-        ["repeat", "decode", count, file] => decode::repeat(number(count), file),
         // `cargo bench` and `cargo test --benches` start it without a table.
         [] => ratios::print(),
         _ => {
-            eprintln!(
-                "tables: ratios | growth | forms | decode FILE... | memory PRESET COUNT | repeat step PRESET COUNT | repeat decode COUNT FILE"
-            );
+            eprintln!("tables: ratios | growth | forms | decode FILE... | memory PRESET COUNT");
             std::process::exit(2);
         }
     }
@@ -66,14 +60,4 @@ fn number(argument: &str) -> usize {
         eprintln!("tables: {argument}: {error}");
         std::process::exit(2);
     })
-}
-
-fn repeat_step(preset: Preset, count: usize) {
-    let (mut tracker, frames) = warm(preset.params());
-    for t in 1..=count {
-        tracker
-            .step(&frames[t % scene::ROUND])
-            .expect("frames of one size");
-    }
-    println!("{:?}", tracker.estimate().target);
 }
