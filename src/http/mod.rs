@@ -27,7 +27,6 @@ mod config;
 mod extract;
 mod metrics;
 mod middleware;
-mod net;
 mod openapi;
 mod page;
 mod problems;
@@ -42,6 +41,8 @@ pub use auth::access::AccessError;
 pub use auth::keys::{ApiKeys, KeysError};
 pub use bagtrack_api::ProblemKind;
 pub use bagtrack_api::media_types::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
+#[cfg(feature = "tls")]
+pub use bagtrack_net::{Certificate, CertificateError};
 pub use config::access::AccessConfig;
 pub use config::base_path::{BasePath, BasePathError};
 pub use config::flag_values::{parse_duration, parse_listen};
@@ -54,8 +55,6 @@ pub use config::store::StoreConfig;
 pub use config::tls::TlsConfig;
 #[cfg(fuzzing)]
 pub use middleware::forwarded::address as forwarded_address;
-#[cfg(feature = "tls")]
-pub use net::certificate::{Certificate, CertificateError};
 pub use quotas::client::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, BindError, Shutdown};

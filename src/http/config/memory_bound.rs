@@ -3,6 +3,8 @@
 use super::limits::OFF;
 use super::service::Config;
 use bagtrack_ingest::video::MAX_DECODER_MEMORY;
+#[cfg(feature = "tls")]
+use bagtrack_net::MAX_UNSENT_BYTES;
 use bagtrack_sessions::{MAX_LIST_BYTES, threads_of};
 use bagtrack_tracker::MAX_WORKING_SIDE;
 
@@ -17,9 +19,6 @@ const WORKER: u64 = 64 << 20;
 const WORKING_IMAGE: u64 = MAX_WORKING_SIDE as u64 * MAX_WORKING_SIDE as u64 * 3 / 2;
 /// A connection's tasks, beside its two buffers.
 const CONNECTION: u64 = 16 << 10;
-/// Most bytes of a connection that wait to be sent, encrypted.
-#[cfg(feature = "tls")]
-pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 /// What TLS keeps of a connection: what waits to be sent, a handshake message that is not whole, and a record's text.
 #[cfg(feature = "tls")]
 const TLS_CONNECTION: u64 = MAX_UNSENT_BYTES as u64 + (64 << 10) + (32 << 10);

@@ -2,8 +2,8 @@
 //! until the deadline of the body.
 
 use crate::http::config::service::Config;
-use crate::http::net::least_rate::LeastRate;
 use axum::body::{Body, Bytes};
+use bagtrack_net::LeastRate;
 use bagtrack_sessions::Charge;
 use futures_util::{StreamExt, stream};
 use std::task::{Poll, ready};

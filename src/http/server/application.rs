@@ -1,7 +1,7 @@
 //! Accepting connections, and ending.
 //!
 //! `axum::serve` has no time limit for request heads: a client that sends half a line holds its connection for ever.
-//! hyper's connection builder has one. Connections are [counted](super::connections), too. On shutdown, busy ones get a
+//! hyper's connection builder has one. Connections are [counted](Connections), too. On shutdown, busy ones get a
 //! bounded time to end.
 
 use super::connection_service::ConnectionService;
@@ -12,16 +12,16 @@ use crate::http::auth::keys::ApiKeys;
 use crate::http::config::service::Config;
 use crate::http::config::settings::ConfigError;
 use crate::http::config::store;
-use crate::http::middleware::forwarded::is_trusted;
 #[cfg(feature = "tls")]
-use crate::http::net::certificate::{Certificate, CertificateError};
-use crate::http::net::connection_hold::ConnectionHold;
-use crate::http::net::connections::{Connections, NoRoom};
-use crate::http::net::handshake::Security;
+use crate::http::config::tls::TlsConfig;
+use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
 use bagtrack_cli::ModelFiles;
+#[cfg(feature = "tls")]
+use bagtrack_net::{Certificate, CertificateError};
+use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security};
 use bagtrack_sessions::clock::{sleep, timeout};
 use bagtrack_sessions::{Clock, Executor, FileStoreError};
 use std::io::{self, Write};
@@ -109,7 +109,7 @@ impl Application {
         let address = config.listen;
         let access = Access::load(&config.access, address)?;
         #[cfg(feature = "tls")]
-        let security = Certificate::load(&config.tls)?.map_or(Security::Plain, Security::Tls);
+        let security = security(&config.tls)?;
         #[cfg(not(feature = "tls"))]
         let security = Security::Plain;
         let listener = TcpListener::bind(address).await;
@@ -221,6 +221,13 @@ impl Application {
         service.flush().await;
         ended.is_ok()
     }
+}
+
+/// With TLS where the settings name a certificate.
+#[cfg(feature = "tls")]
+fn security(tls: &TlsConfig) -> Result<Security, CertificateError> {
+    let certificate = Certificate::load(tls.tls_cert.as_deref(), tls.tls_key.as_deref())?;
+    Ok(certificate.map_or(Security::Plain, Security::Tls))
 }
 
 /// Accepts connections for ever. They end when `cut_off` loses its sender.

@@ -1,15 +1,13 @@
 //! What a connection goes through from when it is accepted to its end.
 
 use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
-use crate::http::net::connection_hold::ConnectionHold;
-use crate::http::net::connection_io::ConnectionIo;
-use crate::http::net::handshake::{Begun, Security, Transport};
 use crate::http::quotas::client::Peer;
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
+use bagtrack_net::{Begun, ClientLimits, ConnectionHold, ConnectionIo, Security, Transport};
 use bagtrack_sessions::clock::timeout;
 use hyper::Request;
 use hyper::body::Incoming;
@@ -83,7 +81,13 @@ impl ConnectionService {
         hold: ConnectionHold,
     ) {
         let activity = hold.activity().clone();
-        let io = ConnectionIo::new(transport, activity.clone(), &self.state.config.limits);
+        let limits = &self.state.config.limits;
+        let limits = ClientLimits {
+            write_timeout: limits.write_timeout,
+            min_answer_rate: limits.min_answer_rate,
+            half_close_timeout: limits.half_close_timeout,
+        };
+        let io = ConnectionIo::new(transport, activity.clone(), limits);
         let service = routes.layer(Extension(Peer(peer)));
         let service = TowerToHyperService::new(service.layer(Extension(hold.clone())));
         let watched = service_fn(move |request: Request<Incoming>| {

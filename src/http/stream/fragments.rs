@@ -7,9 +7,9 @@
 //! streams send more frames a second than it may: the smallest ones cost next to no bytes. Each fragment counts as work of
 //! its task, which gives others their turn after some of them.
 
-use crate::http::net::least_rate::LeastRate;
 use crate::http::quotas::clients::MessageRate;
 use arrayvec::ArrayVec;
+use bagtrack_net::LeastRate;
 use bagtrack_sessions::clock::{self, Sleep, sleep_until};
 use bagtrack_sessions::{Budget, BudgetFull, Charge};
 use bytes::{Buf, BytesMut};

@@ -8,7 +8,6 @@
 use super::activity::Activity;
 use super::handshake::Transport;
 use super::least_rate::LeastRate;
-use crate::http::config::limits::LimitsConfig;
 use bagtrack_sessions::clock::{self, Instant, Sleep, sleep_until};
 use std::io::{self, IoSlice};
 use std::pin::Pin;
@@ -19,6 +18,17 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
 /// Time for a handler to read the body that has come.
 const READING: Duration = Duration::from_millis(500);
+
+/// How long the client of a connection is waited for.
+#[derive(Debug, Clone, Copy)]
+pub struct ClientLimits {
+    /// Time in which it takes no byte of an answer, or takes them too slowly.
+    pub write_timeout: Duration,
+    /// Bytes a second of an answer that it takes at least.
+    pub min_answer_rate: u32,
+    /// Time for the answer to a client that has closed its side.
+    pub half_close_timeout: Duration,
+}
 
 /// The stream of a connection.
 #[derive(Debug)]
@@ -34,7 +44,7 @@ pub struct ConnectionIo {
 
 impl ConnectionIo {
     /// For a stream whose service tells `activity` what it does.
-    pub fn new(stream: Transport, activity: Arc<Activity>, limits: &LimitsConfig) -> Self {
+    pub fn new(stream: Transport, activity: Arc<Activity>, limits: ClientLimits) -> Self {
         Self {
             stream,
             activity,

@@ -1,15 +1,13 @@
 //! From an accepted connection to one over which HTTP is spoken: with TLS, its handshake.
 //!
-//! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It is served, too: by
-//! [routes](crate::http::server::router::https_only) that tell it the right address.
+//! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It can be served, too: by
+//! routes that tell it the right address.
 
 use std::io;
 use tokio::net::TcpStream;
 
 #[cfg(feature = "tls")]
 use super::certificate::Certificate;
-#[cfg(feature = "tls")]
-use crate::http::config::memory_bound::MAX_UNSENT_BYTES;
 #[cfg(feature = "tls")]
 use tokio_rustls::server::TlsStream;
 #[cfg(feature = "tls")]
@@ -18,6 +16,10 @@ use tokio_util::either::Either;
 /// The first byte of a TLS handshake: the type of its record (RFC 8446, section 5.1).
 #[cfg(feature = "tls")]
 const HANDSHAKE_RECORD: u8 = 22;
+
+/// Most bytes of a connection that wait to be sent, encrypted.
+#[cfg(feature = "tls")]
+pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 
 /// A connection's bytes, decrypted.
 #[cfg(feature = "tls")]

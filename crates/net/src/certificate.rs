@@ -1,6 +1,5 @@
 //! The certificate that clients see, and its private key.
 
-use crate::http::config::tls::TlsConfig;
 use rustls::pki_types::pem::{Error as PemError, PemObject};
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::{ServerConfig, crypto::ring};
@@ -80,17 +79,17 @@ struct Inner {
 }
 
 impl Certificate {
-    /// That of these settings, where they name one.
+    /// That of these files, where they are named.
     ///
     /// # Errors
     /// See [`CertificateError`].
-    pub fn load(config: &TlsConfig) -> Result<Option<Self>, CertificateError> {
-        match (&config.tls_cert, &config.tls_key) {
+    pub fn load(cert: Option<&Path>, key: Option<&Path>) -> Result<Option<Self>, CertificateError> {
+        match (cert, key) {
             (None, None) => Ok(None),
             (Some(cert), Some(key)) => Ok(Some(Self(Arc::new(Inner {
                 current: RwLock::new(Arc::new(server_config(cert, key)?)),
-                cert: cert.clone(),
-                key: key.clone(),
+                cert: cert.to_owned(),
+                key: key.to_owned(),
             })))),
             _ => Err(CertificateError::Half),
         }

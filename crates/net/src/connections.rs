@@ -1,14 +1,15 @@
 //! The open connections: how many there are, whose they are, and which one makes room for a new one.
 //!
-//! A client has at most its maximum, and at most as many as are free or idle (a dynamic threshold, as in
-//! [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy connections leave some to each further one. The
-//! IPv6 networks that a client is in may hold as many as one client, and beyond that as many as are free or idle.
+//! A client is an IPv4 address or an IPv6 network of 64 bits. It has at most its maximum, and at most as many as are free
+//! or idle (a dynamic threshold, as in [`Budget`](bagtrack_sessions::Budget)): so a few clients with busy connections
+//! leave some to each further one. The wider IPv6 networks that a client is in may hold as many as one client, and
+//! beyond that as many as are free or idle.
 //!
 //! Whoever may have no more loses the one of its own that was idle longest. When all are taken, it is one of the client
 //! that has most. A connection with a request in progress is never closed for another one.
 
 use super::activity::Activity;
-use crate::http::quotas::client::Client;
+use super::address::{customer_address, wider_networks};
 use ipnet::Ipv6Net;
 use metrics::Counter;
 use std::cmp::Reverse;
@@ -42,22 +43,23 @@ pub struct Connections {
 #[derive(Debug, Default)]
 struct Open {
     next: u64,
-    connections: HashMap<u64, (Client, Arc<Activity>)>,
+    connections: HashMap<u64, (IpAddr, Arc<Activity>)>,
     counts: HashMap<Holder, usize>,
 }
 
 /// Whose connections are counted.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Holder {
-    Client(Client),
+    /// By what its addresses have in common.
+    Client(IpAddr),
     Network(Ipv6Net),
 }
 
 impl Holder {
     /// The client, and the networks that it is in.
-    fn all_of(client: &Client) -> impl Iterator<Item = Self> {
-        let networks = client.networks().map(Self::Network);
-        std::iter::once(Self::Client(client.clone())).chain(networks)
+    fn all_of(client: IpAddr) -> impl Iterator<Item = Self> {
+        let networks = wider_networks(client).map(Self::Network);
+        std::iter::once(Self::Client(client)).chain(networks)
     }
 }
 
@@ -91,14 +93,14 @@ impl Connections {
         address: IpAddr,
         shared: bool,
     ) -> Result<ConnectionPermit, NoRoom> {
-        let client = Client::at(address);
+        let client = customer_address(address);
         let mut open = self.open();
         let free = self.max.saturating_sub(open.connections.len());
         let has_share = shared
-            || self.leaves_room(&open, &client, free)
-            || self.leaves_room(&open, &client, free + open.idle());
+            || self.leaves_room(&open, client, free)
+            || self.leaves_room(&open, client, free + open.idle());
         if !has_share {
-            let shed = open.shed(|other| *other == client);
+            let shed = open.shed(|other| other == client);
             shed.ok_or(NoRoom::Address)?;
             self.shed.increment(1);
         } else if free == 0 {
@@ -108,7 +110,7 @@ impl Connections {
         let number = open.next;
         open.next += 1;
         let activity = Activity::new(self.freed.clone());
-        for holder in Holder::all_of(&client) {
+        for holder in Holder::all_of(client) {
             *open.counts.entry(holder).or_default() += 1;
         }
         open.connections.insert(number, (client, activity.clone()));
@@ -120,8 +122,8 @@ impl Connections {
     }
 
     /// Whether a client may have one more where so many are free.
-    fn leaves_room(&self, open: &Open, client: &Client, free: usize) -> bool {
-        let is_alone = open.count(&Holder::Client(client.clone())) == open.connections.len();
+    fn leaves_room(&self, open: &Open, client: IpAddr, free: usize) -> bool {
+        let is_alone = open.count(&Holder::Client(client)) == open.connections.len();
         Holder::all_of(client).all(|holder| {
             let most = match holder {
                 // Whoever is alone may have what is left over.
@@ -152,13 +154,13 @@ impl Open {
     }
 
     /// Closes an idle connection of those clients, if there is one.
-    fn shed(&mut self, of: impl Fn(&Client) -> bool) -> Option<()> {
+    fn shed(&mut self, of: impl Fn(IpAddr) -> bool) -> Option<()> {
         let idle = self
             .connections
             .iter()
             .filter_map(|(number, (client, activity))| {
-                let since = activity.idle_since().filter(|_| of(client))?;
-                let count = self.count(&Holder::Client(client.clone()));
+                let since = activity.idle_since().filter(|_| of(*client))?;
+                let count = self.count(&Holder::Client(*client));
                 Some((count, Reverse((since, *number))))
             });
         let (_, Reverse((_, number))) = idle.max()?;
@@ -168,7 +170,7 @@ impl Open {
 
     fn remove(&mut self, number: u64) -> Option<Arc<Activity>> {
         let (client, activity) = self.connections.remove(&number)?;
-        for holder in Holder::all_of(&client) {
+        for holder in Holder::all_of(client) {
             if let Entry::Occupied(mut count) = self.counts.entry(holder) {
                 *count.get_mut() -= 1;
                 if *count.get() == 0 {
@@ -213,7 +215,7 @@ mod tests {
         let _fourth = enter(1).unwrap();
         let _fifth = enter(1).unwrap();
         // Its own idle ones went for them.
-        let first = Holder::Client(Client::at(address(1)));
+        let first = Holder::Client(address(1));
         assert_eq!(connections.open().count(&first), 2);
         drop(idle);
         assert!(numbers().contains(&busy.number), "a busy one is not closed");

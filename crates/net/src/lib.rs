@@ -1,0 +1,30 @@
+//! The connections of a service: how many there are, what each is doing, and how slowly its client may read and write.
+//!
+//! In: sockets. Out: the bytes of requests, for whom serves them.
+//!
+//! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, or keeps idle ones.
+//! [`LeastRate`] and the time limits for handshakes and heads bound the first, [`Connections`] the others.
+
+#![warn(clippy::disallowed_methods)]
+
+mod activity;
+mod address;
+#[cfg(feature = "tls")]
+mod certificate;
+mod connection_hold;
+mod connection_io;
+mod connections;
+mod handshake;
+mod least_rate;
+
+pub use activity::Activity;
+pub use address::{customer_address, wider_networks};
+#[cfg(feature = "tls")]
+pub use certificate::{Certificate, CertificateError};
+pub use connection_hold::ConnectionHold;
+pub use connection_io::{ClientLimits, ConnectionIo};
+pub use connections::{ConnectionPermit, Connections, NoRoom};
+#[cfg(feature = "tls")]
+pub use handshake::MAX_UNSENT_BYTES;
+pub use handshake::{Begun, Security, Transport};
+pub use least_rate::LeastRate;
