@@ -23,7 +23,6 @@
 #![warn(clippy::disallowed_methods)]
 
 mod auth;
-mod config;
 mod extract;
 mod metrics;
 mod middleware;
@@ -42,17 +41,13 @@ pub use auth::keys::{ApiKeys, KeysError};
 pub use bagtrack_api::ProblemKind;
 pub use bagtrack_api::media_types::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 #[cfg(feature = "tls")]
-pub use bagtrack_net::{Certificate, CertificateError};
-pub use config::access::AccessConfig;
-pub use config::base_path::{BasePath, BasePathError};
-pub use config::flag_values::{parse_duration, parse_listen};
-pub use config::limits::LimitsConfig;
-pub use config::memory_bound::MemoryBound;
-pub use config::service::Config;
-pub use config::settings::{ConfigError, Secret};
-pub use config::store::StoreConfig;
+pub use bagtrack_config::TlsConfig;
+pub use bagtrack_config::{
+    AccessConfig, BasePath, BasePathError, Config, ConfigError, LimitsConfig, MemoryBound, Secret,
+    StoreConfig, parse_duration, parse_listen,
+};
 #[cfg(feature = "tls")]
-pub use config::tls::TlsConfig;
+pub use bagtrack_net::{Certificate, CertificateError};
 #[cfg(fuzzing)]
 pub use middleware::forwarded::address as forwarded_address;
 pub use quotas::client::Client;

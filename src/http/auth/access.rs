@@ -2,7 +2,7 @@
 
 use super::keys::{ApiKeys, KeysError};
 use super::token::TokenKeys;
-use crate::http::config::access::AccessConfig;
+use bagtrack_config::AccessConfig;
 use bagtrack_sessions::{MacKeys, SNAPSHOT_KEY_CONTEXT};
 use std::net::SocketAddr;
 use std::sync::Arc;

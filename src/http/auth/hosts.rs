@@ -3,7 +3,7 @@
 //! A page can make its own host name resolve to this machine. To the browser it is of the same origin then, and may call
 //! whatever listens there. What it cannot do is name another host.
 
-use crate::http::config::service::Config;
+use bagtrack_config::Config;
 use std::net::IpAddr;
 
 /// The hosts that requests may name.

@@ -3,7 +3,7 @@
 //! Only digests are kept. A key that is presented is hashed and compared with all of them in constant time.
 
 use super::token::PREFIX;
-use crate::http::config::settings::Secret;
+use bagtrack_config::Secret;
 use bagtrack_sessions::Owner;
 use std::io;
 use std::path::{Path, PathBuf};

@@ -8,9 +8,9 @@
 //! make a session token ([`token`]): it is good for one session and a limited time, and nothing about it is stored.
 //!
 //! What can go wrong: a key is guessed by timing (digests are compared in constant time), or leaks by the log (it is
-//! never logged, and [`Secret`](super::config::settings::Secret) does not show itself); a file of keys is broken when it is read again
-//! (the keys before stay); the service is open to a network by accident (it does not start then; see [`access`]); a
-//! web page elsewhere uses the browser of somebody inside (its origin is checked, and its [host](hosts)).
+//! never logged, and [`Secret`](bagtrack_config::Secret) does not show itself); a file of keys is broken when it is read
+//! again (the keys before stay); the service is open to a network by accident (it does not start then; see [`access`]);
+//! a web page elsewhere uses the browser of somebody inside (its origin is checked, and its [host](hosts)).
 
 pub mod access;
 pub mod caller;

@@ -5,11 +5,11 @@
 
 use super::multipart::{HeadTooLong, MAX_HEAD_BYTES};
 use super::pace::{TooSlow, paced};
-use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::MultipartError;
 use axum::http::StatusCode;
+use bagtrack_config::Config;
 use bagtrack_sessions::{BudgetFull, Charge};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use std::error::Error;

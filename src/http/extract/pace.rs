@@ -1,8 +1,8 @@
 //! The least rate of a body. A client that sends a byte now and then would hold its connection and its session's place
 //! until the deadline of the body.
 
-use crate::http::config::service::Config;
 use axum::body::{Body, Bytes};
+use bagtrack_config::Config;
 use bagtrack_net::LeastRate;
 use bagtrack_sessions::Charge;
 use futures_util::{StreamExt, stream};

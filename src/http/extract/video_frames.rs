@@ -1,11 +1,11 @@
 //! The frames of an uploaded video, as they are decoded.
 
 use super::video_place::VideoPlace;
-use crate::http::config::limits::OFF;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
+use bagtrack_config::OFF;
 use bagtrack_ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
 use bagtrack_sessions::clock::timeout;
 use std::sync::Arc;

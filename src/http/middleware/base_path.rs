@@ -3,7 +3,6 @@
 //! A proxy may take the path off requests or leave it, so requests are taken with it and without it. What the service
 //! answers has it: `Location`, the instance of a problem, the server of the OpenAPI document.
 
-use crate::http::config::base_path::BasePath;
 use crate::http::extract::instance::ClientPath;
 use axum::Router;
 use axum::extract::{Request, State};
@@ -12,6 +11,7 @@ use axum::http::uri::PathAndQuery;
 use axum::http::{HeaderValue, Uri};
 use axum::middleware::{self, Next};
 use axum::response::Response;
+use bagtrack_config::BasePath;
 
 /// Serves these routes below the base path, too.
 pub fn mount(base: &BasePath, routes: Router) -> Router {

@@ -4,7 +4,6 @@
 //! origin is checked, too. So is the [host](super::hosts).
 
 use crate::http::auth::hosts::AllowedHosts;
-use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
@@ -12,6 +11,7 @@ use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use bagtrack_config::Config;
 
 /// The middleware.
 pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {

@@ -5,9 +5,9 @@
 
 use super::client::Client;
 use super::holdings::Holdings;
-use crate::http::config::service::Config;
 use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use bagtrack_config::Config;
 use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BudgetFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,

@@ -1,6 +1,6 @@
 //! What is held for clients until it is really given back.
 
-use crate::http::config::service::Config;
+use bagtrack_config::Config;
 use bagtrack_sessions::Budget;
 
 /// What is held: for all clients, for a network, or for one client.

@@ -9,16 +9,14 @@ use super::refusal;
 use super::service::{Parts, Service};
 use crate::http::auth::access::{Access, AccessError};
 use crate::http::auth::keys::ApiKeys;
-use crate::http::config::service::Config;
-use crate::http::config::settings::ConfigError;
-use crate::http::config::store;
-#[cfg(feature = "tls")]
-use crate::http::config::tls::TlsConfig;
 use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
 use bagtrack_cli::ModelFiles;
+#[cfg(feature = "tls")]
+use bagtrack_config::TlsConfig;
+use bagtrack_config::{Config, ConfigError};
 #[cfg(feature = "tls")]
 use bagtrack_net::{Certificate, CertificateError};
 use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security};
@@ -114,7 +112,7 @@ impl Application {
         let security = Security::Plain;
         let listener = TcpListener::bind(address).await;
         let listener = listener.map_err(|source| BindError::Listen { address, source })?;
-        let store = store::connect(&config.store, clock.clone()).await?;
+        let store = config.store.connect(clock.clone()).await?;
         let expert = config.model.as_ref().map(ModelFiles::load);
         let expert = expert.transpose().map_err(BindError::Model)?;
         let executor = Executor::threads(config.worker_count()).map_err(BindError::Workers)?;

@@ -1,12 +1,12 @@
 //! What a connection goes through from when it is accepted to its end.
 
-use crate::http::config::memory_bound::MAX_BUFFER_BYTES;
 use crate::http::quotas::client::Peer;
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
+use bagtrack_config::MAX_BUFFER_BYTES;
 use bagtrack_net::{Begun, ClientLimits, ConnectionHold, ConnectionIo, Security, Transport};
 use bagtrack_sessions::clock::timeout;
 use hyper::Request;

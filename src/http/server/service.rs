@@ -2,11 +2,11 @@
 
 use super::application::BindError;
 use crate::http::auth::access::Access;
-use crate::http::config::service::Config;
 use crate::http::quotas::client::Peer;
 use crate::http::server::router::router;
 use crate::http::state::AppState;
 use axum::{Extension, Router};
+use bagtrack_config::Config;
 use bagtrack_sessions::clock::interval;
 use bagtrack_sessions::{Clock, Executor, SessionStore};
 use bagtrack_tracker::Expert;

@@ -5,10 +5,10 @@
 mod saturation;
 
 use crate::http::auth::access::Access;
-use crate::http::config::service::Config;
 use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
+use bagtrack_config::Config;
 use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,
     Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,

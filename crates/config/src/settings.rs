@@ -291,7 +291,7 @@ macro_rules! settings {
                 let defaults = Self::default();
                 let command = command
                     $(.arg({
-                        let arg = $crate::http::config::settings::flag(
+                        let arg = $crate::settings::flag(
                             stringify!($name), &[$($doc),*], &defaults.$name,
                         );
                         $(let arg = arg.value_name($shown);)?
@@ -312,7 +312,7 @@ macro_rules! settings {
             }
 
             fn from_arg_matches_mut(matches: &mut clap::ArgMatches) -> Result<Self, clap::Error> {
-                use $crate::http::config::settings::Setting;
+                use $crate::settings::Setting;
                 Ok(Self {
                     $($name: Setting::take(matches, stringify!($name)),)*
                     $($($code: Default::default(),)*)?
@@ -328,12 +328,12 @@ macro_rules! settings {
 
         impl $struct {
             /// Checks the settings that have a range of their own.
-            pub(in crate::http::config) fn check_ranges(
+            pub(crate) fn check_ranges(
                 &self,
-            ) -> Result<(), $crate::http::config::settings::ConfigError> {
+            ) -> Result<(), $crate::settings::ConfigError> {
                 $($(
-                    let range: $crate::http::config::settings::Range<$type> = $range;
-                    $crate::http::config::settings::ConfigError::check(stringify!($name), range(&self.$name))?;
+                    let range: $crate::settings::Range<$type> = $range;
+                    $crate::settings::ConfigError::check(stringify!($name), range(&self.$name))?;
                 )?)*
                 $($($(#[cfg($part_cfg)])? self.$part.check_ranges()?;)*)?
                 Ok(())

@@ -31,46 +31,44 @@ settings! {
 impl StoreConfig {
     /// Whether the store is in a folder.
     pub(super) fn is_in_folder(&self) -> bool {
-        let text = self.store.as_ref().map_or("", Secret::text);
-        matches!(
-            StoreAddress::parse(text, self.store_timeout),
-            Ok(StoreAddress::File(_))
-        )
+        matches!(self.address(), Some(StoreAddress::File(_)))
     }
 
     /// Checks the address.
     pub(super) fn check_address(&self) -> Result<(), ConfigError> {
-        let address = |text: &Secret| StoreAddress::parse(text.text(), self.store_timeout).is_ok();
         let held = in_range(
-            self.store.as_ref().is_none_or(address),
+            self.store.is_none() || self.address().is_some(),
             "file:DIR, or an address like redis://localhost:6379; rediss is in builds with the feature tls",
         );
         ConfigError::check("store", held)
     }
-}
 
-/// The store of these settings, where they name one. Sessions expire by `clock`.
-///
-/// # Errors
-/// The folder that they name cannot be used. A Redis may come later.
-pub async fn connect(
-    config: &StoreConfig,
-    clock: Clock,
-) -> Result<Option<Arc<dyn SessionStore>>, FileStoreError> {
-    let (timeout, prefix) = (config.store_timeout, &config.store_prefix);
-    let address = config.store.as_ref().map(Secret::text);
-    // The settings were checked.
-    let address = address.and_then(|text| StoreAddress::parse(text, timeout).ok());
-    Ok(match address {
-        None => None,
-        Some(StoreAddress::File(folder)) => {
-            let store = FileStore::open(&folder, config.durability, timeout, clock)?;
-            Some(Arc::new(store))
-        }
-        Some(StoreAddress::Redis(address)) => {
-            let store = RedisStore::connect(address, prefix, timeout).await;
-            let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
-            store.ok().map(|store| Arc::new(store) as _)
-        }
-    })
+    /// The address, where there is a valid one.
+    fn address(&self) -> Option<StoreAddress> {
+        let text = self.store.as_ref().map(Secret::text)?;
+        StoreAddress::parse(text, self.store_timeout).ok()
+    }
+
+    /// The store of these settings, which were checked, where they name one. Sessions expire by `clock`.
+    ///
+    /// # Errors
+    /// The folder that they name cannot be used. A Redis may come later.
+    pub async fn connect(
+        &self,
+        clock: Clock,
+    ) -> Result<Option<Arc<dyn SessionStore>>, FileStoreError> {
+        let (timeout, prefix) = (self.store_timeout, &self.store_prefix);
+        Ok(match self.address() {
+            None => None,
+            Some(StoreAddress::File(folder)) => {
+                let store = FileStore::open(&folder, self.durability, timeout, clock)?;
+                Some(Arc::new(store))
+            }
+            Some(StoreAddress::Redis(address)) => {
+                let store = RedisStore::connect(address, prefix, timeout).await;
+                let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
+                store.ok().map(|store| Arc::new(store) as _)
+            }
+        })
+    }
 }
