@@ -3,7 +3,6 @@
 //! Memory is charged before it is taken: a body that only announces its length, or sends nothing, holds none. Bytes are
 //! copied into one buffer as they arrive, since a chunk of one byte by itself takes many times that.
 
-use super::multipart::{HeadTooLong, MAX_HEAD_BYTES};
 use super::pace::{TooSlow, paced};
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes};
@@ -17,6 +16,14 @@ use tower_http::timeout::TimeoutError;
 
 /// Bytes that a buffer begins with, where the body is not smaller.
 const FIRST_BYTES: usize = 64 << 10;
+
+/// Most bytes of the head of a form's part, and of what stands before the first part.
+pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
+
+/// The head of a part does not end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the head of a part has more than {MAX_HEAD_BYTES} bytes")]
+pub(super) struct HeadTooLong;
 
 /// Bytes that arrive, with the memory that they are charged to.
 pub(super) struct Buffer<'a> {

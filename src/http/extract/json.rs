@@ -2,7 +2,7 @@
 
 use super::base64_file;
 use super::misnamed;
-use super::uploaded::Fields;
+use super::texts::Fields;
 use crate::http::problems::problem::Problem;
 use bagtrack_api::requests::{FrameCount, Settings};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};

@@ -4,10 +4,9 @@
 //! pieces are gathered, it gets them only when it can do nothing with what it has, and the head of a part is bounded: a
 //! body costs time in proportion to its bytes.
 
-use super::body::{self, Buffer};
+use super::body::{self, Buffer, HeadTooLong, MAX_HEAD_BYTES};
 use super::misnamed;
-use super::texts::MAX_TEXT_BYTES;
-use super::uploaded::Fields;
+use super::texts::{Fields, MAX_TEXT_BYTES};
 use crate::http::problems::problem::Problem;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::multipart::{Field, MultipartError};
@@ -21,16 +20,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
 
-/// Most bytes of a part's head, and of what stands before the first part.
-pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
-
 /// Pieces of fewer bytes are gathered, as far as they have come.
 const ENOUGH_BYTES: usize = 8 << 10;
-
-/// The head of a part does not end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the head of a part has more than {MAX_HEAD_BYTES} bytes")]
-pub(super) struct HeadTooLong;
 
 /// How far the parser is.
 #[derive(Debug, Default)]

@@ -1,7 +1,8 @@
-//! Settings as texts, before they are parsed.
+//! What a body has: files, and settings as texts, before they are parsed.
 
 use super::misnamed;
 use crate::http::problems::problem::Problem;
+use axum::body::Bytes;
 use axum::extract::Query;
 use axum::http::Uri;
 use bagtrack_api::requests::Settings;
@@ -81,4 +82,15 @@ impl Texts {
             }),
         }
     }
+}
+
+/// The files of a body, and the texts of its settings.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    /// The files, in order.
+    pub(super) files: Vec<Bytes>,
+    /// The snapshot beside the files.
+    pub(super) snapshot: Option<Bytes>,
+    /// The texts.
+    pub(super) texts: Texts,
 }

@@ -4,7 +4,7 @@ use super::body;
 use super::json;
 use super::multipart;
 use super::pace::paced;
-use super::texts::Texts;
+use super::texts::{Fields, Texts};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::RequestPermit;
@@ -156,17 +156,6 @@ impl Arrived {
             charge,
         })
     }
-}
-
-/// The files of a body, and the texts of its settings.
-#[derive(Debug, Default)]
-pub(super) struct Fields {
-    /// The files, in order.
-    pub(super) files: Vec<Bytes>,
-    /// The snapshot beside the files.
-    pub(super) snapshot: Option<Bytes>,
-    /// The texts.
-    pub(super) texts: Texts,
 }
 
 /// Lets in a request before any of its body is read: takes a place among the client's requests in flight.

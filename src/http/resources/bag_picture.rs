@@ -4,13 +4,11 @@ use crate::drawing::ContactSheet;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::read_request::ReadRequest;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::charged_body::{ChargedBody, charged_body};
 use crate::http::state::AppState;
-use axum::body::Bytes;
 use axum::extract::State;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::{IntoResponse, Response};
 use bagtrack_api::requests::{BagSettings, BinaryBody};
-use bagtrack_sessions::{ChargedBytes, SessionState};
+use bagtrack_sessions::SessionState;
 use std::sync::Arc;
 
 /// See the bag
@@ -30,7 +28,7 @@ use std::sync::Arc;
 pub async fn get(
     State(state): State<AppState>,
     request: ReadRequest<QuerySettings<BagSettings>>,
-) -> Result<Response, Problem> {
+) -> Result<ChargedBody, Problem> {
     let (QuerySettings(settings), mut charge) = (request.query, request.charge);
     let target = settings.target.unwrap_or(0);
     let count = request.permit.session().target_count();
@@ -41,11 +39,8 @@ pub async fn get(
         charge.grow(2 * sheet.bytes())?;
         let png = sheet.png();
         let png = png.map_err(|error| Problem::internal(Arc::new(error)))?;
-        Ok(Bytes::from(ChargedBytes::new(png, charge)))
+        Ok(charged_body("image/png", png, charge))
     };
-    let picture = state
-        .service
-        .read::<_, Problem, _>(request.permit, request.queue, draw)
-        .await?;
-    Ok(([(CONTENT_TYPE, "image/png")], picture).into_response())
+    let service = &state.service;
+    service.read(request.permit, request.queue, draw).await
 }

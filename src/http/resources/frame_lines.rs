@@ -4,7 +4,7 @@
 //! tracked. A video has the processor time of as many requests as its frames would be posted in, and no end but that of
 //! its frames.
 
-use super::frames::FramesRequest;
+use crate::http::extract::session_request::SessionRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
@@ -15,6 +15,7 @@ use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
 use bagtrack_api::StreamAnswer;
+use bagtrack_api::requests::FramesSettings;
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_sessions::clock::{self, Instant, timeout_at};
 use bagtrack_sessions::{
@@ -22,6 +23,16 @@ use bagtrack_sessions::{
     check_readable_pixels,
 };
 use std::vec::IntoIter;
+
+/// A request with the next frames.
+pub type FramesRequest = SessionRequest<FramesSettings>;
+
+impl FramesRequest {
+    /// The number of the (first) frame, where the client numbers them.
+    pub fn number(&self) -> Option<u64> {
+        self.upload.settings.frame.map(|number| number.0)
+    }
+}
 
 /// Answers the frames by lines.
 ///

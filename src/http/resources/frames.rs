@@ -1,8 +1,7 @@
 //! `POST /sessions/{id}/frames`: the next frame, or several, get their boxes.
 
-use super::frame_lines;
+use super::frame_lines::{self, FramesRequest};
 use crate::http::extract::answer_form::AnswerForm;
-use crate::http::extract::session_request::SessionRequest;
 use crate::http::openapi::example_frames;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
@@ -14,9 +13,6 @@ use axum::response::Response;
 use bagtrack_api::FrameAnswers;
 use bagtrack_api::requests::{BinaryBody, FormBody, FramesSettings, JsonBody};
 use bagtrack_sessions::FrameBatch;
-
-/// A request with the next frames.
-pub type FramesRequest = SessionRequest<FramesSettings>;
 
 type FramesForm = FormBody<FramesSettings>;
 type FramesJson = JsonBody<FramesSettings>;
@@ -88,13 +84,6 @@ pub async fn post(
         (None, AnswerForm::Lines) => frame_lines::respond(state, request).await,
         (None, AnswerForm::Picture) => respond_drawn(&state, request).await,
         (None, AnswerForm::Json) => respond_at_once(&state, request).await,
-    }
-}
-
-impl FramesRequest {
-    /// The number of the (first) frame, where the client numbers them.
-    pub fn number(&self) -> Option<u64> {
-        self.upload.settings.frame.map(|number| number.0)
     }
 }
 

@@ -3,14 +3,11 @@
 use crate::http::extract::query::NoQuery;
 use crate::http::extract::read_request::ReadRequest;
 use crate::http::problems::problem::Problem;
+use crate::http::respond::charged_body::{ChargedBody, charged_body};
 use crate::http::state::AppState;
-use axum::body::Bytes;
 use axum::extract::State;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::{IntoResponse, Response};
 use bagtrack_api::media_types::SNAPSHOT;
 use bagtrack_api::requests::BinaryBody;
-use bagtrack_sessions::ChargedBytes;
 
 /// Take a snapshot
 ///
@@ -33,10 +30,9 @@ use bagtrack_sessions::ChargedBytes;
 pub async fn get(
     State(state): State<AppState>,
     request: ReadRequest<NoQuery>,
-) -> Result<Response, Problem> {
+) -> Result<ChargedBody, Problem> {
     let (permit, queue, mut charge) = (request.permit, request.queue, request.charge);
     let snapshot = state.service.snapshot(permit, queue).await?;
     charge.grow(snapshot.len())?;
-    let body = Bytes::from(ChargedBytes::new(snapshot, charge));
-    Ok(([(CONTENT_TYPE, SNAPSHOT)], body).into_response())
+    Ok(charged_body(SNAPSHOT, snapshot, charge))
 }

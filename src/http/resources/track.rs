@@ -13,7 +13,8 @@ use crate::http::openapi::example_frames;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{answer_bytes, answers};
-use crate::http::respond::json::{self, JsonBytes};
+use crate::http::respond::charged_body::ChargedBody;
+use crate::http::respond::json;
 use crate::http::respond::ndjson;
 use crate::http::state::AppState;
 use axum::body::Bytes;
@@ -218,7 +219,7 @@ fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Probl
 }
 
 /// The body of the answer, whose memory is charged before it is taken.
-fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<JsonBytes, Problem> {
+fn body(tracked: &TrackedAway, mut charge: Charge) -> Result<ChargedBody, Problem> {
     let (estimates, snapshot) = (&tracked.estimates[..], &tracked.snapshot);
     // It is there as base64, and once more in the body.
     let text = snapshot.len().div_ceil(3) * 4;

@@ -1,18 +1,15 @@
 //! The answer to a frame as the frame itself, with box, score and particles drawn.
 
 use super::answer::{answer, with_standing};
+use super::charged_body::charged_body;
 use crate::drawing::{self, Drawn, Picture};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
-use axum::body::Bytes;
-use axum::http::header::CONTENT_TYPE;
 use axum::http::{HeaderName, HeaderValue};
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::headers;
-use bagtrack_sessions::{
-    ChargedBytes, Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter,
-};
+use bagtrack_sessions::{Estimates, FrameBatch, PerTarget, QueuePermit, SessionPermit, WorkMeter};
 use bagtrack_tracker::Diagnostics;
 use std::sync::Arc;
 
@@ -57,9 +54,7 @@ pub async fn answer_drawn(
     let text = text.map_err(|error| Problem::internal(Arc::new(error)))?;
     let draw = move |_: &mut WorkMeter| draw(picture, &estimates, &seen);
     let bytes = state.service.run::<_, Problem, _>(queue, draw).await?;
-    let headers = [(CONTENT_TYPE, HeaderValue::from_static("image/png"))];
-    let picture = Bytes::from(ChargedBytes::new(bytes, charge));
-    let mut response = (headers, picture).into_response();
+    let mut response = charged_body("image/png", bytes, charge).into_response();
     if let Ok(answer) = HeaderValue::from_str(&text) {
         response.headers_mut().insert(ANSWER, answer);
     }

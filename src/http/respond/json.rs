@@ -1,11 +1,11 @@
 //! Answers as JSON, which end with a newline: a shell's prompt then stands on a line of its own.
 
+use super::charged_body::{ChargedBody, charged_body};
 use crate::http::problems::problem::Problem;
-use axum::body::Bytes;
+use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
-use axum::http::{HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
-use bagtrack_sessions::{Charge, ChargedBytes};
+use bagtrack_sessions::Charge;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -25,17 +25,13 @@ impl<T: Serialize> IntoResponse for Json<T> {
     }
 }
 
-/// JSON that is written already.
-pub type JsonBytes = ([(HeaderName, &'static str); 1], Bytes);
-
 /// A value as JSON, whose memory is charged until the client has taken it.
 ///
 /// # Errors
 /// It cannot be written as JSON.
-pub fn charged(value: &impl Serialize, charge: Charge) -> Result<JsonBytes, Problem> {
+pub fn charged(value: &impl Serialize, charge: Charge) -> Result<ChargedBody, Problem> {
     let body = line(value).map_err(|error| Problem::internal(Arc::new(error)))?;
-    let body = Bytes::from(ChargedBytes::new(body, charge));
-    Ok(([(CONTENT_TYPE, "application/json")], body))
+    Ok(charged_body("application/json", body, charge))
 }
 
 /// A value as one line of JSON.
