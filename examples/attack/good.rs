@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
+/// From one frame of a client to its next.
+pub const PERIOD: Duration = Duration::from_millis(40);
 /// After so long a frame counts as lost.
 const LOST: Duration = Duration::from_secs(10);
 
@@ -47,6 +49,11 @@ pub fn target_box() -> String {
 impl GoodClients {
     /// So many of them, each with a session.
     pub async fn start(target: &Target, count: u8) -> Outcome<Self> {
+        Self::start_at(target, count, PERIOD).await
+    }
+
+    /// The same, with so long from one frame of a client to its next.
+    pub async fn start_at(target: &Target, count: u8, period: Duration) -> Outcome<Self> {
         let frames = Arc::new(frames()?);
         let stop = Arc::new(AtomicBool::new(false));
         let mut clients = JoinSet::new();
@@ -55,7 +62,7 @@ impl GoodClients {
             let session = target.open(&client, &frames[0], "").await?;
             let url = format!("{}{session}/frames", target.url);
             let (stop, frames, http) = (stop.clone(), frames.clone(), target.http.clone());
-            clients.spawn(async move { follow(http, url, client, frames, stop).await });
+            clients.spawn(async move { follow(http, url, client, frames, period, stop).await });
         }
         Ok(Self { stop, clients })
     }
@@ -115,10 +122,11 @@ async fn follow(
     url: String,
     client: String,
     frames: Arc<Vec<Vec<u8>>>,
+    period: Duration,
     stop: Arc<AtomicBool>,
 ) -> Outcome<Tally> {
     let mut tally = Tally::new()?;
-    let mut due = interval(Duration::from_millis(40));
+    let mut due = interval(period);
     due.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut number = 1;
     while !stop.load(Ordering::Relaxed) {
