@@ -168,12 +168,13 @@ export declare class Session {
     /** @param {number} number A frame that the service does not have. */
     resend(number: number): Promise<void>;
     /**
-     * Whether the service has lost the session, or frames that are kept, or has frames already that were sent again.
+     * The frame to go on with after an error; undefined: the session is to be opened again. Throws the error where neither
+     * helps.
      * @param {unknown} error
      * @param {number} number The first frame that the call does not need.
-     * @returns {error is Problem}
+     * @returns {number | undefined}
      */
-    canRecover(error: unknown, number: number): error is Problem;
+    recovery(error: unknown, number: number): number | undefined;
     /**
      * Opens the session again after the service has lost it, under another id.
      * @param {Problem} lost What told so.
