@@ -26,7 +26,6 @@ mod auth;
 mod extract;
 mod metrics;
 mod middleware;
-mod openapi;
 mod page;
 mod problems;
 mod quotas;

@@ -3,13 +3,15 @@
 //! A [`Rect`] is a target's box, an [`Answer`] is what a frame gets, a [`CreatedSession`] is what opening one gets. A
 //! [`ProblemDocument`] is what is said where anything fails; its [`ProblemKind`] comes from one catalogue. All of them
 //! are read and written as JSON, by serde. `requests` (with the feature `service`) has the settings of each call, as
-//! the service reads them.
+//! the service reads them, and `openapi` the document that says so.
 //!
 //! What can go wrong: a member that the service adds is unknown to an older client. So answers are read without looking
 //! at what is not known; requests with an unknown setting are refused.
 
 pub mod answer;
 mod boxes;
+#[cfg(feature = "service")]
+pub mod openapi;
 mod parameters;
 mod problem;
 mod problem_kind;

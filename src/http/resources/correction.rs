@@ -2,7 +2,6 @@
 
 use crate::http::extract::overrides::rect;
 use crate::http::extract::session_request::SessionRequest;
-use crate::http::openapi::example_frames;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::{answer, with_standing};
 use crate::http::respond::json::Json;
@@ -10,6 +9,7 @@ use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
 use bagtrack_api::Answer;
+use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, TargetSettings};
 use bagtrack_sessions::{FrameBatch, GivenBox, box_warnings};
 

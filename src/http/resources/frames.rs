@@ -2,7 +2,6 @@
 
 use super::frame_lines::{self, FramesRequest};
 use crate::http::extract::answer_form::AnswerForm;
-use crate::http::openapi::example_frames;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::annotated_image::answer_drawn;
 use crate::http::respond::answer::{answer_bytes, answers, with_standing};
@@ -11,6 +10,7 @@ use crate::http::state::AppState;
 use axum::extract::State;
 use axum::response::Response;
 use bagtrack_api::FrameAnswers;
+use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, FramesSettings, JsonBody};
 use bagtrack_sessions::FrameBatch;
 

@@ -6,7 +6,6 @@ use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
 use crate::http::extract::uploaded::admit;
-use crate::http::openapi::{example_frames, param_limits};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::{Account, ClientSessions};
@@ -16,6 +15,7 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
 use axum::http::request::Parts;
 use axum::response::Response;
 use bagtrack_api::CreatedSession;
+use bagtrack_api::openapi::{create_description, example_frames};
 use bagtrack_api::requests::{BinaryBody, CreateSettings, FormBody, JsonBody};
 use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde_json::json;
@@ -31,7 +31,7 @@ type CreateJson = JsonBody<CreateSettings>;
 /// Open a session
 #[utoipa::path(
     post, path = "/sessions", tag = "sessions", operation_id = "createSession",
-    description = param_limits::create_description(),
+    description = create_description(),
     params(
         CreateSettings,
         (
@@ -173,7 +173,7 @@ impl CreateRequest {
             Start::Frame {
                 file,
                 boxes: overrides::boxes(upload.r#box, upload.boxes)?,
-                params: Box::new(overrides::resolve(
+                params: Box::new(overrides::params(
                     upload.preset,
                     upload.seed,
                     upload.params,

@@ -4,10 +4,10 @@ use super::{
     bag_picture, correction, frames, health, metrics, open, session, snapshot, token, track,
     version,
 };
-use crate::http::openapi::document;
 use crate::http::state::AppState;
 use crate::http::stream::handshake;
 use bagtrack_api::ProblemDocument;
+use bagtrack_api::openapi;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
@@ -96,5 +96,5 @@ pub fn document_at(base_path: &str) -> String {
         .merge(version())
         .merge(metrics())
         .merge(probes());
-    document::document(&handlers.into_openapi(), base_path)
+    openapi::document(&handlers.into_openapi(), base_path)
 }

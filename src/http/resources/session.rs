@@ -1,6 +1,5 @@
 //! `GET` and `DELETE /sessions/{id}`.
 
-use crate::http::extract::overrides;
 use crate::http::extract::query::NoQuery;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
@@ -10,6 +9,7 @@ use crate::http::state::AppState;
 use axum::extract::State;
 use axum::http::StatusCode;
 use bagtrack_api::SessionView;
+use bagtrack_api::requests::public_params;
 
 /// See where a session stands
 ///
@@ -31,7 +31,7 @@ pub async fn get(
         frames: latest.first().frame + 1,
         answer: answer(&latest, None),
         image: session.source_size().into(),
-        parameters: overrides::public(session.params()),
+        parameters: public_params(session.params()),
         expires_at: state.expires_at(&session),
     }))
 }

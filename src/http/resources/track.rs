@@ -9,7 +9,6 @@ use crate::http::extract::uploaded::{Upload, admit};
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
 use crate::http::extract::video_range::{RangeFrames, VideoRange};
-use crate::http::openapi::example_frames;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{answer_bytes, answers};
@@ -21,6 +20,7 @@ use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Request, State};
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::Tracked;
+use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, Switch, TrackSettings};
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, Selection, TrackFrom, TrackedAway};
@@ -171,7 +171,7 @@ fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
         let detail = "`target` says which one `box` corrects; without a snapshot leave it out.";
         return Err(Problem::malformed(detail));
     }
-    let params = overrides::resolve(settings.preset, settings.seed, settings.params)?;
+    let params = overrides::params(settings.preset, settings.seed, settings.params)?;
     let boxes = overrides::boxes(settings.r#box, settings.boxes)?;
     Ok((boxes, Box::new(params)))
 }

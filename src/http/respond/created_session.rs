@@ -2,11 +2,11 @@
 
 use super::answer::{rect, with_standing};
 use super::json::Json;
-use crate::http::extract::overrides;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
 use axum::response::Response;
 use bagtrack_api::CreatedSession;
+use bagtrack_api::requests::public_params;
 use bagtrack_sessions::{Opened, PerTarget, Session, box_warnings};
 use std::time::{Duration, SystemTime};
 
@@ -29,7 +29,7 @@ fn description(session: &Session, is_verbose: bool) -> CreatedSession {
         },
         warnings,
         image: session.source_size().into(),
-        parameters: is_verbose.then(|| overrides::public(session.params())),
+        parameters: is_verbose.then(|| public_params(session.params())),
         expires_at: humantime::format_rfc3339_seconds(expires).to_string(),
     }
 }

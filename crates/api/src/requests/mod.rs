@@ -6,10 +6,12 @@
 //! What can go wrong: a setting is unknown or no value of its type, which reading refuses with the setting's name.
 
 mod bodies;
+mod params;
 mod settings;
 mod values;
 
 pub use bodies::{BinaryBody, FormBody, JsonBody};
+pub use params::{ParamsError, public_params, resolve_params};
 pub use settings::{
     BagSettings, CreateSettings, FramesSettings, StreamSettings, TargetSettings, TokenSettings,
     TrackSettings,

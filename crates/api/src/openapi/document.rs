@@ -3,7 +3,7 @@
 use super::key_order::InOrder;
 use super::params_schema;
 use super::problem_responses::problem_responses;
-use bagtrack_api::requests::MAX_EXACT;
+use crate::requests::MAX_EXACT;
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 

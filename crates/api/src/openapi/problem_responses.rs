@@ -1,8 +1,8 @@
 //! The problems that each operation may answer, and their responses in the OpenAPI document: one for the client's faults
 //! and one for the service's.
 
-use bagtrack_api::ProblemKind as Kind;
-use bagtrack_api::media_types::PROBLEM;
+use crate::ProblemKind as Kind;
+use crate::media_types::PROBLEM;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 

@@ -1,7 +1,6 @@
 //! The schema of the tracker's parameters. It is made here and nowhere else, from the tracker's table.
 
-use crate::http::extract::overrides;
-use bagtrack_api::requests::{MAX_EXACT, number_schema};
+use crate::requests::{MAX_EXACT, number_schema, public_params};
 use bagtrack_tracker::{Parameter, Params, Preset};
 use serde_json::Value;
 use utoipa::Number;
@@ -11,7 +10,7 @@ use utoipa::openapi::schema::{
 
 /// An object with a property for each parameter.
 pub(super) fn parameters() -> Object {
-    let mut defaults = overrides::public(&Preset::default().params()).0;
+    let mut defaults = public_params(&Preset::default().params()).0;
     // Without one, a session draws its own.
     defaults.remove("seed");
     let object = Params::TABLE.iter().fold(
