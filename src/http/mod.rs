@@ -6,7 +6,7 @@
 //!
 //! What can go wrong: clients send headers or bodies slowly, or too much of them; bytes are not an image; there is more
 //! work than there are cores; a connection breaks after a frame was taken; a client has no key. [`Application`] bounds
-//! the first, [`Config`] names every bound, numbered frames can be sent again, the room `auth` says who may call, and the
+//! the first, [`Config`] names every bound, numbered frames can be sent again, [`ApiKeys`] say who may call, and the
 //! cause of an error is in the log only.
 //!
 //! ```no_run
@@ -22,7 +22,6 @@
 
 #![warn(clippy::disallowed_methods)]
 
-mod auth;
 mod extract;
 mod metrics;
 mod middleware;
@@ -35,8 +34,7 @@ mod server;
 mod state;
 mod stream;
 
-pub use auth::access::AccessError;
-pub use auth::keys::{ApiKeys, KeysError};
+pub use bagtrack_access::{AccessError, ApiKeys, KeysError};
 pub use bagtrack_api::ProblemKind;
 pub use bagtrack_api::media_types::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
 #[cfg(feature = "tls")]

@@ -1,4 +1,4 @@
-//! Uploads: frames and settings out of a request, in any of three forms.
+//! Frames and settings out of a request, in any of three forms, and who makes it.
 //!
 //! In: a request whose body is a raw file, `multipart/form-data`, or JSON with base64. JSON is what begins with `{`,
 //! after blanks. A raw body may have any content type: the type of a frame is taken from its bytes, curl labels what it
@@ -17,6 +17,7 @@
 pub mod answer_form;
 pub mod base64_file;
 mod body;
+pub mod caller;
 pub mod idempotency_key;
 pub mod instance;
 mod json;

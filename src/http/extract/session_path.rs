@@ -1,6 +1,6 @@
 //! The `{id}` of a session's path.
 
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;

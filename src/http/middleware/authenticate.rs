@@ -3,8 +3,7 @@
 //! A page cannot set that header where it opens a stream. There a session token may stand among the protocols that it
 //! offers (`Sec-WebSocket-Protocol`). An API key may not: it has no business in a page.
 
-use crate::http::auth::caller::Caller;
-use crate::http::auth::token;
+use crate::http::extract::caller::Caller;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
@@ -13,6 +12,7 @@ use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE
 use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use bagtrack_access::TOKEN_PREFIX;
 
 const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack\"");
 
@@ -64,7 +64,7 @@ fn unauthorized() -> Response {
 fn caller(state: &AppState, headers: &HeaderMap) -> Option<Caller> {
     let keys = &state.access.keys;
     let presented = bearer(headers).or_else(|| offered_token(headers));
-    if let Some(text) = presented.filter(|text| text.starts_with(token::PREFIX)) {
+    if let Some(text) = presented.filter(|text| text.starts_with(TOKEN_PREFIX)) {
         let token = state.access.tokens.verify(text, state.now())?;
         // The token ends with its key.
         let has_key = !keys.are_needed() || keys.has_owner(&token.owner);
@@ -98,5 +98,5 @@ fn offered_token(headers: &HeaderMap) -> Option<&str> {
         .flat_map(|value| value.split(','));
     offers
         .map(str::trim)
-        .find(|offer| offer.starts_with(token::PREFIX))
+        .find(|offer| offer.starts_with(TOKEN_PREFIX))
 }

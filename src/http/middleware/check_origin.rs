@@ -1,9 +1,8 @@
 //! Refuses requests that a browser sends for a page of another origin, or under the name of another host.
 //!
 //! A browser sends "simple" posts of any page without asking first; CORS only hides the answer from the page. So the
-//! origin is checked, too. So is the [host](super::hosts).
+//! origin is checked, too. So is the [host](AllowedHosts).
 
-use crate::http::auth::hosts::AllowedHosts;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
@@ -11,6 +10,7 @@ use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use bagtrack_access::AllowedHosts;
 use bagtrack_config::Config;
 
 /// The middleware.

@@ -1,6 +1,6 @@
 //! `GET /metrics`, for Prometheus.
 
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::query::NoQuery;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;

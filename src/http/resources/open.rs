@@ -1,6 +1,6 @@
 //! `POST /sessions` and `PUT /sessions/{id}`: a first frame and a box, or a snapshot, open a session.
 
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;

@@ -1,13 +1,13 @@
 //! `POST /sessions/{id}/token`: a token with which a web page may use this session, and nothing else.
 
-use crate::http::auth::caller::Caller;
-use crate::http::auth::token::SessionToken;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
 use crate::http::respond::json::Json;
 use crate::http::state::AppState;
 use axum::extract::State;
+use bagtrack_access::SessionToken;
 use bagtrack_api::{self as api, requests::TokenSettings};
 use std::time::Duration;
 

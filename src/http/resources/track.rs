@@ -1,7 +1,7 @@
 //! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
 
 use super::track_video::{Track, VideoTrack};
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;

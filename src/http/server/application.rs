@@ -7,12 +7,11 @@
 use super::connection_service::ConnectionService;
 use super::refusal;
 use super::service::{Parts, Service};
-use crate::http::auth::access::{Access, AccessError};
-use crate::http::auth::keys::ApiKeys;
 use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
+use bagtrack_access::{Access, AccessError, ApiKeys};
 use bagtrack_cli::ModelFiles;
 #[cfg(feature = "tls")]
 use bagtrack_config::TlsConfig;

@@ -1,11 +1,11 @@
 //! The service without a network: its routes, and what goes on beside requests.
 
 use super::application::BindError;
-use crate::http::auth::access::Access;
 use crate::http::quotas::client::Peer;
 use crate::http::server::router::router;
 use crate::http::state::AppState;
 use axum::{Extension, Router};
+use bagtrack_access::Access;
 use bagtrack_config::Config;
 use bagtrack_sessions::clock::interval;
 use bagtrack_sessions::{Clock, Executor, SessionStore};

@@ -4,10 +4,10 @@
 
 mod saturation;
 
-use crate::http::auth::access::Access;
 use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
+use bagtrack_access::Access;
 use bagtrack_config::Config;
 use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,

@@ -2,7 +2,7 @@
 
 use super::message;
 use super::waiting::{Arrived, ArrivedFrame, Waiting};
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::clients::Account;

@@ -5,7 +5,7 @@ use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::Upgrade;
 use super::waiting::Waiting;
-use crate::http::auth::caller::Caller;
+use crate::http::extract::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::session_path::SessionPath;

@@ -1,9 +1,9 @@
 //! Who makes a request.
 
-use super::token::SessionToken;
 use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
+use bagtrack_access::SessionToken;
 use bagtrack_sessions::{Owner, SessionName};
 use std::io;
 use std::sync::Arc;

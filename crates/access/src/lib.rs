@@ -1,0 +1,26 @@
+//! Who may use the service.
+//!
+//! In: what a request presents. Out: the [`Owner`](bagtrack_sessions::Owner) whose key that is, or what a
+//! [`SessionToken`] says; and whether the request may name its host ([`AllowedHosts`]).
+//!
+//! An API key opens sessions, and a session belongs to the name of the key that opened it: to others it is 404. Several
+//! keys may have one name, so that a key can be replaced. For a web page, which cannot keep a key, whoever has one can
+//! make a session token: it is good for one session and a limited time, and nothing about it is stored.
+//!
+//! What can go wrong: a key is guessed by timing (digests are compared in constant time), or leaks by the log (it is
+//! never logged, and [`Secret`](bagtrack_config::Secret) does not show itself); a file of keys is broken when it is read
+//! again (the keys before stay); the service is open to a network by accident (it does not start then: see
+//! [`AccessError`]); a web page elsewhere uses the browser of somebody inside (its host is checked here, and its origin
+//! by the service).
+
+#![warn(clippy::disallowed_methods)]
+
+mod access;
+mod hosts;
+mod keys;
+mod token;
+
+pub use access::{Access, AccessError};
+pub use hosts::AllowedHosts;
+pub use keys::{ApiKeys, KeysError};
+pub use token::{PREFIX as TOKEN_PREFIX, SessionToken, TokenKeys};
