@@ -22,7 +22,6 @@ const FIRST: &[&str] = &[
     "/sessions/{id}/bag.png",
     "/sessions/{id}/token",
     "/track",
-    "/integrations/cvat",
     "/version",
     "/healthz",
     "/readyz",
