@@ -49,5 +49,6 @@ pub use bagtrack_net::{Certificate, CertificateError};
 pub use middleware::forwarded::address as forwarded_address;
 pub use quotas::client::Client;
 pub use resources::routes::document as openapi_document;
-pub use server::application::{Application, BindError, Shutdown};
+pub use server::application::{Application, Shutdown};
+pub use server::bind_error::BindError;
 pub use server::service::{Parts, Service};

@@ -4,6 +4,7 @@
 //! hyper's connection builder has one. Connections are [counted](Connections), too. On shutdown, busy ones get a
 //! bounded time to end.
 
+use super::bind_error::BindError;
 use super::connection_service::ConnectionService;
 use super::refusal;
 use super::service::{Parts, Service};
@@ -11,16 +12,16 @@ use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
-use bagtrack_access::{Access, AccessError, ApiKeys};
+use bagtrack_access::{Access, ApiKeys};
 use bagtrack_cli::ModelFiles;
+use bagtrack_config::Config;
 #[cfg(feature = "tls")]
 use bagtrack_config::TlsConfig;
-use bagtrack_config::{Config, ConfigError};
 #[cfg(feature = "tls")]
 use bagtrack_net::{Certificate, CertificateError};
 use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security};
 use bagtrack_sessions::clock::{sleep, timeout};
-use bagtrack_sessions::{Clock, Executor, FileStoreError};
+use bagtrack_sessions::{Clock, Executor};
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -31,38 +32,6 @@ use tokio::sync::watch;
 
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);
-
-/// Why the service could not start.
-#[derive(Debug, thiserror::Error)]
-pub enum BindError {
-    /// A setting is out of its range.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The keys cannot be used, or the service would be open to a network.
-    #[error(transparent)]
-    Access(#[from] AccessError),
-    /// There is no certificate to show, where the settings name one.
-    #[cfg(feature = "tls")]
-    #[error(transparent)]
-    Certificate(#[from] CertificateError),
-    /// The address cannot be listened on.
-    #[error("cannot listen on {address} (--listen, BAGTRACK_LISTEN): {source}")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The folder of the store cannot be used.
-    #[error("{0} (--store, BAGTRACK_STORE)")]
-    Store(#[from] FileStoreError),
-    /// The network of the second opinion cannot be used.
-    #[error("{0} (--model, BAGTRACK_MODEL)")]
-    Model(String),
-    /// The system gives no threads.
-    #[error("cannot start the workers (--workers, BAGTRACK_WORKERS): {0}")]
-    Workers(io::Error),
-}
 
 /// How a service ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,6 +7,7 @@
 //! connection when the service ends, and is cut off.
 
 pub mod application;
+pub mod bind_error;
 mod connection_service;
 mod refusal;
 pub mod router;

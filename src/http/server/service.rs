@@ -1,6 +1,6 @@
 //! The service without a network: its routes, and what goes on beside requests.
 
-use super::application::BindError;
+use super::bind_error::BindError;
 use crate::http::quotas::client::Peer;
 use crate::http::server::router::router;
 use crate::http::state::AppState;
