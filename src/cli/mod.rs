@@ -12,7 +12,6 @@ mod confined;
 mod evaluate;
 #[cfg(feature = "otel")]
 mod export;
-mod formats;
 mod headings;
 mod health;
 mod log;

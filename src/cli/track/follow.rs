@@ -5,7 +5,7 @@ use super::frames::{FrameFile, Frames};
 use super::interrupt::Interrupt;
 use super::rows::Rows;
 use super::targets::Targets;
-use crate::cli::formats::{Clip, Row};
+use bagtrack_formats::{Clip, Row};
 use bagtrack_sessions::Selection;
 use bagtrack_tracker::{Expert, Params, Rect};
 use indicatif::ProgressBar;

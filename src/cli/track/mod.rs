@@ -17,7 +17,7 @@ mod targets;
 mod video_file;
 mod video_info;
 
-use super::formats::{Columns, Format};
+use bagtrack_formats::{Columns, Format};
 use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
@@ -148,16 +148,8 @@ fn check(args: &Args) -> Result<(), String> {
             "--box is given {count} times; {MAX_TARGETS} targets are followed at most"
         ));
     }
-    if count > 1 && !args.format.has_target() {
-        return Err(
-            "--format otb has one target a file: take --format mot or csv, or run once for each box".to_owned(),
-        );
-    }
-    if args.keyframes && !args.format.takes_key_frames() {
-        let text =
-            "otb, coco and yolo have boxes of every frame: take another --format for --keyframes";
-        return Err(text.to_owned());
-    }
+    let fits = args.format.check(count, args.keyframes);
+    fits.map_err(|unfit| format!("--format: {unfit}"))?;
     if args.backwards && args.start.is_none() {
         let text = "--backwards goes from --start to the first frame: give --start, a frame's number or time";
         return Err(text.to_owned());

@@ -1,6 +1,6 @@
 //! Where the boxes are written: standard output, a new file, or a new folder.
 
-use crate::cli::formats::{Clip, Columns, Form, Format, Lines, Row, TextFile};
+use bagtrack_formats::{Clip, Columns, Form, Format, Lines, Row, TextFile};
 use bagtrack_cli::output::new_folder;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};

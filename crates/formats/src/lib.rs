@@ -1,9 +1,10 @@
-//! How `bagtrack track` writes boxes: one file a format.
+//! Tracked boxes as the files that other tools read: one file of this crate a format.
 //!
 //! In: a [`Row`] for each target in each frame, and the [`Clip`] that they are of. Out: a line for each row, a document,
 //! or the texts of a folder. `text`, `json` and `csv` have 0-based pixels, as the service does, with the score and the
-//! status; the others are what the tools read that they are named after. The page saves the same (`web/save.js`), and
-//! `tools/exports.sh` lets the tools' own readers read both.
+//! status; the others are what the tools read that they are named after. `bagtrack track` writes them, and the service
+//! answers them (`POST /track?format=…`). The page saves the same (`web/save.js`), and `tools/exports.sh` lets the tools'
+//! own readers read all three.
 
 mod clip;
 mod coco;
@@ -43,6 +44,17 @@ pub enum Format {
     LabelStudio,
 }
 
+/// What a format cannot say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unfit {
+    /// It does not tell which target a box is of.
+    #[error("otb has one target a file: take mot or csv, or track each box for itself")]
+    Targets,
+    /// It does not say what is between two key frames.
+    #[error("otb, coco and yolo have boxes of every frame: take another format for key frames")]
+    KeyFrames,
+}
+
 /// What a format makes of rows.
 pub enum Form {
     /// A line for each row, which is written at once.
@@ -71,14 +83,17 @@ pub struct TextFile {
 }
 
 impl Format {
-    /// Whether it tells which frame and target a box is of.
-    pub fn has_target(self) -> bool {
-        self != Self::Otb
-    }
-
-    /// Whether it says what is between two key frames, or leaves it to who reads it.
-    pub fn takes_key_frames(self) -> bool {
-        !matches!(self, Self::Otb | Self::Coco | Self::Yolo)
+    /// Whether it can say what is asked for.
+    ///
+    /// # Errors
+    /// See [`Unfit`].
+    pub fn check(self, targets: usize, only_key_frames: bool) -> Result<(), Unfit> {
+        let takes_key_frames = !matches!(self, Self::Otb | Self::Coco | Self::Yolo);
+        match self {
+            Self::Otb if targets > 1 => Err(Unfit::Targets),
+            _ if only_key_frames && !takes_key_frames => Err(Unfit::KeyFrames),
+            _ => Ok(()),
+        }
     }
 
     /// What it makes of rows.
