@@ -177,6 +177,126 @@ async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
     }
 }
 
+/// A part of the clip: settings of the service, and flags of the command that say the same.
+type Part = (
+    &'static [(&'static str, &'static str)],
+    &'static [&'static str],
+);
+
+/// The file that the command writes of the first box and others.
+fn file(video: &Path, format: &str, flags: &[&str]) -> String {
+    let written = video.with_file_name(format!("written.{format}"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    command.arg("track").arg(video);
+    command.args(["--format", format, "--seed", "7", "--box", BOXES[0]]);
+    command.args(flags).arg("-o");
+    let output = command.arg(&written).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = std::fs::read_to_string(&written).unwrap();
+    std::fs::remove_file(written).unwrap();
+    text
+}
+
+#[tokio::test]
+async fn a_video_is_answered_by_the_file_that_the_command_writes() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let video = clip(folder.path());
+    let app = TestApplication::start().await;
+    let both = BOXES.join(";");
+    let named = ["--box", BOXES[1], "--name", "a <van>", "--name", "ground"];
+    let parts: [Part; 3] = [
+        (&[("start", "30")], &["--start", "30"]),
+        (
+            &[("start", "30"), ("count", "9")],
+            &["--start", "30", "--frames", "9"],
+        ),
+        (
+            &[("start", "30"), ("backwards", "true")],
+            &["--start", "30", "--backwards"],
+        ),
+    ];
+    for (format, media_type) in [
+        ("text", "text/plain; charset=utf-8"),
+        ("json", "application/x-ndjson"),
+        ("csv", "text/csv; charset=utf-8"),
+        ("mot", "text/plain; charset=utf-8"),
+        ("coco", "application/json"),
+        ("cvat", "application/xml"),
+        ("label-studio", "application/json"),
+    ] {
+        for (query, flags) in parts {
+            let given = [
+                ("boxes", both.as_str()),
+                ("names", "a <van>, ground"),
+                ("video_name", "clip.mp4"),
+                ("rate", "30"),
+                ("seed", "7"),
+                ("format", format),
+            ];
+            let answer = track(&app, &video, &[&given, query].concat()).await;
+            assert_eq!(answer.status(), 200, "{format}: {answer:?}");
+            assert_eq!(answer.headers()["content-type"], media_type);
+            let expected = file(&video, format, &[flags, &named].concat());
+            assert!(expected.len() > 500, "{format}: {expected}");
+            assert!(
+                answer.text().await.unwrap() == expected,
+                "{format} {flags:?}"
+            );
+        }
+    }
+    let otb = [("box", BOXES[0]), ("seed", "7"), ("format", "otb")];
+    let answer = track(&app, &video, &otb).await.text().await.unwrap();
+    assert_eq!(answer, file(&video, "otb", &[]));
+}
+
+#[tokio::test]
+async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let video = clip(folder.path());
+    let app = TestApplication::start().await;
+    let both = BOXES.join(";");
+    let one = ("box", BOXES[0]);
+    for (query, word) in [
+        (
+            &[("boxes", both.as_str()), ("format", "otb")][..],
+            "one target a file",
+        ),
+        (
+            &[one, ("format", "coco"), ("keyframes", "true")],
+            "another format for key frames",
+        ),
+        (
+            &[one, ("format", "yolo")],
+            "expected one of `text`, `json`, `csv`",
+        ),
+        (
+            &[one, ("format", "cvat"), ("names", "van,rider")],
+            "2 names, for 1 boxes",
+        ),
+        (
+            &[one, ("format", "cvat"), ("names", "van\u{1}")],
+            "no control characters",
+        ),
+        (&[one, ("format", "csv"), ("rate", "0")], "frames a second"),
+        (&[one, ("names", "van")], "give its `format`"),
+    ] {
+        let refused = track(&app, &video, query).await;
+        let problem = expect_problem(refused, "malformed-request").await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(word), "{query:?}: {detail}");
+    }
+    let jpeg = folder.path().join("clip/img/0001.jpg");
+    let refused = track(&app, &jpeg, &[one, ("format", "csv")]).await;
+    let problem = expect_problem(refused, "malformed-request").await;
+    assert!(problem["detail"].as_str().unwrap().contains("for a video"));
+}
+
 #[tokio::test]
 async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
     if !has_ffmpeg() {

@@ -73,6 +73,27 @@ pub struct Lines {
     pub line: fn(&Row, Columns) -> serde_json::Result<String>,
 }
 
+impl Lines {
+    fn text(&self, rows: &[Row], columns: Columns) -> serde_json::Result<String> {
+        let mut text = String::new();
+        for line in (self.header)(columns) {
+            text += &line;
+            text.push('\n');
+        }
+        for row in rows {
+            text += &(self.line)(row, columns)?;
+            text.push('\n');
+        }
+        Ok(text)
+    }
+}
+
+/// Rows as documents and folders have them: frame by frame, forwards.
+pub fn in_order(rows: &mut [Row]) -> &[Row] {
+    rows.sort_by_key(|row| (row.frame, row.target));
+    rows
+}
+
 /// A text of a folder.
 #[derive(Debug)]
 pub struct TextFile {
@@ -93,6 +114,27 @@ impl Format {
             Self::Otb if targets > 1 => Err(Unfit::Targets),
             _ if only_key_frames && !takes_key_frames => Err(Unfit::KeyFrames),
             _ => Ok(()),
+        }
+    }
+
+    /// One text of all rows of a clip, those of a folder one after the other. The rows are in the order in which they were
+    /// tracked.
+    ///
+    /// # Errors
+    /// A number cannot be written.
+    pub fn text(
+        self,
+        clip: &Clip,
+        columns: Columns,
+        mut rows: Vec<Row>,
+    ) -> serde_json::Result<String> {
+        match self.form() {
+            Form::Lines(lines) => lines.text(&rows, columns),
+            Form::Document(make) => make(clip, in_order(&mut rows)),
+            Form::Folder(make) => {
+                let texts = make(clip, in_order(&mut rows))?;
+                Ok(texts.into_iter().map(|file| file.text).collect())
+            }
         }
     }
 

@@ -17,8 +17,8 @@ mod targets;
 mod video_file;
 mod video_info;
 
-use bagtrack_formats::{Columns, Format};
 use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
+use bagtrack_formats::{Columns, Format};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
 use drawn::Destination;

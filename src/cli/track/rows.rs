@@ -1,7 +1,7 @@
 //! Where the boxes are written: standard output, a new file, or a new folder.
 
-use bagtrack_formats::{Clip, Columns, Form, Format, Lines, Row, TextFile};
 use bagtrack_cli::output::new_folder;
+use bagtrack_formats::{Clip, Columns, Form, Format, Lines, Row, TextFile, in_order};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -110,12 +110,6 @@ impl Rows {
             }
         }
     }
-}
-
-/// Rows as documents have them: frame by frame, forwards.
-fn in_order(rows: &mut [Row]) -> &[Row] {
-    rows.sort_by_key(|row| (row.frame, row.target));
-    rows
 }
 
 impl Output {

@@ -31,6 +31,8 @@ pub struct RangeFrames {
     /// Those that are still to be given backwards; the next one is the last.
     kept: VecDeque<Bytes>,
     bytes: usize,
+    /// Whether there is a frame after `start`, where the frames go backwards from there.
+    goes_on: bool,
 }
 
 impl RangeFrames {
@@ -44,6 +46,7 @@ impl RangeFrames {
             given: 0,
             kept: VecDeque::new(),
             bytes: 0,
+            goes_on: false,
         }
     }
 
@@ -94,9 +97,18 @@ impl RangeFrames {
             }
         }
         if backwards {
+            self.goes_on = self.video.next().await.is_some();
             self.video.end();
         }
         Ok(())
+    }
+
+    /// Whether the video has a frame after all that were given. No other one is given afterwards.
+    pub async fn go_on(&mut self) -> bool {
+        match self.range.backwards {
+            true => self.goes_on,
+            false => self.video.next().await.is_some(),
+        }
     }
 }
 

@@ -15,5 +15,6 @@ pub mod session;
 pub mod snapshot;
 pub mod token;
 pub mod track;
+mod track_file;
 mod track_video;
 pub mod version;

@@ -1,6 +1,7 @@
 //! `POST /track`: a snapshot and a frame get a box and a new snapshot. Nothing is kept here.
 
-use super::track_video::{Track, VideoTrack};
+use super::track_file::TrackFile;
+use super::track_video::{Track, VideoAnswers, VideoTrack};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides;
@@ -41,7 +42,8 @@ type TrackJson = JsonBody<TrackSettings>;
 /// (`application/x-ndjson`), as soon as it is tracked, the first one being the box. Where the rest cannot be tracked,
 /// the last line is a problem document. `start`, `count`, `backwards`, `until_lost` and `keyframes` propagate the boxes
 /// from one frame through those after it, or before it; `frame` is then the number in the video. The boxes are those of
-/// `bagtrack track` with these options and the same seed.
+/// `bagtrack track` with these options and the same seed. With `format` the answer is the file that the command writes,
+/// when all is tracked.
 ///
 /// `curl -N --data-binary @clip.mp4 'http://localhost:8080/track?box=10,20,30,40'`
 ///
@@ -67,8 +69,12 @@ type TrackJson = JsonBody<TrackSettings>;
     ),
     responses(
         (
-            status = 200, description = "Where the target is, and the new snapshot; for a video, a line for each frame",
-            content((Tracked = "application/json"), (String = "application/x-ndjson"))
+            status = 200,
+            description = "Where the target is, and the new snapshot; for a video, a line for each frame, or a file",
+            content(
+                (Tracked = "application/json"), (String = "application/x-ndjson"), (String = "text/csv"),
+                (String = "text/plain"), (String = "application/xml")
+            )
         )
     )
 )]
@@ -133,22 +139,30 @@ async fn track_video(
     }
     let video = request.upload.files.swap_remove(0);
     let settings = request.upload.settings;
-    let range = range(&settings)?;
+    let (range, file) = (range(&settings)?, TrackFile::asked(&settings)?);
     let (until_lost, keyframes) = (settings.until_lost.0, settings.keyframes.0);
     let (boxes, params) = begin(settings)?;
     let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let targets = boxes.as_slice().len();
     let pictures = VideoFrames::decode(&state, video, format, place).await?;
-    let frames = VideoTrack {
+    let charge = state.charge(&request.client);
+    let video = VideoTrack {
         queue: queue.for_frames(targets),
         frames: RangeFrames::new(pictures, range, state.charge(&request.client)),
         client: request.client,
         track: Track::Start(boxes, params),
-        selection: Selection::new(targets, until_lost, keyframes),
-        end: None,
         state: state.clone(),
     };
-    ndjson::respond(state, request.instance, frames).await
+    if let Some(file) = file {
+        let selection = Selection::new(targets, until_lost, keyframes);
+        return file.respond(video, selection, charge).await;
+    }
+    let answers = VideoAnswers {
+        video,
+        selection: Selection::new(targets, until_lost, keyframes),
+        end: None,
+    };
+    ndjson::respond(state, request.instance, answers).await
 }
 
 /// Which frames of a video are tracked.
@@ -180,9 +194,10 @@ fn begin(settings: TrackSettings) -> Result<(Boxes, Box<Params>), Problem> {
 fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
     let switches = [settings.backwards, settings.until_lost, settings.keyframes];
     let is_given = settings.start.is_some() || settings.count.is_some();
-    match is_given || switches.contains(&Switch(true)) {
+    let is_file = TrackFile::asked(settings)?.is_some();
+    match is_given || is_file || switches.contains(&Switch(true)) {
         true => Err(Problem::malformed(
-            "`start`, `count`, `backwards`, `until_lost` and `keyframes` are for a video.",
+            "`start`, `count`, `backwards`, `until_lost`, `keyframes` and `format` are for a video.",
         )),
         false => Ok(()),
     }

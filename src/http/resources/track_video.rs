@@ -9,8 +9,10 @@ use crate::http::respond::ndjson::FrameSequence;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_api::Answer;
-use bagtrack_sessions::{Boxes, QueuePermit, Selection, SessionState, Start, box_warnings};
-use bagtrack_tracker::{Estimate, Params};
+use bagtrack_sessions::{
+    Boxes, Estimates, QueuePermit, Selection, SessionState, Start, box_warnings,
+};
+use bagtrack_tracker::Params;
 use std::sync::Arc;
 
 /// A video that is tracked.
@@ -26,6 +28,80 @@ pub struct VideoTrack {
     pub frames: RangeFrames,
     /// How far it is tracked.
     pub track: Track,
+}
+
+/// How far a video is tracked.
+#[derive(Debug)]
+pub enum Track {
+    /// It begins with these targets in the first frame.
+    Start(Boxes, Box<Params>),
+    /// Up to here.
+    At(Box<SessionState>),
+    /// A frame could not be tracked.
+    Ended,
+}
+
+/// What was found in a frame.
+#[derive(Debug)]
+pub struct TrackedFrame {
+    /// Its number in the video.
+    pub number: u64,
+    /// Its width and height in pixels.
+    pub size: (u32, u32),
+    /// Where the targets are.
+    pub estimates: Estimates,
+    /// What may be wrong with the boxes that were given.
+    pub warnings: Option<Vec<String>>,
+}
+
+impl VideoTrack {
+    /// Tracks through the next frame; none after the last.
+    ///
+    /// # Errors
+    /// The frame cannot be had, or not be tracked. Then no other one is.
+    pub async fn next(&mut self) -> Result<Option<TrackedFrame>, Problem> {
+        let Some(next) = self.frames.next().await else {
+            return Ok(None);
+        };
+        let (number, file) = next?;
+        count_frame(&self.state, &self.client).await?;
+        let (track, warnings) = self.step(file).await?;
+        let frame = TrackedFrame {
+            number,
+            size: track.source_size(),
+            estimates: track.latest(),
+            warnings,
+        };
+        self.track = Track::At(Box::new(track));
+        Ok(Some(frame))
+    }
+
+    /// The track with this frame, and what may be wrong with the boxes that were given.
+    async fn step(&mut self, file: Bytes) -> Result<(SessionState, Option<Vec<String>>), Problem> {
+        let (service, queue) = (&self.state.service, self.queue.clone());
+        match std::mem::replace(&mut self.track, Track::Ended) {
+            Track::Start(boxes, params) => {
+                let given = boxes.clone();
+                let start = Start::Frame {
+                    file,
+                    boxes,
+                    params,
+                };
+                let track = service.begin_track(queue, start).await?;
+                let warnings = box_warnings(given.as_slice(), track.source_size());
+                Ok((track, warnings))
+            }
+            Track::At(track) => Ok((service.continue_track(queue, *track, file).await?, None)),
+            Track::Ended => Err(Problem::missing_frame()),
+        }
+    }
+}
+
+/// The answers to the frames of a video, as they are tracked.
+#[derive(Debug)]
+pub struct VideoAnswers {
+    /// The video.
+    pub video: VideoTrack,
     /// Which answers are given.
     pub selection: Selection<Arc<Answer>>,
     /// Why no further frame is tracked, once there is none.
@@ -41,18 +117,7 @@ pub enum End {
     Refused(Problem),
 }
 
-/// How far a video is tracked.
-#[derive(Debug)]
-pub enum Track {
-    /// It begins with these targets in the first frame.
-    Start(Boxes, Box<Params>),
-    /// Up to here.
-    At(Box<SessionState>),
-    /// A frame could not be tracked.
-    Ended,
-}
-
-impl FrameSequence for VideoTrack {
+impl FrameSequence for VideoAnswers {
     type Answer = Answer;
 
     async fn next(&mut self) -> Option<Result<Answer, Problem>> {
@@ -76,52 +141,25 @@ impl FrameSequence for VideoTrack {
     }
 }
 
-/// The answer of a frame, whose rows are the same for each target; none where no row is given.
-fn only(rows: Vec<Arc<Answer>>) -> Option<Answer> {
-    rows.into_iter().next().map(Arc::unwrap_or_clone)
-}
-
-impl VideoTrack {
+impl VideoAnswers {
     /// Tracks through the next frame, and gives the answer that is known to be wanted now.
     async fn step(&mut self) -> Result<Option<Answer>, End> {
         if self.selection.has_ended() {
             return Err(End::Complete);
         }
-        let (number, file) = match self.frames.next().await {
-            None => return Err(End::Complete),
-            Some(next) => next.map_err(End::Refused)?,
-        };
-        let (estimates, answer) = self.track(file).await.map_err(End::Refused)?;
+        let next = self.video.next().await.map_err(End::Refused)?;
+        let frame = next.ok_or(End::Complete)?;
         let answer = Arc::new(Answer {
-            frame: number,
-            ..answer
+            frame: frame.number,
+            ..answer(&frame.estimates, frame.warnings)
         });
-        let rows = estimates.into_iter().map(|it| (it, answer.clone()));
+        let estimates = frame.estimates.as_slice().iter();
+        let rows = estimates.map(|it| (*it, answer.clone()));
         Ok(only(self.selection.take(rows)))
     }
+}
 
-    /// The answers for the targets in a frame, and the line of it.
-    async fn track(&mut self, file: Bytes) -> Result<(Vec<Estimate>, Answer), Problem> {
-        count_frame(&self.state, &self.client).await?;
-        let (service, queue) = (&self.state.service, self.queue.clone());
-        let (track, warnings) = match std::mem::replace(&mut self.track, Track::Ended) {
-            Track::Start(boxes, params) => {
-                let given = boxes.clone();
-                let start = Start::Frame {
-                    file,
-                    boxes,
-                    params,
-                };
-                let track = service.begin_track(queue, start).await?;
-                let warnings = box_warnings(given.as_slice(), track.source_size());
-                (track, warnings)
-            }
-            Track::At(track) => (service.continue_track(queue, *track, file).await?, None),
-            Track::Ended => return Err(Problem::missing_frame()),
-        };
-        let estimates = track.latest();
-        let answer = answer(&estimates, warnings);
-        self.track = Track::At(Box::new(track));
-        Ok((estimates.as_slice().to_vec(), answer))
-    }
+/// The answer of a frame, whose rows are the same for each target; none where no row is given.
+fn only(rows: Vec<Arc<Answer>>) -> Option<Answer> {
+    rows.into_iter().next().map(Arc::unwrap_or_clone)
 }

@@ -16,7 +16,10 @@ pub use settings::{
     BagSettings, CreateSettings, FramesSettings, StreamSettings, TargetSettings, TokenSettings,
     TrackSettings,
 };
-pub use values::{FrameNumber, MAX_EXACT, Seed, Switch, TargetNumber, number_schema, whole};
+pub use values::{
+    FrameNumber, FrameRate, MAX_EXACT, Name, Names, Seed, Switch, TargetNumber, TrackFormat,
+    number_schema, whole,
+};
 
 use serde::de::DeserializeOwned;
 use utoipa::IntoParams;

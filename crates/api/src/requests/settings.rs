@@ -1,6 +1,9 @@
 //! The settings of each call.
 
-use super::values::{BoxText, BoxesText, FrameNumber, ParametersText, Seed, Switch, TargetNumber};
+use super::values::{
+    BoxText, BoxesText, FrameNumber, FrameRate, Name, Names, NamesText, ParametersText, Seed,
+    Switch, TargetNumber, TrackFormat,
+};
 use super::{FrameCount, Settings};
 use crate::boxes::Boxes;
 use crate::parameters::{Parameters, PresetName};
@@ -131,6 +134,28 @@ pub struct TrackSettings {
     #[param(value_type = bool, required = false, default = false)]
     #[serde(default)]
     pub keyframes: Switch,
+    /// Of a video, answer one file of this format when all is tracked, as `bagtrack track --format` writes it: a table
+    /// for people, JSON lines, CSV, the result files of the Object Tracking Benchmark and of the MOTChallenge, COCO,
+    /// CVAT for video 1.1 or Label Studio.
+    #[param(nullable = false, inline)]
+    pub format: Option<TrackFormat>,
+    /// With `format`, what the targets are called, in their order: `van,rider`, or a JSON array of texts. The others are
+    /// called `Object 1`, `Object 2`, …
+    #[param(value_type = NamesText, inline, required = false)]
+    pub names: Option<Names>,
+    /// With `format`, what the video is called in the file: its name, or for `label-studio` its address.
+    #[param(value_type = String, required = false, nullable = false, max_length = 200)]
+    pub video_name: Option<Name>,
+    /// With `format`, the video's frames a second, which give the times in the file. Without it `text`, `json` and `csv`
+    /// have no times, and `label-studio` those of 25 frames a second.
+    #[param(
+        value_type = f64,
+        required = false,
+        nullable = false,
+        exclusive_minimum = 0,
+        maximum = 1000
+    )]
+    pub rate: Option<FrameRate>,
 }
 
 impl Settings for TrackSettings {

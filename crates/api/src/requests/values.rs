@@ -22,6 +22,106 @@ impl<'de> Deserialize<'de> for Switch {
     }
 }
 
+/// The formats of tracked boxes beside the service's own answers: those of `bagtrack track --format` that are one file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrackFormat {
+    /// A table for people.
+    Text,
+    /// A JSON object a line.
+    Json,
+    /// Comma-separated values with a header.
+    Csv,
+    /// The result file of the Object Tracking Benchmark.
+    Otb,
+    /// The result file of the MOTChallenge.
+    Mot,
+    /// COCO's JSON.
+    Coco,
+    /// CVAT for video 1.1.
+    Cvat,
+    /// Label Studio's JSON.
+    LabelStudio,
+}
+
+/// Most characters of a name in a file.
+const MAX_NAME: usize = 200;
+
+/// What something is called in a file. Documents have no signs in their texts that nobody can see.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Name(pub String);
+
+impl TryFrom<String> for Name {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let is_name = (1..=MAX_NAME).contains(&text.chars().count());
+        match is_name && !text.chars().any(char::is_control) {
+            true => Ok(Self(text)),
+            false => Err(format!(
+                "a name has 1 to {MAX_NAME} characters, and no control characters"
+            )),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Name {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::try_from(String::deserialize(deserializer)?).map_err(D::Error::custom)
+    }
+}
+
+/// The names of the targets, at most as many as there can be: `van,rider`, or a JSON array where one has a comma.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Names(pub Vec<Name>);
+
+impl<'de> Deserialize<'de> for Names {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = Cow::<str>::deserialize(deserializer)?;
+        let names: Vec<Name> = match text.starts_with('[') {
+            true => serde_json::from_str(&text).map_err(D::Error::custom)?,
+            false => {
+                let names = text
+                    .split(',')
+                    .map(|name| name.trim().to_owned().try_into());
+                names.collect::<Result<_, _>>().map_err(D::Error::custom)?
+            }
+        };
+        match names.len() <= MAX_TARGETS {
+            true => Ok(Self(names)),
+            false => Err(D::Error::custom(format!(
+                "there are at most {MAX_TARGETS} targets to name"
+            ))),
+        }
+    }
+}
+
+/// The names as a text, in the query and in forms.
+#[derive(Debug)]
+pub struct NamesText;
+
+impl ToSchema for NamesText {}
+
+impl PartialSchema for NamesText {
+    fn schema() -> RefOr<Schema> {
+        let words = "Separated by commas, or a JSON array of texts.";
+        text_of("names").description(Some(words)).build().into()
+    }
+}
+
+/// Frames a second, above 0 and at most 1000.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameRate(pub f64);
+
+impl<'de> Deserialize<'de> for FrameRate {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = Cow::<str>::deserialize(deserializer)?;
+        let rate = text.parse().ok().filter(|rate| 0.0 < *rate && *rate <= 1e3);
+        rate.map(Self)
+            .ok_or_else(|| D::Error::custom("`rate` is a number of frames a second, up to 1000"))
+    }
+}
+
 /// The greatest number that JSON holds exactly in every language: 2^53 - 1.
 pub const MAX_EXACT: u64 = (1 << 53) - 1;
 const MAX_TARGET: u64 = MAX_TARGETS as u64 - 1;

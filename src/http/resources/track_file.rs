@@ -1,0 +1,162 @@
+//! `POST /track` with a video and a format: one file when all is tracked, as `bagtrack track --format` writes it.
+
+use super::track_video::{TrackedFrame, VideoTrack};
+use crate::http::problems::problem::Problem;
+use crate::http::respond::charged_body::charged_body;
+use axum::response::{IntoResponse, Response};
+use bagtrack_api::media_types::LINES;
+use bagtrack_api::requests::{TrackFormat, TrackSettings};
+use bagtrack_formats::{Clip, Columns, Format, Row};
+use bagtrack_sessions::{Charge, Selection, WorkMeter};
+use std::sync::Arc;
+
+/// Bytes that a row and its part of the file take at most.
+const ROW_BYTES: usize = 1024;
+/// Frames a second, where the caller does not tell.
+const USUAL_RATE: f64 = 25.0;
+
+/// What a file of tracked boxes says beside them.
+#[derive(Debug)]
+pub struct TrackFile {
+    format: Format,
+    media_type: &'static str,
+    /// What each target is called.
+    names: Vec<String>,
+    /// What the video is called.
+    video: String,
+    /// Frames a second.
+    rate: Option<f64>,
+}
+
+impl TrackFile {
+    /// The file that is asked for; none where the answers are to come frame by frame.
+    ///
+    /// # Errors
+    /// Its format cannot say what is asked for, or something is said of a file that is not asked for.
+    pub fn asked(settings: &TrackSettings) -> Result<Option<Self>, Problem> {
+        let Some(format) = settings.format else {
+            let said = [
+                settings.names.is_some(),
+                settings.video_name.is_some(),
+                settings.rate.is_some(),
+            ];
+            return match said.contains(&true) {
+                true => Err(Problem::malformed(
+                    "`names`, `video_name` and `rate` are written to a file: give its `format`.",
+                )),
+                false => Ok(None),
+            };
+        };
+        let (format, media_type) = format_of(format);
+        let boxes = settings.boxes.as_ref();
+        let targets = boxes.map_or(1, |boxes| boxes.as_slice().len());
+        let fits = format.check(targets, settings.keyframes.0);
+        fits.map_err(|unfit| Problem::malformed(format!("`format`: {unfit}.")))?;
+        Ok(Some(Self {
+            format,
+            media_type,
+            names: names(settings, targets)?,
+            video: match &settings.video_name {
+                Some(name) => name.0.clone(),
+                None => "video".to_owned(),
+            },
+            rate: settings.rate.map(|rate| rate.0),
+        }))
+    }
+
+    /// Tracks the video to its end, and answers with the file. Its memory is charged as its rows come.
+    ///
+    /// # Errors
+    /// A frame cannot be had or not be tracked, or there is no memory for the rows.
+    pub async fn respond(
+        self,
+        mut video: VideoTrack,
+        mut selection: Selection<Row>,
+        mut charge: Charge,
+    ) -> Result<Response, Problem> {
+        let (mut rows, mut size) = (Vec::new(), (0, 0));
+        while !selection.has_ended() {
+            let Some(frame) = video.next().await? else {
+                break;
+            };
+            size = frame.size;
+            let new = selection.take(self.rows(&frame));
+            charge.grow(ROW_BYTES * new.len())?;
+            rows.extend(new);
+        }
+        let last = selection.finish();
+        charge.grow(ROW_BYTES * last.len())?;
+        rows.extend(last);
+        let goes_on = video.frames.go_on().await;
+        let media_type = self.media_type;
+        let write = move |_: &mut WorkMeter| self.write(rows, size, goes_on);
+        let queue = video.queue.clone();
+        let text = video.state.service.run(queue, write).await?;
+        Ok(charged_body(media_type, text, charge).into_response())
+    }
+
+    /// The targets in a frame, and their rows.
+    fn rows(&self, frame: &TrackedFrame) -> Vec<(bagtrack_tracker::Estimate, Row)> {
+        let estimates = frame.estimates.as_slice().iter().enumerate();
+        let rows = estimates.map(|(target, estimate)| {
+            let row = Row {
+                frame: frame.number,
+                time: self.rate.map(|rate| micros(frame.number as f64 / rate)),
+                file: None,
+                target,
+                estimate: *estimate,
+            };
+            (*estimate, row)
+        });
+        rows.collect()
+    }
+
+    fn write(self, rows: Vec<Row>, size: (u32, u32), goes_on: bool) -> Result<String, Problem> {
+        let columns = Columns {
+            time: self.rate.is_some(),
+            target: self.names.len() > 1,
+        };
+        let clip = Clip {
+            name: self.video,
+            size,
+            rate: self.rate.unwrap_or(USUAL_RATE),
+            names: self.names,
+            goes_on,
+        };
+        let text = self.format.text(&clip, columns, rows);
+        text.map_err(|error| Problem::internal(Arc::new(error)))
+    }
+}
+
+/// A time as videos have it, whole microseconds.
+fn micros(seconds: f64) -> f64 {
+    (seconds * 1e6).round() / 1e6
+}
+
+/// What the command calls a format, and its media type.
+fn format_of(format: TrackFormat) -> (Format, &'static str) {
+    const TEXT: &str = "text/plain; charset=utf-8";
+    const JSON: &str = "application/json";
+    match format {
+        TrackFormat::Text => (Format::Text, TEXT),
+        TrackFormat::Json => (Format::Json, LINES),
+        TrackFormat::Csv => (Format::Csv, "text/csv; charset=utf-8"),
+        TrackFormat::Otb => (Format::Otb, TEXT),
+        TrackFormat::Mot => (Format::Mot, TEXT),
+        TrackFormat::Coco => (Format::Coco, JSON),
+        TrackFormat::Cvat => (Format::Cvat, "application/xml"),
+        TrackFormat::LabelStudio => (Format::LabelStudio, JSON),
+    }
+}
+
+/// What each target is called.
+fn names(settings: &TrackSettings, targets: usize) -> Result<Vec<String>, Problem> {
+    let given = settings.names.iter().flat_map(|names| &names.0);
+    let mut names: Vec<String> = given.map(|name| name.0.clone()).collect();
+    if names.len() > targets {
+        let detail = format!("`names` has {} names, for {targets} boxes.", names.len());
+        return Err(Problem::malformed(detail));
+    }
+    names.extend((names.len()..targets).map(|target| format!("Object {}", target + 1)));
+    Ok(names)
+}
