@@ -36,7 +36,7 @@ replicas *filter:
 eval *arguments:
     cargo run --release --package bagtrack-eval -- {{arguments}}
 
-# The tables of docs/PERFORMANCE.md: `just bench ratios`.
+# The tables of docs/laboratory/PERFORMANCE.md: `just bench ratios`.
 bench *table:
     cargo bench --bench tables -- {{table}}
 

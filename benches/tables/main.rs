@@ -1,4 +1,4 @@
-//! The tables of docs/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
+//! The tables of docs/laboratory/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
 //!
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
 //! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the

@@ -12,7 +12,7 @@ use bagtrack_tracker::Expert;
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct ModelFlag {
     /// A network that gives a second opinion of every frame, as KIND:FILE,FILE. The one kind is `nanotrack`, with the ONNX
-    /// files of its backbone and its head. docs/ACCURACY.md says where they are and what they bring.
+    /// files of its backbone and its head. docs/laboratory/ACCURACY.md says where they are and what they bring.
     #[arg(long, value_name = "nanotrack:BACKBONE,HEAD")]
     model: Option<ModelFiles>,
 }

@@ -29,7 +29,7 @@ const ROUNDS: usize = 300;
 /// Calls per timing, so that the cost of reading the clock is negligible.
 const REPEATS: usize = 20;
 
-/// Prints the table of docs/PERFORMANCE.md.
+/// Prints the table of docs/laboratory/PERFORMANCE.md.
 fn main() {
     println!("median of {ROUNDS} rounds, in turns, processor time of one thread\n");
     println!("| kernel | own, µs | others, own = 1 |");

@@ -1,4 +1,4 @@
-//! The answer that the filter and the expert give together. Chosen on annotated videos (docs/ACCURACY.md).
+//! The answer that the filter and the expert give together. Chosen on annotated videos (docs/laboratory/ACCURACY.md).
 
 use crate::image::rect::Rect;
 
