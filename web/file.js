@@ -283,6 +283,8 @@ export async function openFile(file, place) {
   video.src = URL.createObjectURL(file);
   try {
     await ready;
+    // Only its sound can be played.
+    if (video.videoWidth === 0) throw new DOMException("", "NotSupportedError");
   } catch (error) {
     video.remove();
     throw error;

@@ -6,7 +6,7 @@ import { button, canvas, get, input } from "./dom.js";
 import { DRAW, Editing, TAP } from "./editing.js";
 import { Client, LocalClient, Problem } from "./js/bagtrack.js";
 import { FOLLOWING, Message } from "./message.js";
-import { words } from "./problems.js";
+import { UnplayableError, words } from "./problems.js";
 import { Run } from "./run.js";
 import { prepareSaving } from "./saving.js";
 import { Seen } from "./seen.js";
@@ -128,11 +128,27 @@ export class Page {
       if (own !== this.choice) return;
       this.enter("start");
       this.fail(error);
+      this.again = () => this.choose(open, resume);
+      if (error instanceof UnplayableError) this.offerDecoding(error.file, resume);
     }
+  }
+
+  /** Offers to have a file decoded by the service: it is uploaded for that.
+   * @param {File} file
+   * @param {(run: Run) => Promise<void>} [resume] */
+  offerDecoding(file, resume) {
+    get("decoding").hidden = false;
+    button("decode").onclick = () => {
+      const tell = (/** @type {number} */ count) => this.say(`The service decodes ${file.name}: ${count} frames…`);
+      const open = async () => (await import("./decoded.js")).openDecoded(file, this.client.transport.key, tell);
+      this.choose(open, resume);
+    };
+    button("decode").focus();
   }
 
   /** Lets go of what was there. */
   reset() {
+    get("decoding").hidden = true;
     this.run?.stop();
     this.run = undefined;
     this.frozen = undefined;

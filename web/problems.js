@@ -25,6 +25,15 @@ const WORDS = {
   EncodingError: "The rest of the file cannot be played. The results up to here can be saved.",
 };
 
+/** The browser cannot play a file, and the service may decode it. */
+export class UnplayableError extends Error {
+  /** @param {File} file */
+  constructor(file) {
+    super(`This browser cannot play ${file.name}. The service may decode it: it gets the whole file then.`);
+    this.file = file;
+  }
+}
+
 /**
  * @param {unknown} error
  * @param {boolean} hasKey Whether a key was given.

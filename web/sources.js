@@ -2,6 +2,7 @@
 
 import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
+import { UnplayableError } from "./problems.js";
 
 /** What opens files and the camera is loaded when one is about to choose. */
 const modules = () => Promise.all([import("./file.js"), import("./images.js"), import("./camera.js")]);
@@ -15,7 +16,10 @@ export async function openFiles(files) {
   const [{ openFile }, { isImage, openImages }] = await modules();
   const video = files.find((file) => file.type.startsWith("video/"));
   if (!video && files.some(isImage)) return openImages(files);
-  return openFile(video ?? files[0], get("stage"));
+  const file = video ?? files[0];
+  return openFile(file, get("stage")).catch((error) => {
+    throw error.name === "NotSupportedError" && file.size > 0 ? new UnplayableError(file) : error;
+  });
 }
 
 /** All files of what was dropped, those in folders too.

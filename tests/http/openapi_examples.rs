@@ -63,6 +63,10 @@ impl<'a> Call<'a> {
         let Some(content) = self.operation["requestBody"]["content"].as_object() else {
             return vec![("", Vec::new())];
         };
+        // A video, which needs a program: `videos` sends some.
+        if self.id() == "getVideoFrames" {
+            return Vec::new();
+        }
         let example = &content["application/json"]["example"];
         let frame = [&example["frame"], &example["frames"][0], &example["image"]]
             .into_iter()
@@ -126,7 +130,8 @@ async fn every_example_of_the_document_works_as_it_stands() {
     }
     let with_body = calls
         .iter()
-        .filter(|call| !call.operation["requestBody"].is_null());
+        .filter(|call| !call.operation["requestBody"].is_null())
+        .filter(|call| call.id() != "getVideoFrames");
     for call in with_body {
         for form in ["application/octet-stream", "application/json"] {
             assert!(sent.contains(&format!("{} {form}", call.id())), "{sent:?}");
@@ -143,8 +148,16 @@ async fn the_raw_file_is_the_first_form_of_a_frame_wherever_it_is_enough() {
         body.split("\"responses\"").next()
     });
     let bodies: Vec<&str> = bodies.collect();
-    assert!(bodies.len() >= 5, "{}", bodies.len());
-    for body in bodies {
+    let takes_forms = |body: &&str| body.contains("multipart/form-data");
+    assert!(
+        bodies
+            .iter()
+            .copied()
+            .filter(|body| takes_forms(body))
+            .count()
+            >= 5
+    );
+    for body in bodies.into_iter().filter(takes_forms) {
         let at = |name: &str| body.find(&format!("\"{name}\": {{"));
         assert!(at("application/octet-stream").unwrap() < at("multipart/form-data").unwrap());
         assert!(at("multipart/form-data") < at("application/json"));

@@ -111,6 +111,50 @@ async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
 }
 
 #[tokio::test]
+async fn a_video_comes_back_frame_by_frame() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start().await;
+    for extension in ["mp4", "webm"] {
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request.body(video(extension)).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{extension}");
+        assert_eq!(answer.headers()["content-type"], "video/x-motion-jpeg");
+        let bytes = answer.bytes().await.unwrap();
+        // They are taken again as what they are, and show what was sent: the target goes right by 2 pixels a frame.
+        let id = app.open().await;
+        let answers = lines(post(&app, &id, "video/x-motion-jpeg", bytes.to_vec()).await).await;
+        assert_eq!(answers.len(), FRAMES as usize, "{extension}");
+        for (answer, t) in answers.iter().zip(1..) {
+            let x = answer["box"]["x"].as_f64().unwrap();
+            assert!((x - f64::from(20 + 2 * t)).abs() < 3.0, "{answer}");
+        }
+    }
+    let request = app.request(Method::POST, "/frames", &[]);
+    let refused = request.body(pictures::png(1)).send().await.unwrap();
+    let problem = expect_problem(refused, "unsupported-image").await;
+    assert!(problem["detail"].as_str().unwrap().contains("Send a video"));
+}
+
+#[tokio::test]
+async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_off() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start().await;
+    let mut damaged = video("webm");
+    let (start, end) = (damaged.len() * 6 / 10, damaged.len() * 8 / 10);
+    damaged[start..end].fill(0);
+    let request = app.request(Method::POST, "/frames", &[]);
+    let answer = request.body(damaged).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    // A whole answer would say that the video has no more.
+    let cut_off = answer.bytes().await.unwrap_err();
+    assert!(cut_off.is_body() || cut_off.is_decode(), "{cut_off:?}");
+}
+
+#[tokio::test]
 async fn a_session_is_opened_with_a_picture() {
     let app = TestApplication::start().await;
     let gif = [b"GIF89a".to_vec(), vec![0; 400]].concat();

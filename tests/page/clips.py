@@ -11,6 +11,8 @@ BITS = 7
 BLOCK = 48
 
 H264 = ("-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p")
+MPEG4 = ("-c:v", "mpeg4", "-q:v", "2")
+"""No browser plays it."""
 VP8 = ("-c:v", "libvpx", "-b:v", "8M", "-deadline", "realtime", "-cpu-used", "16")
 
 

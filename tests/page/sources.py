@@ -3,8 +3,8 @@
 import base64
 
 from browser import DRAW, begin_at, distance, drag, rows, said, to_the_end
-from clips import FRAMES, H264, VP8
-from files import check_rows, choose_file, sent_box, times_of
+from clips import FRAMES, H264, MPEG4, VP8
+from files import check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
 COUNT = 20
 """Images of a folder."""
@@ -73,4 +73,39 @@ def begun_in_the_middle(checks):
         page.context.close()
 
 
-ALL = [folder_of_images, dropped_and_pasted, begun_in_the_middle]
+def decoded_by_the_service(checks):
+    """A file that the browser cannot play is uploaded when one says so, and is then tracked frame by frame."""
+    path = checks.files.file("old.mp4", 25, MPEG4)
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        uploads = []
+        page.on("request", lambda request: request.method == "POST" and uploads.append(request.url))
+        page.locator("#file").set_input_files(path)
+        said(page, "This browser cannot play old.mp4")
+        checks.no_axe_violations(page, "a file that cannot be played")
+        assert not uploads, uploads
+        page.locator("#decode").click()
+        said(page, DRAW)
+        assert not page.locator("#decode").is_visible()
+        drag(page, sent_box(checks.files.truth[0]))
+        to_the_end(page)
+        numbers = list(range(FRAMES))
+        check_rows(rows(page), path, checks.files.truth, numbers, times_of(path))
+        check_video(saved_video(checks, page, f"decoded-{where}.webm"), numbers, FRAMES / 25)
+        page.context.close()
+
+
+def no_video_at_all(checks):
+    """What neither the browser nor the service can read is refused with a reason, and the page goes on."""
+    page = checks.page(where="here", allowed=("Failed to load",))
+    path = checks.files.folder / "no video.mp4"
+    path.write_bytes(bytes(4000))
+    page.locator("#file").set_input_files(path)
+    said(page, "This browser cannot play no video.mp4")
+    page.locator("#decode").click()
+    said(page, "MP4, WebM, GIF")
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    page.context.close()
+
+
+ALL = [folder_of_images, dropped_and_pasted, begun_in_the_middle, decoded_by_the_service, no_video_at_all]

@@ -29,6 +29,7 @@ pub mod query;
 pub mod read_request;
 pub mod session_path;
 pub mod session_request;
+pub mod stateless_request;
 pub mod texts;
 pub mod uploaded;
 pub mod video_frames;

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 58] = [
+const FILES: [File; 59] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -58,6 +58,7 @@ const FILES: [File; 58] = [
     file!("boxes.js", SCRIPT),
     file!("camera.js", SCRIPT),
     file!("clip.js", SCRIPT),
+    file!("decoded.js", SCRIPT),
     file!("dom.js", SCRIPT),
     file!("editing.js", SCRIPT),
     file!("file.js", SCRIPT),

@@ -18,3 +18,4 @@ pub mod track;
 mod track_file;
 mod track_video;
 pub mod version;
+pub mod video_frames;

@@ -2,7 +2,7 @@
 
 use super::{
     bag_picture, correction, frames, health, metrics, open, session, snapshot, token, track,
-    version,
+    version, video_frames,
 };
 use crate::http::state::AppState;
 use crate::http::stream::handshake;
@@ -64,6 +64,7 @@ pub fn sessions() -> OpenApiRouter<AppState> {
         .routes(routes!(bag_picture::get))
         .routes(routes!(token::create))
         .routes(routes!(track::post))
+        .routes(routes!(video_frames::post))
         .routes(routes!(handshake::open))
 }
 

@@ -2,29 +2,26 @@
 
 use super::track_file::TrackFile;
 use super::track_video::{Track, VideoAnswers, VideoTrack};
-use crate::http::extract::caller::Caller;
-use crate::http::extract::instance::Instance;
 use crate::http::extract::overrides;
-use crate::http::extract::texts::Texts;
-use crate::http::extract::uploaded::{Upload, admit};
+use crate::http::extract::stateless_request::StatelessRequest;
+use crate::http::extract::uploaded::Upload;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::VideoPlace;
 use crate::http::extract::video_range::{RangeFrames, VideoRange};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::respond::answer::{answer_bytes, answers};
 use crate::http::respond::charged_body::ChargedBody;
 use crate::http::respond::json;
 use crate::http::respond::ndjson;
 use crate::http::state::AppState;
 use axum::body::Bytes;
-use axum::extract::{FromRequest, FromRequestParts, Request, State};
+use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::Tracked;
 use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, Switch, TrackSettings};
 use bagtrack_ingest::video::VideoFormat;
-use bagtrack_sessions::{Boxes, Charge, GivenBox, QueuePermit, Selection, TrackFrom, TrackedAway};
+use bagtrack_sessions::{Boxes, Charge, GivenBox, Selection, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -80,7 +77,7 @@ type TrackJson = JsonBody<TrackSettings>;
 )]
 pub async fn post(
     State(state): State<AppState>,
-    request: TrackRequest,
+    request: StatelessRequest<TrackSettings>,
 ) -> Result<Response, Problem> {
     match request.upload.video {
         Some(format) => track_video(state, request, format).await,
@@ -88,38 +85,10 @@ pub async fn post(
     }
 }
 
-/// A request to track without a session, with its place in the queue.
-#[derive(Debug)]
-pub struct TrackRequest {
-    client: Client,
-    instance: Instance,
-    queue: QueuePermit,
-    upload: Upload<TrackSettings>,
-}
-
-impl FromRequest<AppState> for TrackRequest {
-    type Rejection = Problem;
-
-    async fn from_request(request: Request, state: &AppState) -> Result<Self, Problem> {
-        let texts = Texts::of_query::<TrackSettings>(request.uri())?;
-        let instance = Instance::of(&request);
-        let (mut parts, body) = request.into_parts();
-        let caller = Caller::from_request_parts(&mut parts, state).await?;
-        caller.require_key()?;
-        let client = Client::of(&parts);
-        let admitted = admit(state, &parts)?;
-        let request = Request::from_parts(parts, body);
-        let (upload, queue) = Upload::read(state, admitted, texts, request).await?;
-        Ok(Self {
-            client,
-            instance,
-            queue,
-            upload,
-        })
-    }
-}
-
-async fn track_frames(state: &AppState, request: TrackRequest) -> Result<Response, Problem> {
+async fn track_frames(
+    state: &AppState,
+    request: StatelessRequest<TrackSettings>,
+) -> Result<Response, Problem> {
     let charge = state.charge(&request.client);
     let (from, files) = asked(request.upload)?;
     let respond = move |tracked: TrackedAway| body(&tracked, charge);
@@ -130,7 +99,7 @@ async fn track_frames(state: &AppState, request: TrackRequest) -> Result<Respons
 
 async fn track_video(
     state: AppState,
-    mut request: TrackRequest,
+    mut request: StatelessRequest<TrackSettings>,
     format: VideoFormat,
 ) -> Result<Response, Problem> {
     if request.upload.snapshot.is_some() {

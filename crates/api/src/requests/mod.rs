@@ -13,8 +13,8 @@ mod values;
 pub use bodies::{BinaryBody, FormBody, JsonBody};
 pub use params::{ParamsError, public_params, resolve_params};
 pub use settings::{
-    BagSettings, CreateSettings, FramesSettings, StreamSettings, TargetSettings, TokenSettings,
-    TrackSettings,
+    BagSettings, CreateSettings, DecodeSettings, FramesSettings, StreamSettings, TargetSettings,
+    TokenSettings, TrackSettings,
 };
 pub use values::{
     FrameNumber, FrameRate, MAX_EXACT, Name, Names, Seed, Switch, TargetNumber, TrackFormat,

@@ -165,6 +165,18 @@ impl Settings for TrackSettings {
     const SCHEMA_PREFIX: &'static str = "Track";
 }
 
+/// A video to decode has no settings.
+#[derive(Debug, Default, Deserialize, utoipa::IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct DecodeSettings {}
+
+impl Settings for DecodeSettings {
+    const FRAMES: FrameCount = FrameCount::One;
+    const TAKES_VIDEO: bool = true;
+    const SCHEMA_PREFIX: &'static str = "Decode";
+}
+
 /// The settings of a token.
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[serde(deny_unknown_fields)]

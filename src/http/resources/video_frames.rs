@@ -1,0 +1,80 @@
+//! `POST /frames`: the frames of a video as pictures, for who cannot decode it.
+
+use crate::http::extract::stateless_request::StatelessRequest;
+use crate::http::extract::video_frames::VideoFrames;
+use crate::http::extract::video_place::{VideoPlace, count_frame};
+use crate::http::problems::problem::Problem;
+use crate::http::state::AppState;
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse, Response};
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_api::requests::{BinaryBody, DecodeSettings};
+use futures_util::{StreamExt, stream};
+use std::future::ready;
+use std::io;
+
+/// JPEG files that follow each other.
+const MOTION_JPEG: &str = "video/x-motion-jpeg";
+
+/// Get the frames of a video
+///
+/// A video of any kind that the service's `ffmpeg` reads comes back as Motion JPEG, a JPEG file after the other: every
+/// frame once, in its own pixels, as soon as it is decoded. The page asks for it where the browser cannot play a file.
+/// Where the rest cannot be decoded, the answer is cut off after the last whole frame, and not ended.
+///
+/// `curl --data-binary @clip.mp4 http://localhost:8080/frames -o clip.mjpeg`
+#[utoipa::path(
+    post, path = "/frames", tag = "service", operation_id = "getVideoFrames",
+    request_body(
+        description = "The video: MP4, WebM, GIF, or Motion JPEG as `video/x-motion-jpeg`.",
+        content((BinaryBody = "application/octet-stream"))
+    ),
+    responses(
+        (
+            status = 200, description = "The frames", body = BinaryBody,
+            content_type = "video/x-motion-jpeg"
+        )
+    )
+)]
+pub async fn post(
+    State(state): State<AppState>,
+    mut request: StatelessRequest<DecodeSettings>,
+) -> Result<Response, Problem> {
+    let Some(format) = request.upload.video else {
+        let detail = "Send a video: MP4, WebM, GIF or Motion JPEG.";
+        return Err(Problem::new(Kind::UnsupportedImage, detail));
+    };
+    let file = request.upload.files.swap_remove(0);
+    let place;
+    (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let mut video = VideoFrames::decode(&state, file, format, place).await?;
+    let first = next(&state, &request, &mut video).await;
+    let first = first.ok_or_else(Problem::missing_frame)??;
+    let rest = stream::unfold(Some((state, request, video)), |held| async {
+        let (state, request, mut video) = held?;
+        match next(&state, &request, &mut video).await? {
+            Ok(frame) => Some((Ok(frame), Some((state, request, video)))),
+            Err(problem) => {
+                request.instance.report(&state, &problem);
+                Some((Err(io::Error::other("the video cannot be decoded")), None))
+            }
+        }
+    });
+    let frames = stream::once(ready(Ok(first))).chain(rest);
+    Ok(([(CONTENT_TYPE, MOTION_JPEG)], Body::from_stream(frames)).into_response())
+}
+
+/// The next frame, which counts as one of the client's.
+async fn next(
+    state: &AppState,
+    request: &StatelessRequest<DecodeSettings>,
+    video: &mut VideoFrames,
+) -> Option<Result<Bytes, Problem>> {
+    let frame = video.next().await?;
+    match count_frame(state, &request.client).await {
+        Ok(()) => Some(frame),
+        Err(problem) => Some(Err(problem)),
+    }
+}
