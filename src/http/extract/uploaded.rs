@@ -77,14 +77,12 @@ impl<S: Settings> Upload<S> {
         let charge = Arc::new(charge);
         let own = |bytes| Bytes::from(ChargedBytes::sharing(bytes, &charge));
         if let Some(bytes) = json.map(own) {
+            let parser = queue.clone().for_time(json::least_time(bytes.len()));
             let parse = move |_: &mut WorkMeter| {
                 json::read::<S>(&bytes, max_files, &mut fields)?;
                 Ok(fields)
             };
-            fields = state
-                .service
-                .run::<_, Problem, _>(queue.clone(), parse)
-                .await?;
+            fields = state.service.run::<_, Problem, _>(parser, parse).await?;
         }
         let Fields {
             files,

@@ -33,10 +33,10 @@ pub async fn answer_drawn(
         let detail = "A drawn answer is one picture; send one frame in a request.";
         return Err(Problem::malformed(detail));
     };
-    next.check_sizes(
-        &state.service.request_limits(),
-        permit.session().source_size(),
-    )?;
+    let size = permit.session().source_size();
+    next.check_sizes(&state.service.request_limits(), size)?;
+    let pixels = u64::from(size.0) * u64::from(size.1);
+    let queue = queue.for_size(pixels, file.len());
     // Before the frame is tracked: what cannot be drawn must not count.
     let (file, limits) = (file.clone(), state.config.frame_limits());
     let decode = move |_: &mut WorkMeter| Ok(Picture::decode(&file, &limits, MAX_SIDE)?);

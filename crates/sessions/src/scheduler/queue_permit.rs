@@ -90,6 +90,12 @@ impl QueuePermit {
         self
     }
 
+    /// For work that surely takes so much processor time without a break.
+    pub fn for_time(mut self, least: Duration) -> Self {
+        self.request.expected = least;
+        self
+    }
+
     /// Whose turn the request's work is done in.
     pub fn flow(&self) -> Flow {
         self.request.flow
