@@ -1,0 +1,212 @@
+//! Who may use a service with these settings.
+
+use bagtrack_access::{Access, AccessError, AllowedHosts, ApiKeys, KeysError};
+use bagtrack_config::{AccessConfig, Config, Secret};
+use bagtrack_sessions::Owner;
+use std::fs;
+use std::net::SocketAddr;
+
+const KEY: &str = "0123456789abcdef";
+const OTHER: &str = "fedcba9876543210";
+
+fn address(text: &str) -> SocketAddr {
+    text.parse().unwrap()
+}
+
+fn with_key() -> AccessConfig {
+    AccessConfig {
+        api_keys: vec![Secret::from(format!("me:{KEY}").as_str())],
+        ..AccessConfig::default()
+    }
+}
+
+#[test]
+fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
+    let (here, everywhere) = (address("127.0.0.1:8080"), address("0.0.0.0:8080"));
+    let none = AccessConfig::default();
+    assert!(!Access::load(&none, here).unwrap().keys.are_needed());
+    let open = Access::load(&none, everywhere).unwrap_err();
+    assert!(
+        matches!(open, AccessError::Open(at) if at == everywhere),
+        "{open}"
+    );
+    let no_auth = AccessConfig {
+        no_auth: true,
+        ..AccessConfig::default()
+    };
+    assert!(
+        !Access::load(&no_auth, everywhere)
+            .unwrap()
+            .keys
+            .are_needed()
+    );
+    assert!(
+        Access::load(&with_key(), everywhere)
+            .unwrap()
+            .keys
+            .are_needed()
+    );
+    let both = AccessConfig {
+        no_auth: true,
+        ..with_key()
+    };
+    let contradiction = Access::load(&both, here).unwrap_err();
+    assert!(
+        matches!(contradiction, AccessError::Contradiction),
+        "{contradiction}"
+    );
+}
+
+#[test]
+fn secrets_have_sixteen_characters() {
+    let here = address("127.0.0.1:8080");
+    for (secret, is_long) in [(KEY, true), (&KEY[1..], false)] {
+        let snapshots = AccessConfig {
+            snapshot_keys: vec![Secret::from(OTHER), Secret::from(secret)],
+            ..AccessConfig::default()
+        };
+        let metrics = AccessConfig {
+            metrics_key: Some(Secret::from(secret)),
+            ..AccessConfig::default()
+        };
+        for config in [snapshots, metrics] {
+            match Access::load(&config, here) {
+                Ok(_) => assert!(is_long),
+                Err(error) => assert!(
+                    !is_long && matches!(error, AccessError::ShortSecret),
+                    "{error}"
+                ),
+            }
+        }
+    }
+}
+
+#[test]
+fn snapshots_are_signed_where_there_is_a_secret() {
+    let here = address("127.0.0.1:8080");
+    let secret = || vec![Secret::from(KEY)];
+    let unsigned = AccessConfig {
+        unsigned_snapshots: true,
+        ..AccessConfig::default()
+    };
+    let unsigned = Access::load(&unsigned, here)
+        .unwrap()
+        .snapshots
+        .sign(b"a snapshot");
+    for (snapshot_keys, unsigned_snapshots, takes_unsigned, signs) in [
+        (vec![], false, false, true),
+        (secret(), false, false, true),
+        (vec![], true, true, false),
+        (secret(), true, true, true),
+    ] {
+        let config = AccessConfig {
+            snapshot_keys,
+            unsigned_snapshots,
+            ..AccessConfig::default()
+        };
+        let keys = Access::load(&config, here).unwrap().snapshots;
+        let code = keys.sign(b"a snapshot");
+        assert_eq!(keys.verify(b"a snapshot", &unsigned), takes_unsigned);
+        assert_eq!(code != unsigned, signs);
+        assert!(keys.verify(b"a snapshot", &code));
+    }
+}
+
+#[test]
+fn keys_of_settings_and_file_are_read_and_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys");
+    fs::write(&file, format!("# people\n\n  you:{OTHER}  \n")).unwrap();
+    let texts = [Secret::from(format!("me:{KEY}").as_str())];
+    let keys = ApiKeys::load(&texts, Some(&file)).unwrap();
+    let (me, you) = (Owner::named("me"), Owner::named("you"));
+    assert_eq!(keys.owner(KEY.as_bytes()), Some(me.clone()));
+    assert_eq!(keys.owner(OTHER.as_bytes()), Some(you.clone()));
+    assert!(keys.has_owner(&you) && !keys.has_owner(&Owner::named("they")));
+
+    let again = format!("they:{OTHER}\nwe:0000000000000000\n");
+    fs::write(&file, again).unwrap();
+    assert_eq!(keys.reload().unwrap(), 3);
+    assert_eq!(keys.owner(OTHER.as_bytes()), Some(Owner::named("they")));
+    assert!(!keys.has_owner(&you) && keys.has_owner(&me));
+
+    // What cannot be read changes nothing.
+    for (text, expected) in [
+        ("# nobody\n", "has no key"),
+        ("broken", "entry 1"),
+        ("me:short", "entry 1"),
+    ] {
+        fs::write(&file, text).unwrap();
+        let error = keys.reload().unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+        assert_eq!(keys.owner(OTHER.as_bytes()), Some(Owner::named("they")));
+    }
+    fs::remove_file(&file).unwrap();
+    let gone = keys.reload().unwrap_err();
+    assert!(matches!(gone, KeysError::File { .. }), "{gone}");
+    fs::create_dir(&file).unwrap();
+    let folder = keys.reload().unwrap_err();
+    assert!(folder.to_string().contains("no regular file"), "{folder}");
+    assert!(keys.has_owner(&me));
+}
+
+#[test]
+fn a_file_alone_makes_keys_needed_and_has_to_have_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys");
+    fs::write(&file, "").unwrap();
+    let empty = ApiKeys::load(&[], Some(&file)).unwrap_err();
+    assert!(matches!(empty, KeysError::Empty(_)), "{empty}");
+    fs::write(&file, format!("you:{OTHER}")).unwrap();
+    assert!(ApiKeys::load(&[], Some(&file)).unwrap().are_needed());
+    assert!(!ApiKeys::load(&[], None).unwrap().are_needed());
+}
+
+#[test]
+fn names_and_keys_have_their_lengths_and_signs() {
+    let load = |text: &str| ApiKeys::load(&[Secret::from(text)], None);
+    for name in ["a", "A-z_0.9", &"n".repeat(64)] {
+        assert!(load(&format!("{name}:{KEY}")).is_ok(), "{name}");
+    }
+    for name in ["", "ä", "a/b", &"n".repeat(65)] {
+        assert!(load(&format!("{name}:{KEY}")).is_err(), "{name}");
+    }
+    for length in [16, 256] {
+        assert!(
+            load(&format!("me:{}", "k".repeat(length))).is_ok(),
+            "{length}"
+        );
+    }
+    for length in [15, 257] {
+        assert!(
+            load(&format!("me:{}", "k".repeat(length))).is_err(),
+            "{length}"
+        );
+    }
+    assert!(load(&format!("me:{KEY} {KEY}")).is_err());
+}
+
+#[test]
+fn only_a_service_for_this_machine_asks_for_its_names() {
+    let hosts = |listen: &str, needs_key: bool, listed: &[&str], proxies: &[&str]| {
+        let mut config = Config {
+            listen: address(listen),
+            ..Config::default()
+        };
+        config.access.allowed_hosts = listed.iter().map(ToString::to_string).collect();
+        config.limits.trusted_proxies = proxies.iter().map(|text| text.parse().unwrap()).collect();
+        let hosts = AllowedHosts::of(&config, needs_key);
+        ["localhost", "example.org", "other.org"].map(|host| hosts.have(host))
+    };
+    let (here, everywhere) = ("127.0.0.1:8080", "0.0.0.0:8080");
+    assert_eq!(hosts(here, false, &[], &[]), [true, false, false]);
+    assert_eq!(hosts(here, true, &[], &[]), [true; 3]);
+    assert_eq!(hosts(everywhere, false, &[], &[]), [true; 3]);
+    assert_eq!(hosts(here, false, &[], &["10.0.0.0/8"]), [true; 3]);
+    for listen in [here, everywhere] {
+        assert_eq!(
+            hosts(listen, false, &["example.org"], &[]),
+            [false, true, false]
+        );
+    }
+}
