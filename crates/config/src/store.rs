@@ -1,9 +1,9 @@
 //! The settings of the store: one that replicas share, or one of this process in a folder.
 
 use super::settings::{ConfigError, Secret, in_range, moment, positive, settings};
-use bagtrack_sessions::{
-    Clock, Durability, FileStore, FileStoreError, RedisStore, SessionStore, StoreAddress,
-};
+#[cfg(feature = "redis")]
+use bagtrack_sessions::RedisStore;
+use bagtrack_sessions::{Clock, Durability, FileStore, FileStoreError, SessionStore, StoreAddress};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -38,7 +38,8 @@ impl StoreConfig {
     pub(super) fn check_address(&self) -> Result<(), ConfigError> {
         let held = in_range(
             self.store.is_none() || self.address().is_some(),
-            "file:DIR, or an address like redis://localhost:6379; rediss is in builds with the feature tls",
+            "file:DIR, or an address like redis://localhost:6379, which is in builds with the feature redis, and rediss \
+             in those with tls",
         );
         ConfigError::check("store", held)
     }
@@ -57,15 +58,16 @@ impl StoreConfig {
         &self,
         clock: Clock,
     ) -> Result<Option<Arc<dyn SessionStore>>, FileStoreError> {
-        let (timeout, prefix) = (self.store_timeout, &self.store_prefix);
+        let timeout = self.store_timeout;
         Ok(match self.address() {
             None => None,
             Some(StoreAddress::File(folder)) => {
                 let store = FileStore::open(&folder, self.durability, timeout, clock)?;
                 Some(Arc::new(store))
             }
+            #[cfg(feature = "redis")]
             Some(StoreAddress::Redis(address)) => {
-                let store = RedisStore::connect(address, prefix, timeout).await;
+                let store = RedisStore::connect(address, &self.store_prefix, timeout).await;
                 let store = store.inspect_err(|error| tracing::error!(%error, "no store"));
                 store.ok().map(|store| Arc::new(store) as _)
             }

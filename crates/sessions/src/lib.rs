@@ -85,11 +85,12 @@ pub use snapshot::{
 pub use state::{SessionState, StepError};
 pub use store::{
     AddressError, Commit, Durability, DurabilityError, FileStore, FileStoreError, Gone, Intent,
-    Local, Outcome, Record, RedisAddress, RedisAddressError, RedisStore, ScriptServer, SessionName,
-    SessionStore, Step, StoreAddress, StoreFuture, StoreUnavailable, UnreadableRecord, Version,
-    reconcile,
+    Local, Outcome, Record, SessionName, SessionStore, Step, StoreAddress, StoreFuture,
+    StoreUnavailable, UnreadableRecord, Version, reconcile,
 };
 pub use store::{Counted, StoreShare};
+#[cfg(feature = "redis")]
+pub use store::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,

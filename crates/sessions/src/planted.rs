@@ -3,7 +3,8 @@
 use crate::store::{Commit, SessionStore};
 use std::sync::Arc;
 
-/// A fault of the code.
+/// A fault of the code. Some are in the scripts of a Redis alone.
+#[cfg_attr(not(feature = "redis"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlantedFault {
     /// A frame is answered before the store has it.

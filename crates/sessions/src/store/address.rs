@@ -1,5 +1,6 @@
 //! Where the store is: one value that is like a URL.
 
+#[cfg(feature = "redis")]
 use super::redis::{RedisAddress, RedisAddressError};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,27 +12,33 @@ pub enum AddressError {
     #[error("file: is followed by a folder, like file:/var/lib/bagtrack")]
     NoFolder,
     /// It is neither.
+    #[cfg(feature = "redis")]
     #[error(transparent)]
     Redis(#[from] RedisAddressError),
+    /// It is no folder, and there is nothing else here.
+    #[cfg(not(feature = "redis"))]
+    #[error("this build, without the feature redis, has stores in folders only: file:DIR")]
+    NoRedis,
 }
 
 /// Where a store is.
 #[derive(Debug, Clone)]
 pub enum StoreAddress {
     /// A Redis, which replicas share.
+    #[cfg(feature = "redis")]
     Redis(RedisAddress),
     /// A folder of this machine, for one process.
     File(PathBuf),
 }
 
 impl StoreAddress {
-    /// Reads `file:DIR` (also `file:///DIR`), or the address of a Redis: see [`RedisAddress::parse`].
+    /// Reads `file:DIR` (also `file:///DIR`), or the address of a Redis (`RedisAddress::parse`).
     ///
     /// # Errors
     /// The text is neither.
     pub fn parse(text: &str, timeout: Duration) -> Result<Self, AddressError> {
         let Some(folder) = text.strip_prefix("file:") else {
-            return Ok(Self::Redis(RedisAddress::parse(text, timeout)?));
+            return Self::parse_shared(text, timeout);
         };
         // What follows two slashes would be a host.
         let folder = match folder.strip_prefix("//") {
@@ -44,9 +51,19 @@ impl StoreAddress {
             folder => Ok(Self::File(folder.into())),
         }
     }
+
+    #[cfg(feature = "redis")]
+    fn parse_shared(text: &str, timeout: Duration) -> Result<Self, AddressError> {
+        Ok(Self::Redis(RedisAddress::parse(text, timeout)?))
+    }
+
+    #[cfg(not(feature = "redis"))]
+    fn parse_shared(_: &str, _: Duration) -> Result<Self, AddressError> {
+        Err(AddressError::NoRedis)
+    }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "redis"))]
 mod tests {
     use super::*;
 

@@ -1,4 +1,4 @@
-//! The store: sessions that all replicas of the service share in a [Redis](redis), or that one process keeps in a
+//! The store: sessions that all replicas of the service share in a Redis (`redis`), or that one process keeps in a
 //! [folder](file).
 //!
 //! In: the [`Record`] of a session, with the [`Version`] that this replica has of it. Out: an [`Outcome`], which
@@ -26,9 +26,11 @@ mod address;
 mod file;
 mod reconcile;
 mod record;
+#[cfg(feature = "redis")]
 mod redis;
 mod session_store;
 
+#[cfg(feature = "redis")]
 pub use self::redis::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};

@@ -2,7 +2,8 @@
 //!
 //! `tests/fixtures` has a folder for each release: sessions that stand at frame 2, as snapshots, as records of a Redis (a
 //! file for each field) and in a store's folder, with their frames and the answers of the undisturbed run. A release adds
-//! its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --test store_protocol formats`.
+//! its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --features redis --test
+//! store_protocol formats`.
 
 use crate::folder::copy;
 use crate::pictures::{FIRST, params, picture};
