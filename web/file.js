@@ -4,6 +4,7 @@
 // the browser tells of is taken. Where the media times leave room for another one, the file is looked into right before
 // the later of the two frames; where that is not the earlier one, the file is played from there again, more slowly.
 
+import { Delivery } from "./delivery.js";
 import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
 import { Playback, SAME, areEqual, frameAt, learnRate } from "./playback.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
@@ -20,8 +21,6 @@ const LEARNED_AFTER = 6;
 const SPEEDS_UP_AFTER = 40;
 /** A sound that goes on for longer after the last frame is no reason to look for frames, in seconds. */
 const LONGEST_TAIL = 1;
-/** Frames that are encoded at a time. */
-const MOST_ENCODING = 3;
 /** Pictures of the screen after which a frame is shown that was told of. */
 const SETTLES_AFTER = 3;
 
@@ -55,11 +54,10 @@ export class VideoFile {
     this.hasEnded = false;
     /** @type {number | undefined} The time of a frame that is taken in a moment; infinite when it has gone by. */
     this.settling = undefined;
-    /** @type {HTMLCanvasElement | undefined} The frame that was taken so last. */
+    /** @type {HTMLCanvasElement | undefined} The frame that was taken last. */
     this.lastImage = undefined;
     /** How often the next one looked the same. */
     this.samePasses = 0;
-    this.encoding = 0;
     /** The frame that was taken last: its number, its media time, and how many the browser had shown then.
      * @type {{frame: number, time: number, shown: number | undefined}} */
     this.last = { frame: 0, time: 0, shown: undefined };
@@ -68,14 +66,11 @@ export class VideoFile {
     this.interval = Infinity;
     this.gaps = new Gaps(this);
     this.sinceGap = 0;
-    /** @type {Promise<unknown>} The pictures before are delivered. */
-    this.before = Promise.resolve();
-    /** @type {(picture: Picture) => void} */
-    this.deliver = () => undefined;
     this.end = () => {};
     /** @type {(error: unknown) => void} */
     this.fail = () => undefined;
     this.adjust = this.adjust.bind(this);
+    this.delivery = new Delivery(this.adjust);
   }
 
   get rate() {
@@ -135,7 +130,8 @@ export class VideoFile {
    */
   start(deliver, end) {
     const { video } = this;
-    [this.deliver, this.end] = [deliver, end];
+    this.delivery.deliver = deliver;
+    this.end = end;
     const next = (/** @type {number} */ _, /** @type {VideoFrameCallbackMetadata} */ shown) => {
       if (this.isStopped) return;
       video.requestVideoFrameCallback(next);
@@ -147,7 +143,7 @@ export class VideoFile {
     document.addEventListener("visibilitychange", this.adjust);
     video.playbackRate = CAUTIOUS;
     return new Promise((_, reject) => {
-      this.fail = reject;
+      this.fail = this.delivery.fail = reject;
       video.onerror = () => reject(new DOMException("", "EncodingError"));
       this.adjust();
     });
@@ -176,7 +172,8 @@ export class VideoFile {
     this.adjust();
   }
 
-  /** Takes the frame that is shown after a while: some browsers tell of a frame before they give it away.
+  /** Takes the frame that is shown after a while: some browsers tell of a frame before they give it away, and when the
+   * machine is busy, give away the next one.
    * @param {number} time
    * @param {number} shown */
   async settle(time, shown) {
@@ -190,30 +187,35 @@ export class VideoFile {
     // What looks the same may be the frame before, which is given away for longer than it is told of.
     const isSame = this.lastImage !== undefined && this.samePasses < SAME_PASSES && areEqual(image, this.lastImage);
     this.samePasses = isSame ? this.samePasses + 1 : 0;
-    if (isGone || isSame) return this.gaps.resume();
+    if (isSame) return this.retake();
+    if (isGone) return this.gaps.resume();
     this.interval = Math.min(this.interval, time - this.last.time);
-    this.lastImage = image;
-    this.take(image, time, shown);
+    this.take(image, time, shown, true);
     this.adjust();
+  }
+
+  /** Goes back to the frame that was taken last: it or the next one was given away for the other. */
+  async retake() {
+    const { time } = this.last;
+    // Rounding leads to before it otherwise.
+    const shown = await this.playback.seek(time + SAME / 2);
+    if (this.isStopped) return;
+    if (!shown || Math.abs(shown.mediaTime - time) > SAME) return this.gaps.resume();
+    this.lastImage = drawFrame(this.video);
+    this.delivery.settle(this.lastImage);
+    this.gaps.goOnFrom(shown);
   }
 
   /** Takes the next frame.
    * @param {HTMLCanvasElement} image
    * @param {number} time
-   * @param {number | undefined} shown */
-  take(image, time, shown) {
+   * @param {number | undefined} shown
+   * @param {boolean} [isDoubted] Whether the image may be that of the frame after it. */
+  take(image, time, shown, isDoubted = false) {
     const frame = this.last.frame + 1;
     this.last = { frame, time, shown };
-    this.encoding += 1;
-    const blob = encoded(image);
-    this.before = this.before.then(async () => {
-      const picture = { image, blob: await blob, time, frame };
-      this.encoding -= 1;
-      if (this.isStopped) return;
-      this.deliver(picture);
-      this.adjust();
-    });
-    this.before.catch((error) => this.fail(error));
+    this.lastImage = image;
+    this.delivery.add({ image, time, frame }, isDoubted);
     this.sinceGap += 1;
     const { video } = this;
     if (frame === LEARNED_AFTER) video.playbackRate = 1;
@@ -225,7 +227,7 @@ export class VideoFile {
     const { video } = this;
     const isBusy = this.playback.isSeeking || this.settling !== undefined;
     const isWanted = !this.isStopped && !isBusy && !this.hasEnded && !video.ended;
-    if (isWanted && !this.isHeld && !document.hidden && this.encoding < MOST_ENCODING) {
+    if (isWanted && !this.isHeld && !document.hidden && !this.delivery.isFull) {
       if (!video.paused) return;
       // It may be paused again before it plays.
       video.play().catch((error) => error.name === "AbortError" || this.fail(error));
@@ -247,7 +249,7 @@ export class VideoFile {
     // There the file ends again, or plays on.
     if (isSuspect) return this.gaps.lookInto(duration, 1);
     this.hasEnded = true;
-    await this.before;
+    await this.delivery.end();
     if (!this.isStopped) this.end();
   }
 
@@ -258,7 +260,7 @@ export class VideoFile {
   }
 
   stop() {
-    this.isStopped = true;
+    this.isStopped = this.delivery.isStopped = true;
     document.removeEventListener("visibilitychange", this.adjust);
     this.video.pause();
     this.video.remove();

@@ -57,6 +57,7 @@ export class Gaps {
     if (found !== undefined && (isNext || (gap.passes > 1 && gap.passes < MOST_PASSES))) {
       // Where there is room for one frame only, there is no other one.
       const frames = await this.goBack({ image: drawFrame(video), time: found }, isNext);
+      if (this.file.delivery.isAhead(frames[0].image)) return this.file.retake();
       for (const { image, time } of frames) this.file.take(image, time, undefined);
       return frames.length === 1 && isNext ? this.goOnFrom(shown) : this.resume();
     }

@@ -76,7 +76,7 @@ pub struct Lines {
 impl Lines {
     fn text(&self, rows: &[Row], columns: Columns) -> serde_json::Result<String> {
         let mut text = String::new();
-        for line in (self.header)(columns) {
+        if let Some(line) = (self.header)(columns) {
             text += &line;
             text.push('\n');
         }

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 59] = [
+const FILES: [File; 60] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -59,6 +59,7 @@ const FILES: [File; 59] = [
     file!("camera.js", SCRIPT),
     file!("clip.js", SCRIPT),
     file!("decoded.js", SCRIPT),
+    file!("delivery.js", SCRIPT),
     file!("dom.js", SCRIPT),
     file!("editing.js", SCRIPT),
     file!("file.js", SCRIPT),

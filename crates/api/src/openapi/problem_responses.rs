@@ -71,6 +71,7 @@ fn kinds(operation_id: &str) -> Vec<Kind> {
         "createSession" => &[UPLOAD, START, OPEN, &[IdempotencyKeyReused]],
         "putSession" => &[UPLOAD, START, OPEN, &[SessionExists]],
         "track" => &[UPLOAD, START, &[FrameSizeMismatch, RequestTooCostly]],
+        "getVideoFrames" => &[UPLOAD, &[Unauthorized, Forbidden]],
         "postFrames" => &[UPLOAD, SESSION, FRAMES, &[RequestTooCostly]],
         "putTarget" => &[UPLOAD, SESSION, FRAMES, &[MissingBox, InvalidBox]],
         "getSnapshot" | "getBagPicture" => &[SESSION, READ],

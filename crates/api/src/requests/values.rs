@@ -23,7 +23,7 @@ impl<'de> Deserialize<'de> for Switch {
 }
 
 /// The formats of tracked boxes beside the service's own answers: those of `bagtrack track --format` that are one file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackFormat {
     /// A table for people.
