@@ -40,7 +40,8 @@ impl SessionService {
             frame,
             state: Some(&bytes),
             takes_over: false,
-            ttl: session.ttl(),
+            // What is left by this clock may be nothing after a jump, and the store would drop the record.
+            ttl: self.registry.idle_lease(),
         };
         let is_written = matches!(store.commit(commit).await?, Outcome::Committed(_));
         if is_written {

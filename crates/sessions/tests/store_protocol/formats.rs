@@ -77,7 +77,7 @@ impl Kind {
     }
 }
 
-async fn open(service: &SessionService, id: Uuid, start: Start) {
+pub async fn open(service: &SessionService, id: Uuid, start: Start) {
     let request = OpenRequest {
         key: Some(CreationKey::Id(id)),
         owner: Owner::default(),
@@ -91,7 +91,7 @@ async fn open(service: &SessionService, id: Uuid, start: Start) {
 }
 
 /// The answer to a frame, or what the client is told.
-async fn post(
+pub async fn post(
     service: &SessionService,
     id: Uuid,
     (number, file): (u64, Bytes),

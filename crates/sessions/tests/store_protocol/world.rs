@@ -15,7 +15,7 @@ use std::time::Duration;
 use tokio::task::JoinHandle;
 use uuid::Uuid;
 
-const LONG: Duration = Duration::from_secs(3600);
+pub const LONG: Duration = Duration::from_secs(3600);
 const FLOW: Flow = Flow(0);
 pub const ID: Uuid = Uuid::from_u128(1);
 
@@ -93,6 +93,15 @@ pub struct Replica {
 
 /// A replica with this store, if any.
 pub fn service(store: Option<Arc<dyn SessionStore>>, store_every: u64) -> SessionService {
+    service_by(Clock::default(), store, store_every)
+}
+
+/// The same, whose sessions expire by this clock.
+pub fn service_by(
+    clock: Clock,
+    store: Option<Arc<dyn SessionStore>>,
+    store_every: u64,
+) -> SessionService {
     let lease = Lease {
         first: LONG,
         idle: LONG,
@@ -107,7 +116,7 @@ pub fn service(store: Option<Arc<dyn SessionStore>>, store_every: u64) -> Sessio
             max_frames: 64,
             store_every,
         },
-        registry: Registry::new(8, 8, lease, Clock::default()).with_eviction(),
+        registry: Registry::new(8, 8, lease, clock).with_eviction(),
         store,
         admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
         streams: OpenStreams::default(),
