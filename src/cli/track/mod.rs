@@ -18,7 +18,7 @@ mod video_file;
 mod video_info;
 
 use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
-use bagtrack_formats::{Columns, Format};
+use bagtrack_formats::{Columns, Format, Unfit};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
 use drawn::Destination;
@@ -149,7 +149,10 @@ fn check(args: &Args) -> Result<(), String> {
         ));
     }
     let fits = args.format.check(count, args.keyframes);
-    fits.map_err(|unfit| format!("--format: {unfit}"))?;
+    fits.map_err(|unfit| match unfit {
+        Unfit::Targets => format!("--format {unfit}"),
+        Unfit::KeyFrames => format!("--keyframes: {unfit}"),
+    })?;
     if args.backwards && args.start.is_none() {
         let text = "--backwards goes from --start to the first frame: give --start, a frame's number or time";
         return Err(text.to_owned());
