@@ -135,6 +135,9 @@ async fn a_video_comes_back_frame_by_frame() {
     let refused = request.body(pictures::png(1)).send().await.unwrap();
     let problem = expect_problem(refused, "unsupported-image").await;
     assert!(problem["detail"].as_str().unwrap().contains("Send a video"));
+    let nothing = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
+    let request = app.request(Method::POST, "/frames", &[]);
+    expect_problem(request.body(nothing).send().await.unwrap(), "frame-damaged").await;
 }
 
 #[tokio::test]

@@ -71,7 +71,11 @@ fn kinds(operation_id: &str) -> Vec<Kind> {
         "createSession" => &[UPLOAD, START, OPEN, &[IdempotencyKeyReused]],
         "putSession" => &[UPLOAD, START, OPEN, &[SessionExists]],
         "track" => &[UPLOAD, START, &[FrameSizeMismatch, RequestTooCostly]],
-        "getVideoFrames" => &[UPLOAD, &[Unauthorized, Forbidden]],
+        "getVideoFrames" => &[
+            &[MalformedRequest, MissingFrame, Unauthorized, Forbidden],
+            &[BodyTimeout, BodyTooLarge, TooManyFrames, UnsupportedImage],
+            &[FrameDamaged, QuotaExceeded, QueueFull, WorkTimeout],
+        ],
         "postFrames" => &[UPLOAD, SESSION, FRAMES, &[RequestTooCostly]],
         "putTarget" => &[UPLOAD, SESSION, FRAMES, &[MissingBox, InvalidBox]],
         "getSnapshot" | "getBagPicture" => &[SESSION, READ],
