@@ -49,6 +49,11 @@ def snapshot():
     return requests.get(f"{URL}{created.headers['location']}/snapshot", timeout=60).content
 
 
+VIDEO = bytes.fromhex(
+    "47494638396101000100800000000000ffffff21f90401000000002c00000000010001000002024401003b"
+)
+"""A GIF of one pixel, for the call that takes a video and no picture."""
+
 # The service looks at the bytes: a picture is taken for any of these.
 KINDS = ["image/png", "image/jpeg", "image/webp", "image/gif", "application/octet-stream"]
 KINDS += ["video/mp4", "video/webm", "video/x-motion-jpeg"]
@@ -124,10 +129,14 @@ def before_call(context, case, kwargs):
         case.path_parameters["id"] = str(uuid.uuid4())
     if path == "/track":
         # What is sent are pictures, and these are for a video.
-        for name in ["start", "count", "backwards", "until_lost", "keyframes"]:
+        for name in [
+            "start", "count", "backwards", "until_lost", "keyframes", "format", "names", "video_name", "rate",
+        ]:
             query.pop(name, None)
             if body is not None:
                 body.pop(name, None)
+    if path == "/frames":
+        case.body = VIDEO
     if path == "/track" and body is not None:
         # A track begins: no picture is a snapshot, and a snapshot holds all settings.
         body.pop("snapshot", None)
