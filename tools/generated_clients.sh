@@ -111,6 +111,7 @@ print(next(pathlib.Path(openapi_generator_cli.__file__).parent.glob("*.jar")))')
     find "$out/java/src/main/java" -name '*.java' >"$out/java/sources"
     javac -nowarn -Xlint:none -cp "$jar:$annotations" -d "$out/java/built" @"$out/java/sources" "$here/Main.java"
     tracks "openapi-generator, Java (native)" java -cp "$out/java/built:$jar:$annotations" Main
+    rm -rf "$out/java-native"
     mv "$out/java" "$out/java-native"
 else
     left_out "javac or libjakarta-annotation-api-java" "the Java client"
