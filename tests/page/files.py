@@ -218,7 +218,7 @@ def plain_http(checks):
 def file_that_cannot_be_played(checks):
     page = checks.page()
     page.locator("#file").set_input_files(pathlib.Path(__file__))
-    said(page, "cannot play the file")
+    said(page, "cannot play files.py")
     assert page.locator("#stage video").count() == 0
     page.context.close()
 
