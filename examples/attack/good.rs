@@ -29,6 +29,8 @@ pub struct Tally {
     /// Answers that were refusals, after which the frame was sent again.
     pub refused: u64,
     pub lost: u64,
+    /// What the first refusal said.
+    pub why_refused: Option<String>,
     pub micros: Histogram<u64>,
 }
 
@@ -76,6 +78,7 @@ impl GoodClients {
             all.answered += tally.answered;
             all.refused += tally.refused;
             all.lost += tally.lost;
+            all.why_refused = all.why_refused.or(tally.why_refused);
             all.micros.add(&tally.micros)?;
         }
         Ok(all)
@@ -97,6 +100,7 @@ impl Tally {
             answered: 0,
             refused: 0,
             lost: 0,
+            why_refused: None,
             micros: Histogram::new(3)?,
         })
     }
@@ -113,8 +117,26 @@ impl std::fmt::Display for Tally {
             self.refused,
             ms(0.5),
             ms(0.99)
-        )
+        )?;
+        match &self.why_refused {
+            Some(why) => write!(formatter, " (refused: {why})"),
+            None => Ok(()),
+        }
     }
+}
+
+/// Why a request has no answer of 200; none where it has.
+async fn refusal(request: reqwest::RequestBuilder) -> Option<String> {
+    let answer = match request.send().await {
+        Ok(answer) if answer.status() == StatusCode::OK => return None,
+        Ok(answer) => answer,
+        Err(error) => return Some(format!("{error:?}")),
+    };
+    let status = answer.status();
+    Some(match answer.text().await {
+        Ok(text) => format!("{status} {text}"),
+        Err(error) => format!("{status} {error:?}"),
+    })
 }
 
 async fn follow(
@@ -139,10 +161,11 @@ async fn follow(
                 let request = request
                     .header("x-forwarded-for", &client)
                     .body(frame.clone());
-                match request.send().await {
-                    Ok(answer) if answer.status() == StatusCode::OK => return,
-                    _ => tally.refused += 1,
-                }
+                let Some(why) = refusal(request).await else {
+                    return;
+                };
+                tally.refused += 1;
+                tally.why_refused.get_or_insert(why);
                 tokio::time::sleep(Duration::from_millis(100)).await;
             }
         };

@@ -25,8 +25,8 @@ settings! {
         /// Requests with a frame that are inside at the same time, the ones at work included.
         queue: usize = 256, permits;
         /// When the oldest frame of a client has waited longer for a worker all the time, for half a second, its newest go
-        /// first, and those that have waited twice as long are refused. Frames of streams and posts of several wait. 0s:
-        /// none is refused.
+        /// first, and older ones that have waited twice as long are refused. Frames of streams and posts of several wait.
+        /// 0s: none is refused.
         queue_delay: Duration = Duration::from_millis(75), delay;
         /// Most sessions alive.
         max_sessions: usize = 1024, positive;

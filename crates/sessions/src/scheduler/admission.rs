@@ -77,7 +77,7 @@ pub struct Admission {
 impl Admission {
     /// At most `queue` requests at a time, and one of each client that has none there; at most `workers` quick ones and as
     /// many slow ones of them at work. Where all requests of a client wait longer than `delay`, those that wait twice as
-    /// long are refused; none at zero.
+    /// long are refused for newer ones; none at zero.
     ///
     /// # Errors
     /// The system gives no threads for the workers.

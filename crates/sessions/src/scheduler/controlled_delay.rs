@@ -3,7 +3,8 @@
 //!
 //! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So after
 //! an interval in which no wait was within the target, the newest request goes first, which is answered in time, and one
-//! that has waited twice the target is refused. This ends after an interval in which a request found none before it.
+//! that has waited twice the target is refused, where a newer one waits. A client that sends one at a time is never
+//! refused. This ends after an interval in which a request found none before it.
 
 use std::time::Duration;
 
@@ -51,7 +52,8 @@ impl ControlledDelay {
         }
         match self.is_overloaded {
             false => Order::Oldest,
-            true if waited > 2 * target => Order::Refuse,
+            // No newer one would be answered in its place.
+            true if waited > 2 * target && !is_alone => Order::Refuse,
             true => Order::Newest,
         }
     }
@@ -86,6 +88,17 @@ mod tests {
         assert_eq!(order(&mut delay, 11_500, 12_000, 2 * TARGET), Order::Newest);
         // Room that refusals made is no end of it.
         assert_eq!(order(&mut delay, 12_000, 14_000, TARGET), Order::Newest);
+    }
+
+    /// It was, beside random clients (`attack --only random_clients --seed 2`).
+    #[test]
+    fn the_only_request_of_a_client_is_late_and_not_refused() {
+        let mut delay = ControlledDelay::default();
+        let mut orders = (0..30).map(|frame| {
+            let now = Duration::from_millis(10_000 + 100 * frame);
+            delay.order((LATE, true), now, TARGET)
+        });
+        assert!(orders.all(|order| order != Order::Refuse));
     }
 
     #[test]

@@ -5,9 +5,9 @@ use crate::clock::{self, Instant};
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-/// Work that takes more processor time without a break makes its flow a slow one. It is some ten times what a frame of a
-/// camera takes, and half of the time between two of them.
-const SLOW: Duration = Duration::from_millis(15);
+/// Work that takes more processor time without a break makes its flow a slow one: it could not follow a camera, of whose
+/// frames one comes each 33 ms. A frame takes a twentieth of it, and a half on a machine ten times as slow.
+const SLOW: Duration = Duration::from_millis(33);
 /// The memory of the longest work fades by half in this time, whatever else the client sends meanwhile.
 const HALF_LIFE: Duration = Duration::from_secs(5);
 /// Flows above which those without work, debt and slow work are forgotten.
@@ -122,11 +122,12 @@ impl SizeClass {
         }
     }
 
-    /// Time that a flow without work saves up. It is more than the flows that always have work are apart, so a client
-    /// that uses less than its share is served before them. (Borrowed virtual time: Duda, Cheriton 1999.)
+    /// Time that a flow without work saves up: as much as the flows that always have work are apart, so a client that uses
+    /// less than its share is served before them, and hardly waits for others that come back too. (Borrowed virtual
+    /// time: Duda, Cheriton 1999.)
     fn claim(self) -> Duration {
         match self {
-            Self::Small => 2 * SLOW,
+            Self::Small => SLOW,
             Self::Large => Duration::from_secs(1),
         }
     }
@@ -395,7 +396,7 @@ mod tests {
         assert_eq!(work(&mut flows, 1, 1_000), SizeClass::Small);
         // Forty works of a fifth of a millisecond once made the flow quick again.
         assert!((0..1_000).all(|_| work(&mut flows, 1, 0) == SizeClass::Large));
-        flows.passed += 5 * HALF_LIFE;
+        flows.passed += 4 * HALF_LIFE;
         assert_eq!(work(&mut flows, 1, 0), SizeClass::Large);
         flows.passed += 2 * HALF_LIFE;
         assert_eq!(work(&mut flows, 1, 0), SizeClass::Small);
