@@ -20,10 +20,25 @@ mod yolo;
 
 pub use clip::Clip;
 pub use row::{Columns, Row};
+pub use yolo::folder as yolo_folder;
+
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+use std::sync::LazyLock;
 
 /// A format.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
+    /// One file.
+    File(FileFormat),
+    /// Ultralytics' YOLO: a folder with data.yaml and a text for each frame ([`yolo_folder`]).
+    Yolo,
+}
+
+/// A format of one file. Its names are those of the command and of the service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum FileFormat {
     /// A table for people, in 0-based pixels.
     Text,
     /// An object a line, in 0-based pixels.
@@ -36,12 +51,29 @@ pub enum Format {
     Mot,
     /// COCO's JSON, with `track_id` and `video_id`; without the frames in which a target is lost.
     Coco,
-    /// Ultralytics' YOLO: a folder (`-o DIR`) with data.yaml and a text for each frame; without lost targets.
-    Yolo,
     /// CVAT for video 1.1: a track for each target, outside where it is lost.
     Cvat,
     /// Label Studio's JSON: a task with a `videorectangle` for each target, switched off where it is lost.
     LabelStudio,
+}
+
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Format>> = LazyLock::new(|| {
+            let files = FileFormat::value_variants().iter().copied();
+            files.map(Format::File).chain([Format::Yolo]).collect()
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::File(format) => format.to_possible_value(),
+            Self::Yolo => Some(PossibleValue::new("yolo").help(
+                "Ultralytics' YOLO: a folder (`-o DIR`) with data.yaml and a text for each frame; without lost targets",
+            )),
+        }
+    }
 }
 
 /// What a format cannot say.
@@ -55,14 +87,12 @@ pub enum Unfit {
     KeyFrames,
 }
 
-/// What a format makes of rows.
+/// What a format of one file makes of rows.
 pub enum Form {
     /// A line for each row, which is written at once.
     Lines(Lines),
     /// One text for all rows, which is written at the end.
     Document(fn(&Clip, &[Row]) -> serde_json::Result<String>),
-    /// Several texts, in a folder.
-    Folder(fn(&Clip, &[Row]) -> serde_json::Result<Vec<TextFile>>),
 }
 
 /// A format that has a line for each row.
@@ -109,16 +139,35 @@ impl Format {
     /// # Errors
     /// See [`Unfit`].
     pub fn check(self, targets: usize, only_key_frames: bool) -> Result<(), Unfit> {
-        let takes_key_frames = !matches!(self, Self::Otb | Self::Coco | Self::Yolo);
+        match self {
+            Self::File(format) => format.check(targets, only_key_frames),
+            Self::Yolo if only_key_frames => Err(Unfit::KeyFrames),
+            Self::Yolo => Ok(()),
+        }
+    }
+}
+
+impl FileFormat {
+    /// The names of all.
+    pub fn names() -> impl Iterator<Item = String> {
+        let values = Self::value_variants().iter();
+        let values = values.filter_map(ValueEnum::to_possible_value);
+        values.map(|value| value.get_name().to_owned())
+    }
+
+    /// Whether it can say what is asked for.
+    ///
+    /// # Errors
+    /// See [`Unfit`].
+    pub fn check(self, targets: usize, only_key_frames: bool) -> Result<(), Unfit> {
         match self {
             Self::Otb if targets > 1 => Err(Unfit::Targets),
-            _ if only_key_frames && !takes_key_frames => Err(Unfit::KeyFrames),
+            Self::Otb | Self::Coco if only_key_frames => Err(Unfit::KeyFrames),
             _ => Ok(()),
         }
     }
 
-    /// One text of all rows of a clip, those of a folder one after the other. The rows are in the order in which they were
-    /// tracked.
+    /// One text of all rows of a clip, which are in the order in which they were tracked.
     ///
     /// # Errors
     /// A number cannot be written.
@@ -131,10 +180,6 @@ impl Format {
         match self.form() {
             Form::Lines(lines) => lines.text(&rows, columns),
             Form::Document(make) => make(clip, in_order(&mut rows)),
-            Form::Folder(make) => {
-                let texts = make(clip, in_order(&mut rows))?;
-                Ok(texts.into_iter().map(|file| file.text).collect())
-            }
         }
     }
 
@@ -155,7 +200,6 @@ impl Format {
             Self::Coco => Form::Document(coco::document),
             Self::Cvat => Form::Document(|clip, rows| Ok(cvat::document(clip, rows))),
             Self::LabelStudio => Form::Document(label_studio::document),
-            Self::Yolo => Form::Folder(yolo::folder),
         }
     }
 }

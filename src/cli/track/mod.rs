@@ -18,7 +18,7 @@ mod video_file;
 mod video_info;
 
 use bagtrack_cli::{BOXES, ModelFlag, ParamFlags, progress, read_boxes};
-use bagtrack_formats::{Columns, Format, Unfit};
+use bagtrack_formats::{Columns, FileFormat, Format, Unfit};
 use bagtrack_sessions::{MAX_TARGETS, Selection};
 use bagtrack_tracker::Rect;
 use drawn::Destination;
@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     /// How boxes are written. Frames and targets count from 0 but for otb, mot, and what COCO and Label Studio count.
-    #[arg(long, value_enum, default_value_t = Format::Text)]
+    #[arg(long, value_enum, default_value_t = Format::File(FileFormat::Text))]
     format: Format,
     /// Writes the boxes to a new file, not to standard output; with --format yolo to a new folder.
     #[arg(short, long, value_name = "FILE")]

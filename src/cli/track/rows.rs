@@ -1,7 +1,7 @@
 //! Where the boxes are written: standard output, a new file, or a new folder.
 
 use bagtrack_cli::output::new_folder;
-use bagtrack_formats::{Clip, Columns, Form, Format, Lines, Row, TextFile, in_order};
+use bagtrack_formats::{Clip, Columns, Form, Format, Lines, Row, TextFile, in_order, yolo_folder};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -21,11 +21,7 @@ enum Sink {
         Output,
         Vec<Row>,
     ),
-    Folder(
-        fn(&Clip, &[Row]) -> serde_json::Result<Vec<TextFile>>,
-        PathBuf,
-        Vec<Row>,
-    ),
+    Yolo(PathBuf, Vec<Row>),
 }
 
 /// A file, or standard output.
@@ -40,14 +36,16 @@ impl Rows {
     /// Rows in this format, to standard output or to a file or folder, which must be new.
     pub fn open(path: Option<&Path>, format: Format, columns: Columns) -> Result<Self, String> {
         let path = path.filter(|path| *path != Path::new("-"));
-        let sink = match format.form() {
-            Form::Lines(lines) => Sink::Lines(lines, Output::open(path)?),
-            Form::Document(make) => Sink::Document(make, Output::open(path)?, Vec::new()),
-            Form::Folder(make) => {
+        let sink = match format {
+            Format::File(format) => match format.form() {
+                Form::Lines(lines) => Sink::Lines(lines, Output::open(path)?),
+                Form::Document(make) => Sink::Document(make, Output::open(path)?, Vec::new()),
+            },
+            Format::Yolo => {
                 let text = "a folder of texts is written: give a new folder with -o DIR";
                 let path = path.ok_or_else(|| text.to_owned())?;
                 new_folder(path).map_err(|error| format!("-o {error}"))?;
-                Sink::Folder(make, path.to_owned(), Vec::new())
+                Sink::Yolo(path.to_owned(), Vec::new())
             }
         };
         let is_lines = matches!(sink, Sink::Lines(..));
@@ -66,7 +64,7 @@ impl Rows {
     /// Takes these rows.
     pub fn write(&mut self, new: Vec<Row>) -> io::Result<()> {
         match &mut self.sink {
-            Sink::Document(_, _, rows) | Sink::Folder(_, _, rows) => {
+            Sink::Document(_, _, rows) | Sink::Yolo(_, rows) => {
                 rows.extend(new);
                 Ok(())
             }
@@ -91,7 +89,7 @@ impl Rows {
     pub fn length(&self) -> u64 {
         match &self.sink {
             Sink::Lines(..) => 0,
-            Sink::Document(_, _, rows) | Sink::Folder(_, _, rows) => Clip::length(rows),
+            Sink::Document(_, _, rows) | Sink::Yolo(_, rows) => Clip::length(rows),
         }
     }
 
@@ -100,8 +98,8 @@ impl Rows {
         match &mut self.sink {
             Sink::Lines(..) => Ok(()),
             Sink::Document(make, output, rows) => output.write(&make(clip, in_order(rows))?),
-            Sink::Folder(make, folder, rows) => {
-                for TextFile { path, text } in make(clip, in_order(rows))? {
+            Sink::Yolo(folder, rows) => {
+                for TextFile { path, text } in yolo_folder(clip, in_order(rows))? {
                     let file = folder.join(path);
                     fs::create_dir_all(file.parent().unwrap_or(folder))?;
                     fs::write(&file, text)?;

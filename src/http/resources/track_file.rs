@@ -5,8 +5,8 @@ use crate::http::problems::problem::Problem;
 use crate::http::respond::charged_body::charged_body;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::media_types::LINES;
-use bagtrack_api::requests::{TrackFormat, TrackSettings};
-use bagtrack_formats::{Clip, Columns, Format, Row};
+use bagtrack_api::requests::TrackSettings;
+use bagtrack_formats::{Clip, Columns, FileFormat, Row};
 use bagtrack_sessions::{Charge, Selection, WorkMeter};
 use std::sync::Arc;
 
@@ -18,8 +18,7 @@ const USUAL_RATE: f64 = 25.0;
 /// What a file of tracked boxes says beside them.
 #[derive(Debug)]
 pub struct TrackFile {
-    format: Format,
-    media_type: &'static str,
+    format: FileFormat,
     /// What each target is called.
     names: Vec<String>,
     /// What the video is called.
@@ -47,14 +46,12 @@ impl TrackFile {
                 false => Ok(None),
             };
         };
-        let (format, media_type) = format_of(format);
         let boxes = settings.boxes.as_ref();
         let targets = boxes.map_or(1, |boxes| boxes.as_slice().len());
         let fits = format.check(targets, settings.keyframes.0);
         fits.map_err(|unfit| Problem::malformed(format!("`format`: {unfit}.")))?;
         Ok(Some(Self {
             format,
-            media_type,
             names: names(settings, targets)?,
             video: match &settings.video_name {
                 Some(name) => name.0.clone(),
@@ -88,7 +85,7 @@ impl TrackFile {
         charge.grow(ROW_BYTES * last.len())?;
         rows.extend(last);
         let goes_on = video.frames.go_on().await;
-        let media_type = self.media_type;
+        let media_type = media_type(self.format);
         let write = move |_: &mut WorkMeter| self.write(rows, size, goes_on);
         let queue = video.queue.clone();
         let text = video.state.service.run(queue, write).await?;
@@ -133,19 +130,13 @@ fn micros(seconds: f64) -> f64 {
     (seconds * 1e6).round() / 1e6
 }
 
-/// What the command calls a format, and its media type.
-fn format_of(format: TrackFormat) -> (Format, &'static str) {
-    const TEXT: &str = "text/plain; charset=utf-8";
-    const JSON: &str = "application/json";
+fn media_type(format: FileFormat) -> &'static str {
     match format {
-        TrackFormat::Text => (Format::Text, TEXT),
-        TrackFormat::Json => (Format::Json, LINES),
-        TrackFormat::Csv => (Format::Csv, "text/csv; charset=utf-8"),
-        TrackFormat::Otb => (Format::Otb, TEXT),
-        TrackFormat::Mot => (Format::Mot, TEXT),
-        TrackFormat::Coco => (Format::Coco, JSON),
-        TrackFormat::Cvat => (Format::Cvat, "application/xml"),
-        TrackFormat::LabelStudio => (Format::LabelStudio, JSON),
+        FileFormat::Text | FileFormat::Otb | FileFormat::Mot => "text/plain; charset=utf-8",
+        FileFormat::Json => LINES,
+        FileFormat::Csv => "text/csv; charset=utf-8",
+        FileFormat::Coco | FileFormat::LabelStudio => "application/json",
+        FileFormat::Cvat => "application/xml",
     }
 }
 

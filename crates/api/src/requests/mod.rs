@@ -17,8 +17,8 @@ pub use settings::{
     TokenSettings, TrackSettings,
 };
 pub use values::{
-    FrameNumber, FrameRate, MAX_EXACT, Name, Names, Seed, Switch, TargetNumber, TrackFormat,
-    number_schema, whole,
+    FrameNumber, FrameRate, MAX_EXACT, Name, Names, Seed, Switch, TargetNumber, number_schema,
+    whole,
 };
 
 use serde::de::DeserializeOwned;

@@ -1,13 +1,14 @@
 //! The settings of each call.
 
 use super::values::{
-    BoxText, BoxesText, FrameNumber, FrameRate, Name, Names, NamesText, ParametersText, Seed,
-    Switch, TargetNumber, TrackFormat,
+    BoxText, BoxesText, FileFormatText, FrameNumber, FrameRate, Name, Names, NamesText,
+    ParametersText, Seed, Switch, TargetNumber,
 };
 use super::{FrameCount, Settings};
 use crate::boxes::Boxes;
 use crate::parameters::{Parameters, PresetName};
 use crate::rect::Rect;
+use bagtrack_formats::FileFormat;
 use serde::Deserialize;
 
 /// The settings of a new session.
@@ -137,8 +138,8 @@ pub struct TrackSettings {
     /// Of a video, answer one file of this format when all is tracked, as `bagtrack track --format` writes it: a table
     /// for people, JSON lines, CSV, the result files of the Object Tracking Benchmark and of the MOTChallenge, COCO,
     /// CVAT for video 1.1 or Label Studio.
-    #[param(nullable = false, inline)]
-    pub format: Option<TrackFormat>,
+    #[param(value_type = FileFormatText, inline, required = false)]
+    pub format: Option<FileFormat>,
     /// With `format`, what the targets are called, in their order: `van,rider`, or a JSON array of texts. The others are
     /// called `Object 1`, `Object 2`, …
     #[param(value_type = NamesText, inline, required = false)]

@@ -2,6 +2,7 @@
 
 use crate::boxes::MAX_TARGETS;
 use crate::parameters::Parameters;
+use bagtrack_formats::FileFormat;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;
@@ -22,26 +23,20 @@ impl<'de> Deserialize<'de> for Switch {
     }
 }
 
-/// The formats of tracked boxes beside the service's own answers: those of `bagtrack track --format` that are one file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TrackFormat {
-    /// A table for people.
-    Text,
-    /// A JSON object a line.
-    Json,
-    /// Comma-separated values with a header.
-    Csv,
-    /// The result file of the Object Tracking Benchmark.
-    Otb,
-    /// The result file of the MOTChallenge.
-    Mot,
-    /// COCO's JSON.
-    Coco,
-    /// CVAT for video 1.1.
-    Cvat,
-    /// Label Studio's JSON.
-    LabelStudio,
+/// The name of a [`FileFormat`].
+#[derive(Debug)]
+pub struct FileFormatText;
+
+impl ToSchema for FileFormatText {}
+
+impl PartialSchema for FileFormatText {
+    fn schema() -> RefOr<Schema> {
+        let words = "The formats of tracked boxes beside the service's own answers: those of `bagtrack track --format` that \
+            are one file.";
+        let text = ObjectBuilder::new().schema_type(Type::String);
+        let text = text.description(Some(words));
+        text.enum_values(Some(FileFormat::names())).build().into()
+    }
 }
 
 /// Most characters of a name in a file.
