@@ -40,11 +40,19 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     if state.is_draining() {
         return Err(Problem::not_ready());
     }
-    if let Some(store) = &state.service.store
-        && !store.is_ready()
-    {
+    let store = state.service.store.as_ref();
+    if store.is_some_and(|store| !store.is_ready()) {
         return Err(Problem::from(StoreUnavailable::default()).with_kind(Kind::NotReady));
     }
+    check_room(&state)?;
+    match store.is_some_and(|store| store.is_full()) {
+        true => Ok(health("store-full")),
+        false => Ok(health("ok")),
+    }
+}
+
+/// Whether there is room for requests: places in the queue, and memory for bodies.
+fn check_room(state: &AppState) -> Result<(), Problem> {
     let (places, bytes) = (state.service.admission.queue_places(), state.uploads.left());
     let queue = state.queue_saturation.update(places, state.config.queue);
     let uploads = state
@@ -53,15 +61,6 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     match (queue, uploads) {
         (true, _) => Err(Problem::saturated("The queue is full.")),
         (_, true) => Err(Problem::saturated("The memory for bodies is used up.")),
-        (false, false)
-            if state
-                .service
-                .store
-                .as_ref()
-                .is_some_and(|store| store.is_full()) =>
-        {
-            Ok(health("store-full"))
-        }
-        (false, false) => Ok(health("ok")),
+        (false, false) => Ok(()),
     }
 }

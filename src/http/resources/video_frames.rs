@@ -11,7 +11,7 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::requests::{BinaryBody, DecodeSettings};
-use futures_util::{StreamExt, stream};
+use futures_util::{Stream, StreamExt, stream};
 use std::future::ready;
 use std::io;
 
@@ -52,17 +52,7 @@ pub async fn post(
     let mut video = VideoFrames::decode(&state, file, format, place).await?;
     let first = next(&state, &request, &mut video).await;
     let first = first.ok_or_else(Problem::missing_frame)??;
-    let rest = stream::unfold(Some((state, request, video)), |held| async {
-        let (state, request, mut video) = held?;
-        match next(&state, &request, &mut video).await? {
-            Ok(frame) => Some((Ok(frame), Some((state, request, video)))),
-            Err(problem) => {
-                request.instance.report(&state, &problem);
-                Some((Err(io::Error::other("the video cannot be decoded")), None))
-            }
-        }
-    });
-    let frames = stream::once(ready(Ok(first))).chain(rest);
+    let frames = stream::once(ready(Ok(first))).chain(rest(state, request, video));
     Ok(([(CONTENT_TYPE, MOTION_JPEG)], Body::from_stream(frames)).into_response())
 }
 
@@ -77,4 +67,22 @@ async fn next(
         Ok(()) => Some(frame),
         Err(problem) => Some(Err(problem)),
     }
+}
+
+/// The frames after the first. One that cannot be had is the last, and cuts the answer off.
+fn rest(
+    state: AppState,
+    request: StatelessRequest<DecodeSettings>,
+    video: VideoFrames,
+) -> impl Stream<Item = io::Result<Bytes>> {
+    stream::unfold(Some((state, request, video)), |held| async {
+        let (state, request, mut video) = held?;
+        match next(&state, &request, &mut video).await? {
+            Ok(frame) => Some((Ok(frame), Some((state, request, video)))),
+            Err(problem) => {
+                request.instance.report(&state, &problem);
+                Some((Err(io::Error::other("the video cannot be decoded")), None))
+            }
+        }
+    })
 }

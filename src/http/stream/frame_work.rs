@@ -38,8 +38,6 @@ pub struct FrameWork {
     pub place: Arc<StreamPlace>,
     /// The frames that wait.
     pub waiting: Mutex<Waiting>,
-    /// Whether frames may be skipped.
-    pub newest_wins: bool,
 }
 
 /// The answer to a frame.
@@ -159,7 +157,7 @@ impl FrameWork {
         (mut session, mut queue): (SessionPermit, QueuePermit),
     ) -> Result<Given, Problem> {
         let ArrivedFrame { header, file } = frame;
-        if self.newest_wins && header.frame.is_some() {
+        if self.waiting().newest_wins() && header.frame.is_some() {
             let detail = "With drop=true frames are skipped, so they have no numbers.";
             return Err(Problem::malformed(detail));
         }

@@ -3,7 +3,7 @@
 use super::fragments::Rates;
 use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
-use super::upgrade::Upgrade;
+use super::upgrade::{MessageLimits, Upgrade};
 use super::waiting::Waiting;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::instance::Instance;
@@ -21,7 +21,6 @@ use bagtrack_net::{ConnectionHold, LeastRate};
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
 use std::io;
 use std::sync::{Arc, Mutex};
-use tracing::Instrument;
 
 /// Most bytes of a frame for each of its pixels: no sensible file has more than the pixels themselves.
 const BYTES_PER_PIXEL: usize = 4;
@@ -60,11 +59,8 @@ pub async fn open(
     let (session, settings) = (&request.session, request.settings);
     let account = state.clients.account(&request.client);
     let permit = account.stream()?;
-    // The stream before this one tracks no further frame.
-    let place = Arc::new(state.service.streams.take(session.id()));
-    let stand = stand(&state, session, account.flow(), &place, settings.from).await?;
-    let (max_bytes, rates) = (max_message_bytes(&state, session), rates(&state, &account));
-    let budgets = [state.uploads.clone(), account.bytes().clone()];
+    let (place, stand) = begin(&state, session, account.flow(), settings.from).await?;
+    let limits = message_limits(&state, session, &account);
     let stream = SessionStream {
         connection: request.connection,
         permit,
@@ -76,13 +72,10 @@ pub async fn open(
             session: session.id(),
             place,
             waiting: Mutex::new(Waiting::new(settings.drop.0)),
-            newest_wins: settings.drop.0,
             state,
         }),
     };
-    let span = tracing::Span::current();
-    let serve = move |socket| stream.run(socket).instrument(span);
-    Ok(request.upgrade.answer(max_bytes, budgets, rates, serve))
+    Ok(request.upgrade.answer(limits, |socket| stream.run(socket)))
 }
 
 /// A request to open a stream.
@@ -123,13 +116,17 @@ impl FromRequestParts<AppState> for StreamRequest {
     }
 }
 
-/// How slowly a client may send.
-fn rates(state: &AppState, account: &Account) -> Rates {
+/// How large messages may be, how slowly they may come, and what their memory is charged to.
+fn message_limits(state: &AppState, session: &Session, account: &Account) -> MessageLimits {
     let config = &state.config;
-    Rates {
-        bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
-        message: LeastRate::new(config.body_timeout, u32::MAX),
-        messages: account.messages(),
+    MessageLimits {
+        max_bytes: max_message_bytes(state, session),
+        budgets: [state.uploads.clone(), account.bytes().clone()],
+        rates: Rates {
+            bytes: LeastRate::new(config.body_timeout, config.limits.min_body_rate),
+            message: LeastRate::new(config.body_timeout, u32::MAX),
+            messages: account.messages(),
+        },
     }
 }
 
@@ -143,15 +140,15 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     usual.min(state.config.max_frame_bytes)
 }
 
-/// Where the session stands. Waits for the frame at work, of the stream before this one too. A stream before it at another
-/// replica tracks no further frame either.
-async fn stand(
+/// Takes the session's place for a stream, and finds where the session stands. The stream before this one tracks no further
+/// frame, nor does one at another replica. Waits for the frame at work, of that stream too.
+async fn begin(
     state: &AppState,
     session: &Arc<Session>,
     flow: Flow,
-    place: &StreamPlace,
     from: Option<u64>,
-) -> Result<Stand, Problem> {
+) -> Result<(Arc<StreamPlace>, Stand), Problem> {
+    let place = Arc::new(state.service.streams.take(session.id()));
     let fenced = state.service.fence(session.read_permit()?, flow);
     let mut locked = fenced.await?;
     place.begin(session);
@@ -162,9 +159,10 @@ async fn stand(
         got: from,
         expected: next,
     })?;
-    Ok(Stand {
+    let stand = Stand {
         next,
         stored,
         checkpoint: session.checkpoint(),
-    })
+    };
+    Ok((place, stand))
 }

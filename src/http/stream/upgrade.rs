@@ -17,6 +17,7 @@ use hyper_util::rt::TokioIo;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+use tracing::Instrument;
 
 /// The protocol that a client may offer. A page has to offer one beside its token.
 const PROTOCOL: &str = "bagtrack";
@@ -27,6 +28,17 @@ const WRITE_BYTES: usize = 64 << 10;
 
 /// A WebSocket whose messages are charged as they arrive. Its buffers take the place of those that its connection had.
 pub type Socket = WebSocketStream<Fragments<ConnectionIo>>;
+
+/// What the messages of a stream may be.
+#[derive(Debug)]
+pub struct MessageLimits {
+    /// Most bytes of one.
+    pub max_bytes: usize,
+    /// What their memory is charged to: of all clients, and of this one.
+    pub budgets: [Budget; 2],
+    /// How slowly they may come, and how fast.
+    pub rates: Rates,
+}
 
 /// A handshake that can be answered.
 #[derive(Debug)]
@@ -59,20 +71,14 @@ impl Upgrade {
         })
     }
 
-    /// The answer. After it `serve` gets the socket, with messages of at most `max_bytes`.
-    pub fn answer<F, S>(
-        self,
-        max_bytes: usize,
-        budgets: [Budget; 2],
-        rates: Rates,
-        serve: F,
-    ) -> Response
+    /// The answer. After it `serve` gets the socket, in the span of this call.
+    pub fn answer<F, S>(self, limits: MessageLimits, serve: F) -> Response
     where
         F: FnOnce(Socket) -> S + Send + 'static,
         S: Future<Output = ()> + Send + 'static,
     {
         let connection = self.connection;
-        tokio::spawn(async move {
+        let stream = async move {
             let Ok(upgraded) = connection.await else {
                 return tracing::debug!("the connection ended before it became a stream");
             };
@@ -80,17 +86,18 @@ impl Upgrade {
                 return tracing::error!("a stream over a connection of another kind");
             };
             let stream = parts.io.into_inner();
-            let fragments = Fragments::new(stream, &parts.read_buf, budgets, rates);
+            let fragments = Fragments::new(stream, &parts.read_buf, limits.budgets, limits.rates);
             let config = WebSocketConfig::default()
                 .read_buffer_size(READ_BYTES)
                 .write_buffer_size(0)
                 .max_write_buffer_size(WRITE_BYTES)
-                .max_message_size(Some(max_bytes))
+                .max_message_size(Some(limits.max_bytes))
                 .max_frame_size(Some(READ_BYTES));
             let role = Role::Server;
             let socket = WebSocketStream::from_raw_socket(fragments, role, Some(config));
             serve(socket.await).await;
-        });
+        };
+        tokio::spawn(stream.in_current_span());
         let accept = HeaderValue::try_from(self.accept).expect("base64 is a header's value");
         let headers = [
             (CONNECTION, HeaderValue::from_static("upgrade")),

@@ -51,6 +51,11 @@ impl Waiting {
         }
     }
 
+    /// Whether frames may be skipped.
+    pub fn newest_wins(&self) -> bool {
+        self.newest_wins
+    }
+
     /// Whether no more can come.
     pub fn is_full(&self) -> bool {
         !self.newest_wins && self.frames.len() >= MAX_WAITING
