@@ -1,9 +1,10 @@
 //! The connections of a service: how many there are, what each is doing, and how slowly its client may read and write.
 //!
-//! In: sockets. Out: the bytes of requests, for whom serves them.
+//! In: sockets. Out: the bytes of requests, and of WebSockets' messages ([`Fragments`]), for whom serves them.
 //!
-//! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, or keeps idle ones.
-//! [`LeastRate`] and the time limits for handshakes and heads bound the first, [`Connections`] the others.
+//! What can go wrong: a client sends its head or reads its answer slowly, opens many connections, keeps idle ones, or
+//! begins large messages on many streams. [`LeastRate`] and the time limits for handshakes and heads bound the first,
+//! [`Connections`] the next two, and the memory of messages is charged as they arrive.
 
 #![warn(clippy::disallowed_methods)]
 
@@ -14,6 +15,7 @@ mod certificate;
 mod connection_hold;
 mod connection_io;
 mod connections;
+mod fragments;
 mod handshake;
 mod least_rate;
 
@@ -24,6 +26,7 @@ pub use certificate::{Certificate, CertificateError};
 pub use connection_hold::ConnectionHold;
 pub use connection_io::{ClientLimits, ConnectionIo};
 pub use connections::{ConnectionPermit, Connections, NoRoom};
+pub use fragments::{Fragments, MessageRate, MessageTooSlow, Rates};
 #[cfg(feature = "tls")]
 pub use handshake::MAX_UNSENT_BYTES;
 pub use handshake::{Begun, Security, Transport};

@@ -8,6 +8,7 @@ use super::holdings::Holdings;
 use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_config::Config;
+use bagtrack_net::MessageRate;
 use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BudgetFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
@@ -16,7 +17,7 @@ use bagtrack_sessions::{
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
-use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
+use governor::{Quota, RateLimiter};
 use ipnet::Ipv6Net;
 use std::collections::HashMap;
 use std::num::NonZeroU32;
@@ -33,9 +34,6 @@ pub const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-pol
 const MAX_IDLE_ACCOUNTS: usize = 1024;
 
 type FrameRate = RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInformationMiddleware>;
-
-/// How many frames of WebSockets a client may send.
-pub type MessageRate = DefaultDirectRateLimiter;
 
 /// Frames of WebSockets a second, which carry messages: as many as some hundred cameras send, and so few that they take a
 /// network thread little time, whatever is in them.

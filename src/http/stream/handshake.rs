@@ -1,6 +1,5 @@
 //! Opens a stream.
 
-use super::fragments::Rates;
 use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::{MessageLimits, Upgrade};
@@ -17,7 +16,7 @@ use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::response::Response;
 use bagtrack_api::requests::StreamSettings;
-use bagtrack_net::{ConnectionHold, LeastRate};
+use bagtrack_net::{ConnectionHold, LeastRate, Rates};
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
 use std::io;
 use std::sync::{Arc, Mutex};

@@ -1,7 +1,6 @@
 //! A stream from its first message to its end: reads frames, sends answers, pings.
 
 use super::end::End;
-use super::fragments::MessageTooSlow;
 use super::frame_work::{Done, FrameWork};
 use super::message;
 use super::upgrade::Socket;
@@ -12,7 +11,7 @@ use crate::http::respond::answer::{particles, stream_answer};
 use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::{FrameHeader, Hello, StreamAnswer};
-use bagtrack_net::ConnectionHold;
+use bagtrack_net::{ConnectionHold, MessageTooSlow};
 use bagtrack_sessions::clock::{self, interval_at, timeout};
 use bagtrack_sessions::{BudgetFull, Charge, ChargedBytes, Estimates};
 use futures_util::stream::FusedStream;

@@ -1,6 +1,5 @@
 //! From HTTP to a WebSocket: the answer to the handshake, and the connection after it.
 
-use super::fragments::{Fragments, Rates};
 use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::extract::ws::WebSocketUpgrade;
@@ -10,7 +9,7 @@ use axum::http::header::{
 use axum::http::request::Parts;
 use axum::http::{HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use bagtrack_net::ConnectionIo;
+use bagtrack_net::{ConnectionIo, Fragments, Rates};
 use bagtrack_sessions::Budget;
 use hyper::upgrade::OnUpgrade;
 use hyper_util::rt::TokioIo;

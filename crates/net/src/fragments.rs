@@ -7,12 +7,12 @@
 //! streams send more frames a second than it may: the smallest ones cost next to no bytes. Each fragment counts as work of
 //! its task, which gives others their turn after some of them.
 
-use crate::http::quotas::clients::MessageRate;
+use crate::LeastRate;
 use arrayvec::ArrayVec;
-use bagtrack_net::LeastRate;
 use bagtrack_sessions::clock::{self, Sleep, sleep_until};
 use bagtrack_sessions::{Budget, BudgetFull, Charge};
 use bytes::{Buf, BytesMut};
+use governor::DefaultDirectRateLimiter;
 use governor::clock::{Clock, DefaultClock};
 use std::future::poll_fn;
 use std::io;
@@ -23,10 +23,13 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::coop::poll_proceed;
 
+/// How many frames of WebSockets a client may send.
+pub type MessageRate = DefaultDirectRateLimiter;
+
 /// Most bytes of a fragment. Masks have four bytes, so each fragment begins with the first of them.
 const FRAGMENT: usize = 16 << 10;
 /// Most bytes that are read at once.
-pub const READ_BYTES: usize = 32 << 10;
+const READ_BYTES: usize = 32 << 10;
 /// A message that grows may be there twice: in the room that it had, and in the one that it gets.
 const COPIES: usize = 2;
 /// How long to wait before memory is asked for again.
