@@ -2,14 +2,9 @@
 
 use super::cpu_time::CpuClock;
 use super::flows::{SizeClass, max_begun};
-use super::workers::Workers;
+use super::workers::{Work, Workers};
 use std::sync::Arc;
 use std::{fmt, io};
-
-/// Work of a request, and what is to be done once its thread can be given the next. Neither may panic.
-pub type Work = Box<dyn FnOnce() -> AfterWork + Send>;
-/// What is to be done after [`Work`], on its thread.
-pub type AfterWork = Box<dyn FnOnce()>;
 
 /// What runs work. Clones are the same.
 #[derive(Clone)]

@@ -20,4 +20,4 @@ mod interleavings;
 mod places;
 pub(crate) mod queue_permit;
 pub(crate) mod work_limit;
-mod workers;
+pub(crate) mod workers;

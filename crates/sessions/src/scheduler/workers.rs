@@ -3,11 +3,15 @@
 //! A thread keeps a megabyte or more of buffers from one frame to the next. So work goes to the thread that became idle
 //! last: its buffers are most likely still in the caches of its core.
 
-use super::executor::{AfterWork, Work};
 use crate::sync::{Condvar, Mutex, MutexGuard, PoisonError, thread};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::{fmt, io};
+
+/// Work of a request, and what is to be done once its thread can be given the next. Neither may panic.
+pub type Work = Box<dyn FnOnce() -> AfterWork + Send>;
+/// What is to be done after [`Work`], on its thread.
+pub type AfterWork = Box<dyn FnOnce()>;
 
 /// The threads. When this is dropped each ends after its current job, once no job waits.
 pub(super) struct Workers(Arc<Shared>);
