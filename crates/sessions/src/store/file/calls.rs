@@ -4,9 +4,9 @@ use super::super::record::{Record, SessionName, Version};
 use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
 };
-use super::database::OpenError;
+use super::database::{OpenError, Transaction};
 use super::durability::Durability;
-use super::rules::{Fault, OwnedCommit, Transaction};
+use super::rules::{Fault, OwnedCommit};
 use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};

@@ -1,10 +1,9 @@
-//! The database in its folder: opened, repaired, swept, and given back to the disk.
+//! The database in its folder: opened, written in transactions, repaired, swept, and given back to the disk.
 
 use super::row::Row;
-use super::rules::{Transaction, Written, moment};
 use fjall::{
     Keyspace, KeyspaceCreateOptions, PersistMode, Readable, SingleWriterTxDatabase,
-    SingleWriterTxKeyspace,
+    SingleWriterTxKeyspace, SingleWriterWriteTx,
 };
 use std::fs::{DirBuilder, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -301,6 +300,50 @@ impl Database {
         });
         self.compaction = compaction.ok();
     }
+}
+
+/// The calls of a group, which are written together. Each reads first and writes then, so one that fails has written
+/// nothing. In damaged tables the row and the state of a session may be of different frames: that is found out.
+pub(super) struct Transaction<'a> {
+    pub(super) inner: SingleWriterWriteTx<'a>,
+    pub(super) database: &'a Database,
+    pub(super) tables: &'a Tables,
+    /// Milliseconds since 1970.
+    pub(super) now: u64,
+    /// Whether an answer promises something that is written here.
+    pub(super) promises: bool,
+    /// Of what was written.
+    pub(super) written_bytes: u64,
+    /// Of the states that were dropped.
+    pub(super) dropped_bytes: u64,
+}
+
+/// What was written.
+pub(super) struct Written {
+    /// See [`Transaction::promises`].
+    pub(super) promises: bool,
+    /// See [`Transaction::written_bytes`].
+    pub(super) written_bytes: u64,
+    /// See [`Transaction::dropped_bytes`].
+    pub(super) dropped_bytes: u64,
+}
+
+impl Transaction<'_> {
+    /// Writes it.
+    pub(super) fn write(self, mode: PersistMode) -> fjall::Result<Written> {
+        self.inner.durability(Some(mode)).commit()?;
+        Ok(Written {
+            promises: self.promises,
+            written_bytes: self.written_bytes,
+            dropped_bytes: self.dropped_bytes,
+        })
+    }
+}
+
+/// A moment, as it is written.
+pub(super) fn moment(bytes: &[u8]) -> Option<u64> {
+    let (moment, _) = bytes.split_first_chunk()?;
+    Some(u64::from_be_bytes(*moment))
 }
 
 /// Rewrites tables without what was dropped from them.

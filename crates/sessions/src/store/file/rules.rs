@@ -2,10 +2,10 @@
 
 use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
-use super::database::{Database, Tables};
+use super::database::{Transaction, moment};
 use super::row::Row;
 use crate::owner::Owner;
-use fjall::{PersistMode, Readable, SingleWriterWriteTx};
+use fjall::Readable;
 use std::time::Duration;
 use uuid::Uuid;
 
@@ -58,22 +58,6 @@ impl From<Commit<'_>> for OwnedCommit {
     }
 }
 
-/// The calls of a group, which are written together. Each reads first and writes then, so one that fails has written
-/// nothing. In damaged tables the row and the state of a session may be of different frames: that is found out.
-pub(super) struct Transaction<'a> {
-    pub(super) inner: SingleWriterWriteTx<'a>,
-    pub(super) database: &'a Database,
-    pub(super) tables: &'a Tables,
-    /// Milliseconds since 1970.
-    pub(super) now: u64,
-    /// Whether an answer promises something that is written here.
-    pub(super) promises: bool,
-    /// Of what was written.
-    pub(super) written_bytes: u64,
-    /// Of the states that were dropped.
-    pub(super) dropped_bytes: u64,
-}
-
 /// The key of the mark that a session was ended.
 fn ended_key(name: SessionName) -> [u8; 24] {
     let mut key = [0; 24];
@@ -82,37 +66,11 @@ fn ended_key(name: SessionName) -> [u8; 24] {
     key
 }
 
-/// A moment, as it is written.
-pub(super) fn moment(bytes: &[u8]) -> Option<u64> {
-    let (moment, _) = bytes.split_first_chunk()?;
-    Some(u64::from_be_bytes(*moment))
-}
-
 fn milliseconds(time: Duration) -> u64 {
     u64::try_from(time.as_millis()).unwrap_or(u64::MAX).max(1)
 }
 
-/// What was written.
-pub(super) struct Written {
-    /// See [`Transaction::promises`].
-    pub(super) promises: bool,
-    /// See [`Transaction::written_bytes`].
-    pub(super) written_bytes: u64,
-    /// See [`Transaction::dropped_bytes`].
-    pub(super) dropped_bytes: u64,
-}
-
 impl Transaction<'_> {
-    /// Writes it.
-    pub(super) fn write(self, mode: PersistMode) -> fjall::Result<Written> {
-        self.inner.durability(Some(mode)).commit()?;
-        Ok(Written {
-            promises: self.promises,
-            written_bytes: self.written_bytes,
-            dropped_bytes: self.dropped_bytes,
-        })
-    }
-
     fn expiry(&self, ttl: Duration) -> u64 {
         self.now.saturating_add(milliseconds(ttl))
     }

@@ -1,8 +1,8 @@
 //! The thread that does all calls, in groups that are written together.
 
-use super::database::{Database, OpenError};
+use super::database::{Database, OpenError, Transaction};
 use super::durability::Durability;
-use super::rules::{Fault, Transaction};
+use super::rules::Fault;
 use crate::clock::{Clock, Instant, now};
 use crate::store::session_store::StoreUnavailable;
 use fjall::PersistMode;
