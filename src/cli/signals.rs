@@ -1,9 +1,13 @@
-//! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads the API keys and the certificate again.
+//! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads keys and the certificate again.
 
 #[cfg(all(unix, feature = "tls"))]
 use bagtrack::http::Certificate;
+#[cfg(all(unix, feature = "jwt"))]
+use bagtrack::http::JwtError;
 use bagtrack::http::{ApiKeys, Application, Shutdown};
 use std::io;
+#[cfg(all(unix, feature = "jwt"))]
+use std::sync::Arc;
 use tokio::sync::watch;
 
 /// The signals to end that have come so far. Clones see the same ones.
@@ -46,9 +50,11 @@ impl Signals {
 }
 
 /// What is read again on a SIGHUP.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Reloaded {
     keys: ApiKeys,
+    #[cfg(all(unix, feature = "jwt"))]
+    issuer_keys: Option<Arc<dyn Fn() -> Result<usize, JwtError> + Send + Sync>>,
     #[cfg(all(unix, feature = "tls"))]
     certificate: Option<Certificate>,
 }
@@ -58,6 +64,8 @@ impl Reloaded {
     pub fn of(application: &Application) -> Self {
         Self {
             keys: application.api_keys(),
+            #[cfg(all(unix, feature = "jwt"))]
+            issuer_keys: application.issuer_keys().map(|read| Arc::new(read) as _),
             #[cfg(all(unix, feature = "tls"))]
             certificate: application.certificate(),
         }
@@ -70,6 +78,13 @@ impl Reloaded {
             Ok(count) => tracing::info!(count, "API keys read again"),
             Err(error) => tracing::error!(%error, "the API keys stay as they were"),
         }
+        #[cfg(feature = "jwt")]
+        if let Some(read) = &self.issuer_keys {
+            match read() {
+                Ok(count) => tracing::info!(count, "keys of the issuer read again"),
+                Err(error) => tracing::error!(%error, "the issuer's keys stay as they were"),
+            }
+        }
         #[cfg(feature = "tls")]
         if let Some(certificate) = &self.certificate {
             match certificate.reload() {
@@ -80,14 +95,14 @@ impl Reloaded {
     }
 }
 
-/// Reads the files of API keys and certificate again on every SIGHUP.
+/// Reads keys and certificate again on every SIGHUP.
 #[cfg(unix)]
 pub async fn reload(reloaded: Reloaded) {
     use tokio::signal::unix::{SignalKind, signal};
     let mut hangups = match signal(SignalKind::hangup()) {
         Ok(hangups) => hangups,
         Err(error) => {
-            tracing::error!(%error, "cannot listen to SIGHUP: API keys and certificate are not read again");
+            tracing::error!(%error, "cannot listen to SIGHUP: keys and certificate are not read again");
             return;
         }
     };
@@ -95,7 +110,7 @@ pub async fn reload(reloaded: Reloaded) {
         let reloaded = reloaded.clone();
         // The files may be on a slow file system.
         if let Err(error) = tokio::task::spawn_blocking(move || reloaded.reload()).await {
-            tracing::error!(%error, "API keys and certificate stay as they were");
+            tracing::error!(%error, "keys and certificate stay as they were");
         }
     }
 }

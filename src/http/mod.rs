@@ -34,9 +34,13 @@ mod server;
 mod state;
 mod stream;
 
+#[cfg(feature = "jwt")]
+pub use bagtrack_access::JwtError;
 pub use bagtrack_access::{AccessError, ApiKeys, KeysError};
 pub use bagtrack_api::ProblemKind;
 pub use bagtrack_api::media_types::SNAPSHOT as SNAPSHOT_MEDIA_TYPE;
+#[cfg(feature = "jwt")]
+pub use bagtrack_config::JwtConfig;
 #[cfg(feature = "tls")]
 pub use bagtrack_config::TlsConfig;
 pub use bagtrack_config::{

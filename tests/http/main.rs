@@ -25,6 +25,8 @@ mod hostile_connections;
 mod https;
 mod idempotency;
 mod identity;
+#[cfg(feature = "jwt")]
+mod identity_provider;
 mod labels;
 mod lines;
 mod log;

@@ -21,7 +21,7 @@ async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
     answers
 }
 
-fn problem_slug(message: &Value) -> &str {
+pub fn problem_slug(message: &Value) -> &str {
     let kind = message["type"].as_str();
     let kind = kind.unwrap_or_else(|| panic!("{message} is no problem"));
     kind.strip_prefix("/docs/problems#").unwrap()

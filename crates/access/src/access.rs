@@ -1,11 +1,14 @@
-//! The keys and secrets of a running service, checked at its start.
+//! The keys and secrets of a running service, checked at its start, and whom a request speaks for.
 
+#[cfg(feature = "jwt")]
+use super::jwt::{JwtError, TokenError, TokenVerifier};
 use super::keys::{ApiKeys, KeysError};
 use super::token::TokenKeys;
 use bagtrack_config::AccessConfig;
-use bagtrack_sessions::{MacKeys, SNAPSHOT_KEY_CONTEXT};
+use bagtrack_sessions::{MacKeys, Owner, SNAPSHOT_KEY_CONTEXT};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::time::SystemTime;
 
 const MIN_SECRET_BYTES: usize = 16;
 
@@ -15,15 +18,19 @@ pub enum AccessError {
     /// The API keys cannot be read.
     #[error(transparent)]
     Keys(#[from] KeysError),
+    /// The tokens of an identity provider cannot be taken.
+    #[cfg(feature = "jwt")]
+    #[error(transparent)]
+    Jwt(#[from] JwtError),
     /// The service would be open to a network.
     #[error(
         "{0} can be reached from other machines, and there are no API keys: give some (--api-keys-file, \
-         BAGTRACK_API_KEYS), or say that everybody may use the service (--no-auth, BAGTRACK_NO_AUTH=true)"
+         BAGTRACK_API_KEYS), or an issuer of tokens (--jwt-issuer), or say that everybody may use the service (--no-auth, BAGTRACK_NO_AUTH=true)"
     )]
     Open(SocketAddr),
     /// Two settings contradict each other.
     #[error(
-        "there are API keys, and --no-auth (BAGTRACK_NO_AUTH) says that none is needed: leave one of them out"
+        "there are API keys or an issuer of tokens, and --no-auth (BAGTRACK_NO_AUTH) says that none is needed: leave one of them out"
     )]
     Contradiction,
     /// A secret can be guessed.
@@ -39,6 +46,9 @@ pub enum AccessError {
 pub struct Access {
     /// The API keys.
     pub keys: ApiKeys,
+    /// What checks the tokens of an identity provider, where one is named.
+    #[cfg(feature = "jwt")]
+    pub jwt: Option<TokenVerifier>,
     /// What session tokens are signed with.
     pub tokens: TokenKeys,
     /// What snapshots are signed with.
@@ -46,13 +56,25 @@ pub struct Access {
 }
 
 impl Access {
-    /// The keys and secrets of these settings, for a service that listens on this address.
+    /// The keys and secrets of these settings, for a service that listens on this address. It may block: keys of an
+    /// issuer are read `now`.
     ///
     /// # Errors
     /// See [`AccessError`].
-    pub fn load(config: &AccessConfig, listen: SocketAddr) -> Result<Self, AccessError> {
+    #[cfg_attr(
+        not(feature = "jwt"),
+        expect(unused_variables, reason = "nothing is as old as its keys")
+    )]
+    pub fn load(
+        config: &AccessConfig,
+        listen: SocketAddr,
+        now: SystemTime,
+    ) -> Result<Self, AccessError> {
         let keys = ApiKeys::load(&config.api_keys, config.api_keys_file.as_deref())?;
-        match (keys.are_needed(), config.no_auth) {
+        let is_needed = keys.are_needed();
+        #[cfg(feature = "jwt")]
+        let is_needed = is_needed || config.jwt.jwt_issuer.is_some();
+        match (is_needed, config.no_auth) {
             (true, true) => return Err(AccessError::Contradiction),
             (false, false) if !listen.ip().is_loopback() => return Err(AccessError::Open(listen)),
             _ => {}
@@ -68,8 +90,61 @@ impl Access {
         }
         Ok(Self {
             keys,
+            #[cfg(feature = "jwt")]
+            jwt: TokenVerifier::load(&config.jwt, now)?,
             tokens: TokenKeys::new(secrets),
             snapshots: Arc::new(snapshots),
         })
     }
+
+    /// Whether a key or a token is needed to use the service.
+    pub fn is_needed(&self) -> bool {
+        #[cfg(feature = "jwt")]
+        if self.jwt.is_some() {
+            return true;
+        }
+        self.keys.are_needed()
+    }
+
+    /// Whether there is a key of this owner, or may be a token.
+    pub fn has_owner(&self, owner: &Owner) -> bool {
+        #[cfg(feature = "jwt")]
+        if self.jwt.as_ref().is_some_and(|jwt| jwt.may_have(owner)) {
+            return true;
+        }
+        self.keys.has_owner(owner)
+    }
+
+    /// Whom this key, or this token of an identity provider, speaks for; and until when, where it ends.
+    ///
+    /// # Errors
+    /// See [`NotIdentified`].
+    #[cfg_attr(not(feature = "jwt"), expect(unused_variables, reason = "no key ends"))]
+    pub async fn identify(
+        &self,
+        presented: &str,
+        now: SystemTime,
+    ) -> Result<(Owner, Option<SystemTime>), NotIdentified> {
+        if let Some(owner) = self.keys.owner(presented.as_bytes()) {
+            return Ok((owner, None));
+        }
+        #[cfg(feature = "jwt")]
+        if let Some(jwt) = &self.jwt {
+            let identity = jwt.identify(presented, now).await?;
+            return Ok((identity.owner, Some(identity.expires)));
+        }
+        Err(NotIdentified::Key)
+    }
+}
+
+/// Why nobody is identified.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotIdentified {
+    /// There is no such key.
+    #[error("it is no API key of this service")]
+    Key,
+    /// It is a token that is not taken.
+    #[cfg(feature = "jwt")]
+    #[error(transparent)]
+    Token(#[from] TokenError),
 }

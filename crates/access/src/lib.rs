@@ -1,7 +1,7 @@
 //! Who may use the service.
 //!
 //! In: what a request presents. Out: the [`Owner`](bagtrack_sessions::Owner) whose key that is, or what a
-//! [`SessionToken`] says; and whether the request may name its host ([`AllowedHosts`]).
+//! [`SessionToken`] or the token of an identity provider says; and whether the request may name its host ([`AllowedHosts`]).
 //!
 //! An API key opens sessions, and a session belongs to the name of the key that opened it: to others it is 404. Several
 //! keys may have one name, so that a key can be replaced. For a web page, which cannot keep a key, whoever has one can
@@ -17,10 +17,14 @@
 
 mod access;
 mod hosts;
+#[cfg(feature = "jwt")]
+mod jwt;
 mod keys;
 mod token;
 
-pub use access::{Access, AccessError};
+pub use access::{Access, AccessError, NotIdentified};
 pub use hosts::AllowedHosts;
+#[cfg(feature = "jwt")]
+pub use jwt::{Identity, JwtError, KeySetError, KeySource, SourceError, TokenError, TokenVerifier};
 pub use keys::{ApiKeys, KeysError};
 pub use token::{PREFIX as TOKEN_PREFIX, SessionToken, TokenKeys};

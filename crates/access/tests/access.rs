@@ -5,12 +5,17 @@ use bagtrack_config::{AccessConfig, Config, Secret};
 use bagtrack_sessions::Owner;
 use std::fs;
 use std::net::SocketAddr;
+use std::time::SystemTime;
 
 const KEY: &str = "0123456789abcdef";
 const OTHER: &str = "fedcba9876543210";
 
 fn address(text: &str) -> SocketAddr {
     text.parse().unwrap()
+}
+
+fn load(config: &AccessConfig, listen: SocketAddr) -> Result<Access, AccessError> {
+    Access::load(config, listen, SystemTime::UNIX_EPOCH)
 }
 
 fn with_key() -> AccessConfig {
@@ -24,8 +29,8 @@ fn with_key() -> AccessConfig {
 fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
     let (here, everywhere) = (address("127.0.0.1:8080"), address("0.0.0.0:8080"));
     let none = AccessConfig::default();
-    assert!(!Access::load(&none, here).unwrap().keys.are_needed());
-    let open = Access::load(&none, everywhere).unwrap_err();
+    assert!(!load(&none, here).unwrap().keys.are_needed());
+    let open = load(&none, everywhere).unwrap_err();
     assert!(
         matches!(open, AccessError::Open(at) if at == everywhere),
         "{open}"
@@ -34,23 +39,13 @@ fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
         no_auth: true,
         ..AccessConfig::default()
     };
-    assert!(
-        !Access::load(&no_auth, everywhere)
-            .unwrap()
-            .keys
-            .are_needed()
-    );
-    assert!(
-        Access::load(&with_key(), everywhere)
-            .unwrap()
-            .keys
-            .are_needed()
-    );
+    assert!(!load(&no_auth, everywhere).unwrap().keys.are_needed());
+    assert!(load(&with_key(), everywhere).unwrap().keys.are_needed());
     let both = AccessConfig {
         no_auth: true,
         ..with_key()
     };
-    let contradiction = Access::load(&both, here).unwrap_err();
+    let contradiction = load(&both, here).unwrap_err();
     assert!(
         matches!(contradiction, AccessError::Contradiction),
         "{contradiction}"
@@ -70,7 +65,7 @@ fn secrets_have_sixteen_characters() {
             ..AccessConfig::default()
         };
         for config in [snapshots, metrics] {
-            match Access::load(&config, here) {
+            match load(&config, here) {
                 Ok(_) => assert!(is_long),
                 Err(error) => assert!(
                     !is_long && matches!(error, AccessError::ShortSecret),
@@ -89,10 +84,7 @@ fn snapshots_are_signed_where_there_is_a_secret() {
         unsigned_snapshots: true,
         ..AccessConfig::default()
     };
-    let unsigned = Access::load(&unsigned, here)
-        .unwrap()
-        .snapshots
-        .sign(b"a snapshot");
+    let unsigned = load(&unsigned, here).unwrap().snapshots.sign(b"a snapshot");
     for (snapshot_keys, unsigned_snapshots, takes_unsigned, signs) in [
         (vec![], false, false, true),
         (secret(), false, false, true),
@@ -104,7 +96,7 @@ fn snapshots_are_signed_where_there_is_a_secret() {
             unsigned_snapshots,
             ..AccessConfig::default()
         };
-        let keys = Access::load(&config, here).unwrap().snapshots;
+        let keys = load(&config, here).unwrap().snapshots;
         let code = keys.sign(b"a snapshot");
         assert_eq!(keys.verify(b"a snapshot", &unsigned), takes_unsigned);
         assert_eq!(code != unsigned, signs);

@@ -55,9 +55,9 @@ kinds! {
         cure: "Send `box=x,y,width,height` in pixels of the frame, in the query or as a field; `boxes` for \
             several targets."
     Unauthorized: 401 "unauthorized" "The request has no valid API key"
-        cause: "The service has API keys, and the request came without one, or with one that it does not know. A \
-            session token ends after its time."
-        cure: "Send `Authorization: Bearer KEY`. For a session token that has ended, make a new one with `POST \
+        cause: "The service has API keys, or an issuer of tokens, and the request came without one, or with one that it \
+            does not know or that has ended: `detail` says why."
+        cure: "Send `Authorization: Bearer KEY`, or `Bearer TOKEN` of the issuer. For a session token that has ended, make a new one with `POST \
             /sessions/{id}/token`."
     Forbidden: 403 "forbidden" "A session token is not good for this"
         cause: "A session token opens one session and nothing else."

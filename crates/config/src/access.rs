@@ -1,5 +1,7 @@
 //! The settings of who may use the service.
 
+#[cfg(feature = "jwt")]
+use super::jwt::JwtConfig;
 use super::settings::{Secret, settings};
 use std::path::PathBuf;
 
@@ -24,5 +26,10 @@ settings! {
         metrics_key: Option<Secret> = None, as "KEY";
         /// Accept snapshots that are not signed with a secret, and sign none where no secret is given.
         unsigned_snapshots: bool = false;
+    }
+    flattened {
+        /// Whose tokens are taken beside API keys.
+        #[cfg(feature = "jwt")]
+        jwt: JwtConfig;
     }
 }

@@ -10,6 +10,8 @@
 mod access;
 mod base_path;
 mod flag_values;
+#[cfg(feature = "jwt")]
+mod jwt;
 mod limits;
 mod memory_bound;
 mod service;
@@ -21,6 +23,8 @@ mod tls;
 pub use access::AccessConfig;
 pub use base_path::{BasePath, BasePathError};
 pub use flag_values::{parse_duration, parse_listen};
+#[cfg(feature = "jwt")]
+pub use jwt::JwtConfig;
 pub use limits::{LimitsConfig, OFF};
 pub use memory_bound::{MAX_BUFFER_BYTES, MemoryBound};
 pub use service::Config;

@@ -16,21 +16,21 @@ pub struct Caller {
     owner: Owner,
     /// The only session that may be used, where the request came with a session token.
     only: Option<SessionName>,
-    /// When the token ends, where the request came with one.
+    /// When what the request came with ends, where it does.
     until: Option<SystemTime>,
 }
 
 impl Caller {
-    /// Whoever has the key of this owner.
-    pub fn with_key(owner: Owner) -> Self {
+    /// Whoever has the key of this owner, or a token of an identity provider, which is good `until` it ends.
+    pub fn with_key(owner: Owner, until: Option<SystemTime>) -> Self {
         Self {
             owner,
             only: None,
-            until: None,
+            until,
         }
     }
 
-    /// Whoever has this token.
+    /// Whoever has this session token.
     pub fn with_token(token: SessionToken) -> Self {
         Self {
             owner: token.owner,
@@ -39,7 +39,7 @@ impl Caller {
         }
     }
 
-    /// Whether the caller came with a token that has ended by `now`.
+    /// Whether what the caller came with has ended by `now`.
     pub fn has_ended(&self, now: SystemTime) -> bool {
         self.until.is_some_and(|until| now >= until)
     }

@@ -12,9 +12,13 @@ use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE
 use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use bagtrack_access::TOKEN_PREFIX;
+use bagtrack_access::{NotIdentified, TOKEN_PREFIX};
 
+/// What a request without a key or a token is told, and one whose token is not taken (RFC 6750, section 3).
 const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack\"");
+#[cfg(feature = "jwt")]
+const INVALID_TOKEN: HeaderValue =
+    HeaderValue::from_static("Bearer realm=\"bagtrack\", error=\"invalid_token\"");
 
 /// The middleware: puts the [`Caller`] into the extensions of the request, or answers 401.
 pub async fn authenticate(
@@ -22,8 +26,8 @@ pub async fn authenticate(
     mut request: Request,
     next: Next,
 ) -> Response {
-    match caller(&state, request.headers()) {
-        Some(caller) => {
+    match caller(&state, request.headers()).await {
+        Ok(caller) => {
             // Who has a key shares its quotas, wherever the requests come from.
             if let Some(name) = caller.owner().name() {
                 request.extensions_mut().insert(Client::Key(name.into()));
@@ -31,7 +35,7 @@ pub async fn authenticate(
             request.extensions_mut().insert(caller);
             next.run(request).await
         }
-        None => unauthorized(),
+        Err(refused) => unauthorized(&refused),
     }
 }
 
@@ -48,32 +52,39 @@ pub async fn authenticate_metrics(
     let digest = |text: &str| blake3::hash(text.as_bytes());
     let presented = bearer(request.headers()).map(digest);
     if presented != Some(digest(key.text())) {
-        return unauthorized();
+        return unauthorized(&NotIdentified::Key);
     }
-    let reader = Caller::with_key(Default::default());
+    let reader = Caller::with_key(Default::default(), None);
     request.extensions_mut().insert(reader);
     next.run(request).await
 }
 
-fn unauthorized() -> Response {
-    let mut response = Problem::unauthorized().into_response();
-    response.headers_mut().insert(WWW_AUTHENTICATE, CHALLENGE);
+fn unauthorized(refused: &NotIdentified) -> Response {
+    let (problem, challenge) = match refused {
+        NotIdentified::Key => (Problem::unauthorized(), CHALLENGE),
+        #[cfg(feature = "jwt")]
+        NotIdentified::Token(error) => (Problem::invalid_token(error), INVALID_TOKEN),
+    };
+    let mut response = problem.into_response();
+    response.headers_mut().insert(WWW_AUTHENTICATE, challenge);
     response
 }
 
-fn caller(state: &AppState, headers: &HeaderMap) -> Option<Caller> {
-    let keys = &state.access.keys;
+async fn caller(state: &AppState, headers: &HeaderMap) -> Result<Caller, NotIdentified> {
+    let (access, now) = (&state.access, state.now());
     let presented = bearer(headers).or_else(|| offered_token(headers));
     if let Some(text) = presented.filter(|text| text.starts_with(TOKEN_PREFIX)) {
-        let token = state.access.tokens.verify(text, state.now())?;
+        let token = access.tokens.verify(text, now);
         // The token ends with its key.
-        let has_key = !keys.are_needed() || keys.has_owner(&token.owner);
-        return has_key.then(|| Caller::with_token(token));
+        let token = token.filter(|token| !access.is_needed() || access.has_owner(&token.owner));
+        return token.map(Caller::with_token).ok_or(NotIdentified::Key);
     }
-    match keys.are_needed() {
-        true => Some(Caller::with_key(keys.owner(presented?.as_bytes())?)),
-        false => Some(Caller::with_key(Default::default())),
+    if !access.is_needed() {
+        return Ok(Caller::with_key(Default::default(), None));
     }
+    let presented = presented.ok_or(NotIdentified::Key)?;
+    let (owner, until) = access.identify(presented, now).await?;
+    Ok(Caller::with_key(owner, until))
 }
 
 /// The key or token of the only `Authorization` header.

@@ -15,7 +15,7 @@ use bagtrack_config::Config;
 
 /// The middleware.
 pub async fn check_origin(State(state): State<AppState>, request: Request, next: Next) -> Response {
-    let hosts = AllowedHosts::of(&state.config, state.access.keys.are_needed());
+    let hosts = AllowedHosts::of(&state.config, state.access.is_needed());
     match check(&state.config, hosts, &request) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),

@@ -72,6 +72,15 @@ impl Problem {
         Self::new(Kind::InvalidParameter, detail)
     }
 
+    /// The token of an identity provider is not taken.
+    #[cfg(feature = "jwt")]
+    pub fn invalid_token(error: &bagtrack_access::TokenError) -> Self {
+        let detail = format!(
+            "The bearer token is not taken: {error}. Send one of the service's issuer, or an API key."
+        );
+        Self::new(Kind::Unauthorized, detail)
+    }
+
     /// Something of the service is full.
     pub fn saturated(what: &str) -> Self {
         let detail = format!("{what} Send requests to another instance.");

@@ -223,7 +223,7 @@ impl CreateRequest {
 /// apart otherwise, each address.
 fn scoped(key: String, state: &AppState, client: &Client) -> String {
     match client {
-        Client::Address(address) if !state.access.keys.are_needed() => format!("{address} {key}"),
+        Client::Address(address) if !state.access.is_needed() => format!("{address} {key}"),
         _ => key,
     }
 }

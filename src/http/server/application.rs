@@ -12,7 +12,9 @@ use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
-use bagtrack_access::{Access, ApiKeys};
+#[cfg(feature = "jwt")]
+use bagtrack_access::JwtError;
+use bagtrack_access::{Access, AccessError, ApiKeys};
 use bagtrack_cli::ModelFiles;
 use bagtrack_config::Config;
 #[cfg(feature = "tls")]
@@ -27,6 +29,7 @@ use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
+use std::time::SystemTime;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 
@@ -73,7 +76,7 @@ impl Application {
     pub async fn bind_with_clock(config: Config, clock: Clock) -> Result<Self, BindError> {
         config.validate()?;
         let address = config.listen;
-        let access = Access::load(&config.access, address)?;
+        let access = load_access(&config, clock.wall(clock.now())).await?;
         #[cfg(feature = "tls")]
         let security = security(&config.tls)?;
         #[cfg(not(feature = "tls"))]
@@ -123,6 +126,16 @@ impl Application {
     /// The API keys, to read them again.
     pub fn api_keys(&self) -> ApiKeys {
         self.service.state.access.keys.clone()
+    }
+
+    /// What reads the keys of the issuer of tokens again, where one is named. It gives how many there are, and may block.
+    #[cfg(feature = "jwt")]
+    pub fn issuer_keys(
+        &self,
+    ) -> Option<impl Fn() -> Result<usize, JwtError> + Send + Sync + use<>> {
+        let state = self.service.state.clone();
+        let verifier = state.access.jwt.clone()?;
+        Some(move || verifier.reload(state.now()))
     }
 
     /// Serves these routes too: behind the layers that all requests pass, but not behind those that ask for a key, or
@@ -187,6 +200,14 @@ impl Application {
         service.flush().await;
         ended.is_ok()
     }
+}
+
+/// Reads the keys. They may come from a slow file system, or over the network.
+async fn load_access(config: &Config, now: SystemTime) -> Result<Access, AccessError> {
+    let (access, listen) = (config.access.clone(), config.listen);
+    let loaded = tokio::task::spawn_blocking(move || Access::load(&access, listen, now)).await;
+    // Nobody cancels it.
+    loaded.unwrap_or_else(|panic| std::panic::resume_unwind(panic.into_panic()))
 }
 
 /// With TLS where the settings name a certificate.

@@ -40,7 +40,11 @@ impl Service {
     /// The settings or the keys cannot be used.
     pub fn new(config: Config, parts: Parts) -> Result<Self, BindError> {
         config.validate()?;
-        let access = Access::load(&config.access, config.listen)?;
+        let access = Access::load(
+            &config.access,
+            config.listen,
+            parts.clock.wall(parts.clock.now()),
+        )?;
         Ok(Self::of(config, access, parts))
     }
 

@@ -124,8 +124,8 @@ impl FrameWork {
     /// The session, if the caller may still use it.
     async fn find(&self) -> Result<Arc<Session>, Problem> {
         let (state, caller) = (&self.state, &self.caller);
-        let keys = &state.access.keys;
-        let has_key = !keys.are_needed() || keys.has_owner(caller.owner());
+        let access = &state.access;
+        let has_key = !access.is_needed() || access.has_owner(caller.owner());
         if caller.has_ended(state.now()) || !has_key {
             return Err(Problem::unauthorized());
         }

@@ -1,0 +1,346 @@
+//! Checks tokens with the keys of their issuer.
+
+use super::key_set::{KeySet, KeySetError};
+use super::key_source::{self, KeySource, SourceError};
+use super::ring_provider;
+use bagtrack_config::JwtConfig;
+use bagtrack_sessions::Owner;
+use jsonwebtoken::errors::ErrorKind;
+use jsonwebtoken::{Algorithm, Header, Validation, decode, decode_header};
+use serde_json::{Map, Value};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+
+/// What the clocks of issuer and service may be apart.
+const LEEWAY: Duration = Duration::from_secs(60);
+/// After so long the keys are read again: an issuer takes one back.
+const MAX_AGE: Duration = Duration::from_secs(600);
+/// Not before this time they are read again for a token that none of them has signed.
+const MIN_AGE: Duration = Duration::from_secs(30);
+/// Tokens whose signature need not be checked again.
+const MAX_CHECKED: usize = 1024;
+/// What the names of such clients begin with. No API key has a name like this.
+const PREFIX: &str = "jwt:";
+/// The longest subject (OpenID Connect Core 1.0, section 2).
+const MAX_OWNER_BYTES: usize = 255;
+
+/// Why no tokens can be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum JwtError {
+    /// Settings are missing.
+    #[error(
+        "--jwt-issuer and --jwt-audience (BAGTRACK_JWT_ISSUER, BAGTRACK_JWT_AUDIENCE) go together, and --jwt-keys with them: \
+         a token for other services must not be good for this one"
+    )]
+    Incomplete,
+    /// The keys cannot be read.
+    #[error("the keys of --jwt-issuer cannot be read (--jwt-keys, BAGTRACK_JWT_KEYS): {0}")]
+    Source(#[from] SourceError),
+    /// What was read is no key set.
+    #[error("the keys of --jwt-issuer (--jwt-keys, BAGTRACK_JWT_KEYS) cannot be used: {0}")]
+    Keys(#[from] KeySetError),
+}
+
+/// Why a token is not taken, for whoever sent it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TokenError {
+    /// It has another form.
+    #[error("it is no API key of this service, and no JSON Web Token")]
+    Form,
+    /// Its algorithm is none of a public key.
+    #[error("the token is signed with {0:?}, not with the issuer's key")]
+    Algorithm(Algorithm),
+    /// Nobody knows the key that it names.
+    #[error("the issuer has no key of the name and algorithm that the token says")]
+    UnknownKey,
+    /// It was changed, or another key has signed it.
+    #[error("the token's signature is wrong")]
+    Signature,
+    /// Its time is over.
+    #[error("the token has expired")]
+    Expired,
+    /// Its time has not come.
+    #[error("the token is not valid yet")]
+    Early,
+    /// It is another issuer's.
+    #[error("the token's issuer (`iss`) is not the one of this service")]
+    Issuer,
+    /// It is for somebody else.
+    #[error("the token is not for this service (`aud`)")]
+    Audience,
+    /// A claim is missing, or is not what it has to be.
+    #[error("the token has no usable claim `{0}`")]
+    Claim(String),
+}
+
+/// Whom a token speaks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// The client.
+    pub owner: Owner,
+    /// When the token ends.
+    pub expires: SystemTime,
+}
+
+/// Checks the tokens of one issuer. Clones are the same.
+#[derive(Debug, Clone)]
+pub struct TokenVerifier(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    issuer: String,
+    audience: Vec<String>,
+    owner_claim: String,
+    source: Arc<dyn KeySource>,
+    known: Mutex<Known>,
+    /// Held by whoever reads the keys, for whom the others wait.
+    reading: tokio::sync::Mutex<()>,
+}
+
+/// What is known at a time.
+#[derive(Debug)]
+struct Known {
+    keys: Arc<KeySet>,
+    /// When the keys were asked for last, and when they came last.
+    asked: SystemTime,
+    came: SystemTime,
+    /// By the digests of tokens that these keys have signed.
+    checked: HashMap<blake3::Hash, Identity>,
+}
+
+impl TokenVerifier {
+    /// Checks tokens as these settings say, with keys that are read now; none where no issuer is named. It may block.
+    ///
+    /// # Errors
+    /// See [`JwtError`].
+    pub fn load(config: &JwtConfig, now: SystemTime) -> Result<Option<Self>, JwtError> {
+        let Some(issuer) = &config.jwt_issuer else {
+            let is_empty = config.jwt_audience.is_empty() && config.jwt_keys.is_none();
+            return if is_empty {
+                Ok(None)
+            } else {
+                Err(JwtError::Incomplete)
+            };
+        };
+        let source = key_source::named(config.jwt_keys.as_deref(), issuer);
+        Self::with_source(config, source, now).map(Some)
+    }
+
+    /// The same, with keys from elsewhere.
+    ///
+    /// # Errors
+    /// See [`JwtError`].
+    pub fn with_source(
+        config: &JwtConfig,
+        source: Arc<dyn KeySource>,
+        now: SystemTime,
+    ) -> Result<Self, JwtError> {
+        let issuer = config.jwt_issuer.clone().ok_or(JwtError::Incomplete)?;
+        if config.jwt_audience.is_empty() {
+            return Err(JwtError::Incomplete);
+        }
+        ring_provider::install();
+        let keys = Arc::new(KeySet::parse(&source.read()?)?);
+        Ok(Self(Arc::new(Inner {
+            issuer,
+            audience: config.jwt_audience.clone(),
+            owner_claim: config.jwt_owner.clone(),
+            source,
+            known: Mutex::new(Known {
+                keys,
+                asked: now,
+                came: now,
+                checked: HashMap::new(),
+            }),
+            reading: tokio::sync::Mutex::new(()),
+        })))
+    }
+
+    /// Whom this token speaks for. Reads the keys again where they are old, or have not signed it.
+    ///
+    /// # Errors
+    /// See [`TokenError`].
+    pub async fn identify(&self, token: &str, now: SystemTime) -> Result<Identity, TokenError> {
+        let header = decode_header(token).map_err(|_| TokenError::Form)?;
+        let (keys, came) = {
+            let known = self.known();
+            (known.keys.clone(), known.came)
+        };
+        if since(came, now) >= MAX_AGE {
+            self.read_keys(&keys, now).await;
+        }
+        let identity = self.look_up(token, &header, now);
+        // The key may be new, or another of the same name.
+        let (Err(TokenError::UnknownKey) | Err(TokenError::Signature)) = identity else {
+            return identity;
+        };
+        self.read_keys(&keys, now).await;
+        self.look_up(token, &header, now)
+    }
+
+    /// Whom the token speaks for by the keys that are known.
+    fn look_up(
+        &self,
+        token: &str,
+        header: &Header,
+        now: SystemTime,
+    ) -> Result<Identity, TokenError> {
+        let digest = blake3::hash(token.as_bytes());
+        let (keys, checked) = {
+            let known = self.known();
+            (known.keys.clone(), known.checked.get(&digest).cloned())
+        };
+        if let Some(identity) = checked {
+            return match now < identity.expires + LEEWAY {
+                true => Ok(identity),
+                false => Err(TokenError::Expired),
+            };
+        }
+        let identity = self.check(token, header, &keys, now)?;
+        let mut known = self.known();
+        // Keys that came meanwhile may not have signed it.
+        if Arc::ptr_eq(&known.keys, &keys) {
+            known.remember(digest, identity.clone(), now);
+        }
+        Ok(identity)
+    }
+
+    /// Whether a client of this name comes with such tokens.
+    pub fn may_have(&self, owner: &Owner) -> bool {
+        owner.name().is_some_and(|name| name.starts_with(PREFIX))
+    }
+
+    /// Reads the keys again. Gives how many there are. It may block.
+    ///
+    /// # Errors
+    /// See [`JwtError`]. The keys are then as before.
+    pub fn reload(&self, now: SystemTime) -> Result<usize, JwtError> {
+        self.known().asked = now;
+        let keys = KeySet::parse(&self.0.source.read()?)?;
+        let count = keys.len();
+        let mut known = self.known();
+        (known.keys, known.came) = (Arc::new(keys), now);
+        known.checked.clear();
+        Ok(count)
+    }
+
+    /// Reads the keys again, unless somebody else has done so since they were `seen`, or tried a moment ago.
+    async fn read_keys(&self, seen: &Arc<KeySet>, now: SystemTime) {
+        let _reading = self.0.reading.lock().await;
+        let is_done = {
+            let known = self.known();
+            !Arc::ptr_eq(&known.keys, seen) || since(known.asked, now) < MIN_AGE
+        };
+        if is_done {
+            return;
+        }
+        let verifier = self.clone();
+        let read = tokio::task::spawn_blocking(move || verifier.reload(now)).await;
+        match read {
+            Ok(Ok(count)) => tracing::info!(count, "keys of the issuer read again"),
+            Ok(Err(error)) => tracing::warn!(%error, "the issuer's keys stay as they were"),
+            Err(error) => tracing::error!(%error, "the issuer's keys stay as they were"),
+        }
+    }
+
+    /// Checks a token with these keys.
+    fn check(
+        &self,
+        token: &str,
+        header: &Header,
+        keys: &KeySet,
+        now: SystemTime,
+    ) -> Result<Identity, TokenError> {
+        use Algorithm::{HS256, HS384, HS512};
+        if matches!(header.alg, HS256 | HS384 | HS512) {
+            return Err(TokenError::Algorithm(header.alg));
+        }
+        let key = keys.find(header.kid.as_deref(), header.alg);
+        let key = key.ok_or(TokenError::UnknownKey)?;
+        let mut validation = Validation::new(header.alg);
+        validation.set_issuer(&[&self.0.issuer]);
+        validation.set_audience(&self.0.audience);
+        validation.set_required_spec_claims(&["exp", "iss", "aud"]);
+        // The time is the service's.
+        validation.validate_exp = false;
+        let claims = decode::<Map<String, Value>>(token, &key.key, &validation);
+        let claims = claims.map_err(|error| refusal(error.kind()))?.claims;
+        self.identity(&claims, now)
+    }
+
+    fn identity(
+        &self,
+        claims: &Map<String, Value>,
+        now: SystemTime,
+    ) -> Result<Identity, TokenError> {
+        let expires = moment(claims, "exp")?.ok_or_else(|| missing("exp"))?;
+        if now >= expires + LEEWAY {
+            return Err(TokenError::Expired);
+        }
+        if moment(claims, "nbf")?.is_some_and(|begins| now + LEEWAY < begins) {
+            return Err(TokenError::Early);
+        }
+        let claim = &self.0.owner_claim;
+        let name = claims.get(claim).and_then(Value::as_str);
+        let is_name = |name: &&str| {
+            (1..=MAX_OWNER_BYTES).contains(&name.len()) && !name.contains(char::is_control)
+        };
+        let name = name.filter(is_name).ok_or_else(|| missing(claim))?;
+        Ok(Identity {
+            owner: Owner::named(&format!("{PREFIX}{name}")),
+            expires,
+        })
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        // Nothing panics while it is held.
+        self.0.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Known {
+    fn remember(&mut self, digest: blake3::Hash, identity: Identity, now: SystemTime) {
+        if self.checked.len() >= MAX_CHECKED {
+            self.checked.retain(|_, checked| now < checked.expires);
+        }
+        if self.checked.len() >= MAX_CHECKED {
+            self.checked.clear();
+        }
+        self.checked.insert(digest, identity);
+    }
+}
+
+/// The time since a moment; none where the clock was set back.
+fn since(moment: SystemTime, now: SystemTime) -> Duration {
+    now.duration_since(moment).unwrap_or_default()
+}
+
+/// The moment of a claim in seconds since 1970, where it is there. A leeway can be added to it.
+fn moment(claims: &Map<String, Value>, claim: &str) -> Result<Option<SystemTime>, TokenError> {
+    let Some(value) = claims.get(claim) else {
+        return Ok(None);
+    };
+    let since_1970 = value.as_f64().map(Duration::try_from_secs_f64);
+    let since_1970 = since_1970.and_then(Result::ok);
+    let moment = since_1970.and_then(|since| SystemTime::UNIX_EPOCH.checked_add(since));
+    let moment = moment.filter(|moment| moment.checked_add(LEEWAY).is_some());
+    moment.map(Some).ok_or_else(|| missing(claim))
+}
+
+fn missing(claim: &str) -> TokenError {
+    TokenError::Claim(claim.to_owned())
+}
+
+/// Why a token is refused, in words that say what to do.
+fn refusal(error: &ErrorKind) -> TokenError {
+    match error {
+        ErrorKind::InvalidSignature => TokenError::Signature,
+        ErrorKind::InvalidIssuer => TokenError::Issuer,
+        ErrorKind::InvalidAudience => TokenError::Audience,
+        ErrorKind::MissingRequiredClaim(claim) | ErrorKind::InvalidClaimFormat(claim) => {
+            missing(claim)
+        }
+        _ => TokenError::Form,
+    }
+}

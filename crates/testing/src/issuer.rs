@@ -1,0 +1,109 @@
+//! An issuer of JSON Web Tokens: its keys, its key set, and what it signs.
+
+use base64::Engine;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use ring::rand::SystemRandom;
+use ring::signature::{
+    ECDSA_P256_SHA256_FIXED_SIGNING, ECDSA_P384_SHA384_FIXED_SIGNING, EcdsaKeyPair,
+    EcdsaSigningAlgorithm, Ed25519KeyPair, KeyPair,
+};
+use serde_json::{Value, json};
+
+/// A private key of an issuer.
+#[derive(Debug)]
+pub struct IssuerKey {
+    id: &'static str,
+    pair: Pair,
+}
+
+#[derive(Debug)]
+enum Pair {
+    /// Its curve, and its algorithm.
+    Ecdsa(&'static str, &'static str, EcdsaKeyPair),
+    Ed25519(Ed25519KeyPair),
+}
+
+impl IssuerKey {
+    /// A key of the curve P-256, of this name.
+    pub fn p256(id: &'static str) -> Self {
+        Self::ecdsa(id, ("P-256", "ES256"), &ECDSA_P256_SHA256_FIXED_SIGNING)
+    }
+
+    /// One of the curve P-384.
+    pub fn p384(id: &'static str) -> Self {
+        Self::ecdsa(id, ("P-384", "ES384"), &ECDSA_P384_SHA384_FIXED_SIGNING)
+    }
+
+    /// One of Ed25519.
+    pub fn ed25519(id: &'static str) -> Self {
+        let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new()).expect("randomness");
+        let pair = Ed25519KeyPair::from_pkcs8(document.as_ref()).expect("a key that was made so");
+        Self {
+            id,
+            pair: Pair::Ed25519(pair),
+        }
+    }
+
+    fn ecdsa(
+        id: &'static str,
+        (curve, name): (&'static str, &'static str),
+        algorithm: &'static EcdsaSigningAlgorithm,
+    ) -> Self {
+        let random = SystemRandom::new();
+        let document = EcdsaKeyPair::generate_pkcs8(algorithm, &random).expect("randomness");
+        let pair = EcdsaKeyPair::from_pkcs8(algorithm, document.as_ref(), &random);
+        Self {
+            id,
+            pair: Pair::Ecdsa(curve, name, pair.expect("a key that was made so")),
+        }
+    }
+
+    /// The public key, as a JSON Web Key.
+    pub fn public(&self) -> Value {
+        match &self.pair {
+            Pair::Ecdsa(curve, name, pair) => {
+                // The first byte says that both coordinates follow.
+                let point = &pair.public_key().as_ref()[1..];
+                let (x, y) = point.split_at(point.len() / 2);
+                json!({
+                    "kty": "EC", "crv": curve, "alg": name, "use": "sig", "kid": self.id,
+                    "x": URL_SAFE_NO_PAD.encode(x), "y": URL_SAFE_NO_PAD.encode(y),
+                })
+            }
+            Pair::Ed25519(pair) => {
+                let x = URL_SAFE_NO_PAD.encode(pair.public_key());
+                json!({ "kty": "OKP", "crv": "Ed25519", "kid": self.id, "x": x })
+            }
+        }
+    }
+
+    /// A token with these claims.
+    pub fn sign(&self, claims: &Value) -> String {
+        let name = match &self.pair {
+            Pair::Ecdsa(_, name, _) => name,
+            Pair::Ed25519(_) => "EdDSA",
+        };
+        let header = json!({ "alg": name, "typ": "JWT", "kid": self.id });
+        let signed = unsigned(&header, claims);
+        let signature = match &self.pair {
+            Pair::Ecdsa(_, _, pair) => {
+                let signature = pair.sign(&SystemRandom::new(), signed.as_bytes());
+                signature.expect("randomness").as_ref().to_vec()
+            }
+            Pair::Ed25519(pair) => pair.sign(signed.as_bytes()).as_ref().to_vec(),
+        };
+        format!("{signed}.{}", URL_SAFE_NO_PAD.encode(signature))
+    }
+}
+
+/// What is signed of a token.
+pub fn unsigned(header: &Value, claims: &Value) -> String {
+    let encode = |value: &Value| URL_SAFE_NO_PAD.encode(value.to_string());
+    format!("{}.{}", encode(header), encode(claims))
+}
+
+/// The key set of an issuer with these keys.
+pub fn key_set(keys: &[&IssuerKey]) -> String {
+    let keys: Vec<Value> = keys.iter().map(|key| key.public()).collect();
+    json!({ "keys": keys }).to_string()
+}
