@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::confidence::score::UNCERTAIN_BELOW;
 use crate::image::rect::Rect;
+
+/// Below this score the target counts as uncertain.
+pub(crate) const UNCERTAIN_BELOW: f32 = 0.5;
 
 /// Whether the tracker believes its own box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

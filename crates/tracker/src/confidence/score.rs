@@ -13,7 +13,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::Status;
+use crate::estimate::{Status, UNCERTAIN_BELOW};
 
 /// What the score's predictors are called, in the order of [`Evidence::predictors`].
 pub const PREDICTORS: [&str; 4] = [
@@ -29,8 +29,7 @@ const MAX_LOST: f64 = 0.1;
 /// A ratio at which the score is a half.
 const HALF_RATIO: f64 = 3.0;
 
-/// Below this score the target counts as uncertain, and (without a discriminant) below the next as lost.
-pub(crate) const UNCERTAIN_BELOW: f32 = 0.5;
+/// Without a discriminant, below this score the target counts as lost.
 const LOST_BELOW: f64 = 0.2;
 
 /// The share of the newest frame in the running mean.
