@@ -1,7 +1,8 @@
 //! Who may use the service.
 //!
 //! In: what a request presents. Out: the [`Owner`](bagtrack_sessions::Owner) whose key that is, or what a
-//! [`SessionToken`] or the token of an identity provider says; and whether the request may name its host ([`AllowedHosts`]).
+//! [`SessionToken`] or the token of an identity provider says; and whether the request may name its host
+//! ([`AllowedHosts`]).
 //!
 //! An API key opens sessions, and a session belongs to the name of the key that opened it: to others it is 404. Several
 //! keys may have one name, so that a key can be replaced. For a web page, which cannot keep a key, whoever has one can
