@@ -2,7 +2,8 @@
 #![no_main]
 
 use axum::http::{HeaderMap, HeaderValue};
-use bagtrack::http::{forwarded_address, ApiKeys, Client, Secret};
+use bagtrack::http::{ApiKeys, Client, Secret};
+use bagtrack_net::client_address;
 use libfuzzer_sys::fuzz_target;
 use std::net::IpAddr;
 
@@ -20,14 +21,14 @@ fuzz_target!(|data: &[u8]| {
     }
     // An untrusted peer is the client, whatever it writes.
     let other: IpAddr = [192, 0, 2, 1].into();
-    assert_eq!(forwarded_address(other, &headers, &trusted), other);
-    let address = forwarded_address(peer, &headers, &trusted);
+    assert_eq!(client_address(other, &headers, &trusted), other);
+    let address = client_address(peer, &headers, &trusted);
     assert_eq!(Client::at(address), Client::at(address.to_canonical()));
     // What a client writes in front of its own address changes nothing.
     headers.remove("forwarded");
     headers.append("x-forwarded-for", HeaderValue::from_static("198.51.100.9"));
     let own: IpAddr = [198, 51, 100, 9].into();
-    assert_eq!(forwarded_address(peer, &headers, &trusted), own);
+    assert_eq!(client_address(peer, &headers, &trusted), own);
     if let Ok(text) = std::str::from_utf8(data) {
         if let Ok(keys) = ApiKeys::load(&[Secret::from(text)], None) {
             // White space around an entry is no part of it.

@@ -49,8 +49,6 @@ pub use bagtrack_config::{
 };
 #[cfg(feature = "tls")]
 pub use bagtrack_net::{Certificate, CertificateError};
-#[cfg(fuzzing)]
-pub use middleware::forwarded::address as forwarded_address;
 pub use quotas::client::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, Shutdown};

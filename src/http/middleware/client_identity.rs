@@ -1,6 +1,5 @@
 //! Notes which client a request is from, and tells the client what is left of its quotas.
 
-use super::forwarded::address;
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::{Client, Peer};
 use crate::http::state::AppState;
@@ -8,6 +7,7 @@ use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
 use bagtrack_api::ProblemKind as Kind;
+use bagtrack_net::client_address;
 use bagtrack_sessions::clock::sleep;
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
@@ -25,7 +25,7 @@ pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
     let peer = request.extensions().get::<Peer>();
     let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
     let trusted = &state.config.limits.trusted_proxies;
-    let address = address(peer, request.headers(), trusted);
+    let address = client_address(peer, request.headers(), trusted);
     request.extensions_mut().insert(ClientAddress(address));
     address
 }

@@ -15,7 +15,6 @@ pub mod count_requests;
 pub mod draining;
 #[cfg(feature = "otel")]
 pub mod exported_span;
-pub mod forwarded;
 pub mod lingering_close;
 pub mod request_log;
 pub mod security_headers;

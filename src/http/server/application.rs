@@ -8,7 +8,6 @@ use super::bind_error::BindError;
 use super::connection_service::ConnectionService;
 use super::refusal;
 use super::service::{Parts, Service};
-use crate::http::middleware::forwarded::is_trusted;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::Router;
@@ -21,7 +20,7 @@ use bagtrack_config::Config;
 use bagtrack_config::TlsConfig;
 #[cfg(feature = "tls")]
 use bagtrack_net::{Certificate, CertificateError};
-use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security};
+use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security, is_trusted};
 use bagtrack_sessions::clock::{sleep, timeout};
 use bagtrack_sessions::{Clock, Executor};
 use std::io::{self, Write};
