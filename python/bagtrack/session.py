@@ -200,13 +200,22 @@ class Session:
     def save(self) -> Steps[bytes]:
         """The service's snapshot of the session."""
         self.next_number()
-        reply = yield from self.call(Request("GET", self.path("/snapshot")))
-        if reply.status in GONE:
-            yield from self.restore(ServiceError(reply.status, reply.document))
+        backoff, is_first = Backoff(self.retry_for), True
+        while True:
             if self.answer and self.last_acknowledged < self.answer.frame:
                 yield from self.catch_up(self.answer.frame)
             reply = yield from self.call(Request("GET", self.path("/snapshot")))
-        return self._checked(reply).body
+            if reply.status not in GONE:
+                return self._checked(reply).body
+            problem = ServiceError(reply.status, reply.document)
+            if not is_first:
+                # An answer that is lost is asked for at the next replica, which may not have the session.
+                pause = backoff.next()
+                if pause is None:
+                    raise problem
+                yield Pause(pause)
+            is_first = False
+            yield from self.restore(problem)
 
     def close(self) -> Steps[None]:
         """Ends the session at the service."""

@@ -435,9 +435,13 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
         let request = request_as(&app, client, &path, &[]);
         request.body(pictures::png(1)).send().await.unwrap()
     };
+    // One after the other: many at once could be refused like frames.
+    let mut sessions = Vec::new();
+    for _ in 0..48 {
+        sessions.push(open(&app, GREEDY).await);
+    }
     // Each sends its next frame once it has an answer, until one was refused.
-    let flood = async || {
-        let id = open(&app, GREEDY).await;
+    let flood = async |id: String| {
         let mut frame = 0;
         loop {
             let answer = post(GREEDY, &id).await;
@@ -449,7 +453,7 @@ async fn frames_of_a_client_that_sends_too_many_are_refused_and_change_nothing()
             frame += 1;
         }
     };
-    let floods = (0..48).map(|_| Box::pin(flood()));
+    let floods = sessions.into_iter().map(|id| Box::pin(flood(id)));
     let first_refusal = futures_util::future::select_all(floods);
     let modest = async {
         let id = open(&app, MODEST).await;

@@ -6,7 +6,8 @@
 //!
 //! Nothing simpler bounds it. image-webp 0.2.4 allocates every group up to the largest number that stands in the small
 //! image of groups, whether a pixel uses it or not, so the number of pixels is no bound; its `set_memory_limit` is asked
-//! for metadata only. A bound by pixels that holds would be that of 65,536 groups, whatever the image.
+//! for metadata only (docs/upstream/image-webp.md). A bound by pixels that holds would be that of 65,536 groups, whatever
+//! the image.
 
 use super::prefix_codes::{Bits, Code};
 

@@ -1,9 +1,9 @@
 //! The bytes of a WebSocket connection, with the client's messages in small fragments, and their memory charged.
 //!
-//! The library makes room for a whole frame when its head has come, and keeps that room for the next one: a few bytes, or
-//! one large message, would hold memory for the life of a stream. So it gets each frame in fragments (RFC 6455, section
-//! 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A fragment is handed over when
-//! its memory is charged. Where there is none the client waits: nothing more is read from it. So does a client whose
+//! The library makes room for a whole frame when its head has come (docs/upstream/tungstenite.md), and keeps that room for
+//! the next one: a few bytes, or one large message, would hold memory for the life of a stream. So it gets each frame in
+//! fragments (RFC 6455, section 5.4). Its own buffer holds one of them, and a message is put together as it arrives. A
+//! fragment is handed over when its memory is charged. Where there is none the client waits: nothing more is read from it. So does a client whose
 //! streams send more frames a second than it may: the smallest ones cost next to no bytes. Each fragment counts as work of
 //! its task, which gives others their turn after some of them.
 

@@ -45,8 +45,8 @@ struct Bearer;
 
 impl utoipa::Modify for Bearer {
     fn modify(&self, document: &mut utoipa::openapi::OpenApi) {
-        let text = "An API key, a token of the service's issuer (JWT), or a session token, which is good for one session. Needed where \
-            the service has keys or an issuer.";
+        let text = "An API key, a token of the service's issuer (JWT), or a session token, which is good for one session. \
+            Needed where the service has keys or an issuer.";
         let scheme = HttpBuilder::new().scheme(HttpAuthScheme::Bearer);
         let scheme = SecurityScheme::Http(scheme.description(Some(text)).build());
         let components = document.components.get_or_insert_default();

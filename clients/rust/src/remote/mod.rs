@@ -194,17 +194,25 @@ impl Remote {
     }
 
     pub async fn snapshot(&mut self) -> Result<Bytes, ClientError> {
-        let reply = self.transport.call(&self.request_snapshot()).await?;
-        match reply.checked() {
-            Ok(reply) => return Ok(reply.body),
-            Err(problem) if is_gone(&problem) => self.reopen(problem).await?,
-            Err(problem) => return Err(problem.into()),
+        let mut backoff = Backoff::new(self.transport.retry_for, self.transport.carrier.clone());
+        let mut has_recovered = false;
+        loop {
+            if self.last_acknowledged < self.answered {
+                self.deliver(self.answered).await?;
+            }
+            let reply = self.transport.call(&self.request_snapshot()).await?;
+            let problem = match reply.checked() {
+                Ok(reply) => return Ok(reply.body),
+                Err(problem) if is_gone(&problem) => problem,
+                Err(problem) => return Err(problem.into()),
+            };
+            // An answer that is lost is asked for at the next replica, which may not have the session.
+            if has_recovered && !backoff.wait(None).await {
+                return Err(problem.into());
+            }
+            has_recovered = true;
+            self.reopen(problem).await?;
         }
-        if self.last_acknowledged < self.answered {
-            self.deliver(self.answered).await?;
-        }
-        let reply = self.transport.call(&self.request_snapshot()).await?;
-        Ok(reply.checked()?.body)
     }
 
     pub async fn end(mut self) -> Result<(), ClientError> {

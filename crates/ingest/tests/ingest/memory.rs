@@ -116,7 +116,7 @@ impl Bits {
 }
 
 /// A lossless WebP of 1024 x 1024 equal pixels with so many groups of codes, each with 2048 codes of 11 bits.
-fn with_code_groups(groups: usize) -> Vec<u8> {
+pub fn with_code_groups(groups: usize) -> Vec<u8> {
     let mut bits = Bits::default();
     bits.write(0x2f, 8);
     bits.write(1023, 14);
