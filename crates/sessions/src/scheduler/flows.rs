@@ -5,9 +5,9 @@ use crate::clock::{self, Instant};
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-/// Work that takes more processor time without a break makes its flow a slow one: it could not follow a camera, of whose
-/// frames one comes each 33 ms. A frame takes a twentieth of it, and a half on a machine ten times as slow.
-const SLOW: Duration = Duration::from_millis(33);
+/// Work that takes more processor time without a break makes its flow a slow one. It is half of the time between two
+/// frames of a camera, some ten times what one takes, and more than one that learns takes in a build for tests.
+const SLOW: Duration = Duration::from_millis(20);
 /// The memory of the longest work fades by half in this time, whatever else the client sends meanwhile.
 const HALF_LIFE: Duration = Duration::from_secs(5);
 /// Flows above which those without work, debt and slow work are forgotten.
