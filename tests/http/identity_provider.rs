@@ -12,6 +12,7 @@ use rustix::process::Signal;
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
+use tempfile::TempDir;
 
 const ISSUER: &str = "https://login.example.org";
 const AUDIENCE: &str = "bagtrack";
@@ -29,6 +30,16 @@ fn write_keys(key: &IssuerKey, file: &Path) {
     std::fs::write(file, key_set(&[key])).unwrap();
 }
 
+/// A service that takes the tokens of this key, and is called with one of Ann's. The folder has the key set.
+async fn signed_in() -> (TempDir, IssuerKey, TestApplication) {
+    let (folder, key) = (tempfile::tempdir().unwrap(), IssuerKey::p256("1"));
+    let file = folder.path().join("keys.json");
+    write_keys(&key, &file);
+    let mut app = with_keys_in(&file).await;
+    app.key = Some(token(&key, "ann"));
+    (folder, key, app)
+}
+
 async fn with_keys_in(file: &Path) -> TestApplication {
     TestApplication::start_with(|config: &mut Config| {
         config.access.api_keys = vec![Secret::from(format!("jwt.ann:{KEY}"))];
@@ -41,11 +52,7 @@ async fn with_keys_in(file: &Path) -> TestApplication {
 
 #[tokio::test]
 async fn a_session_belongs_to_the_subject_of_the_token_that_opened_it() {
-    let (folder, key) = (tempfile::tempdir().unwrap(), IssuerKey::p256("1"));
-    let file = folder.path().join("keys.json");
-    write_keys(&key, &file);
-    let mut app = with_keys_in(&file).await;
-    app.key = Some(token(&key, "ann"));
+    let (_folder, key, mut app) = signed_in().await;
     let id = app.open().await;
     expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
     // A later token of hers is as good.
@@ -64,11 +71,7 @@ async fn a_session_belongs_to_the_subject_of_the_token_that_opened_it() {
 
 #[tokio::test]
 async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
-    let (folder, key) = (tempfile::tempdir().unwrap(), IssuerKey::p256("1"));
-    let file = folder.path().join("keys.json");
-    write_keys(&key, &file);
-    let mut app = with_keys_in(&file).await;
-    app.key = Some(token(&key, "ann"));
+    let (_folder, _key, mut app) = signed_in().await;
     let id = app.open().await;
     let made = app.request(Method::POST, &format!("/sessions/{id}/token"), &[]);
     let made = expect(made.send().await.unwrap(), StatusCode::OK).await;

@@ -134,7 +134,7 @@ impl ApiKeys {
 }
 
 /// The text of a file that is none of those which may never end: a pipe nobody writes to would stop all later reloads.
-fn read_regular(path: &Path) -> io::Result<String> {
+pub(super) fn read_regular(path: &Path) -> io::Result<String> {
     match std::fs::metadata(path)?.is_file() {
         true => std::fs::read_to_string(path),
         false => Err(io::Error::new(

@@ -295,6 +295,12 @@ async fn keys_come_from_a_file_from_an_address_and_from_where_the_issuer_says() 
         let name = name_in(&verifier, &token).await;
         assert_eq!(name.as_deref(), Ok("jwt:auth0|5f7c8e"), "{keys:?}");
     }
+    // A pipe nobody writes to would be read for ever.
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let refused = load(Some(pipe.display().to_string())).unwrap_err();
+    assert!(refused.to_string().contains("no regular file"), "{refused}");
     for missing in [format!("{url}/other"), format!("{}.bak", file.display())] {
         let refused = load(Some(missing.clone())).unwrap_err().to_string();
         assert!(

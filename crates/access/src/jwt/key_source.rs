@@ -1,5 +1,6 @@
 //! Where the public keys of an issuer come from.
 
+use crate::keys::read_regular;
 use serde::Deserialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -60,8 +61,7 @@ struct File(PathBuf);
 
 impl KeySource for File {
     fn read(&self) -> Result<String, SourceError> {
-        let text = std::fs::read_to_string(&self.0);
-        text.map_err(|error| SourceError::new(self.0.display(), error))
+        read_regular(&self.0).map_err(|error| SourceError::new(self.0.display(), error))
     }
 }
 
