@@ -24,3 +24,21 @@ class Backoff:
         pause = max(self._own * random.uniform(0.5, 1.0), asked)
         self._own = min(2.0 * self._own, LONGEST)
         return None if time.monotonic() + pause - self._begin > self._retry_for else pause
+
+
+class RecoveryBackoff:
+    """Pauses between the recoveries of one call.
+
+    The first comes at once; where every replica loses the session again, they end with the time for retries.
+    """
+
+    def __init__(self, retry_for: float) -> None:
+        self._backoff = Backoff(retry_for)
+        self._has_recovered = False
+
+    def next(self) -> Optional[float]:
+        """The pause before the next recovery in seconds; None where the time would be up then."""
+        if not self._has_recovered:
+            self._has_recovered = True
+            return 0.0
+        return self._backoff.next()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 from bagtrack.answer import Answer, Box, BoxLike, parse_box
-from bagtrack.backoff import Backoff
+from bagtrack.backoff import Backoff, RecoveryBackoff
 from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Steps
 
@@ -106,7 +106,7 @@ class Session:
 
     def catch_up(self, until: int) -> Steps[Reply]:
         """Brings the service up to frame `until`; the reply to that frame."""
-        backoff, is_first = Backoff(self.retry_for), True
+        backoff = RecoveryBackoff(self.retry_for)
         while True:
             number = min(self.last_acknowledged + 1, until)
             upload = self._uploads.get(number)
@@ -121,17 +121,20 @@ class Session:
             problem = ServiceError(reply.status, reply.document)
             # None where the session is to be opened again.
             go_on_with = None if reply.status in GONE else self._recovery(problem, number, until)
-            if not is_first:
-                # Where every replica loses the session again, this ends with the time for retries.
-                pause = backoff.next()
-                if pause is None:
-                    raise problem
-                yield Pause(pause)
-            is_first = False
+            yield from self._pause(backoff, problem)
             if go_on_with is None:
                 yield from self.restore(problem)
             else:
                 self.last_acknowledged = go_on_with - 1
+
+    @staticmethod
+    def _pause(backoff: RecoveryBackoff, problem: ServiceError) -> Steps[None]:
+        """Waits before the next recovery from the problem, which is raised where the time for retries would be up."""
+        pause = backoff.next()
+        if pause is None:
+            raise problem
+        if pause > 0.0:
+            yield Pause(pause)
 
     def _recovery(self, problem: ServiceError, number: int, until: int) -> Optional[int]:
         """The frame to go on with after `number` was refused on the way to frame `until`; None: open the session again.
@@ -200,7 +203,7 @@ class Session:
     def save(self) -> Steps[bytes]:
         """The service's snapshot of the session."""
         self.next_number()
-        backoff, is_first = Backoff(self.retry_for), True
+        backoff = RecoveryBackoff(self.retry_for)
         while True:
             if self.answer and self.last_acknowledged < self.answer.frame:
                 yield from self.catch_up(self.answer.frame)
@@ -208,13 +211,8 @@ class Session:
             if reply.status not in GONE:
                 return self._checked(reply).body
             problem = ServiceError(reply.status, reply.document)
-            if not is_first:
-                # An answer that is lost is asked for at the next replica, which may not have the session.
-                pause = backoff.next()
-                if pause is None:
-                    raise problem
-                yield Pause(pause)
-            is_first = False
+            # An answer that is lost is asked for at the next replica, which may not have the session.
+            yield from self._pause(backoff, problem)
             yield from self.restore(problem)
 
     def close(self) -> Steps[None]:

@@ -38,3 +38,25 @@ impl Backoff {
         true
     }
 }
+
+/// The pauses between the recoveries of one call. The first recovery comes at once; where every replica loses the session
+/// again, they end with the time for retries.
+pub struct RecoveryBackoff {
+    backoff: Backoff,
+    has_recovered: bool,
+}
+
+impl RecoveryBackoff {
+    pub fn new(backoff: Backoff) -> Self {
+        Self {
+            backoff,
+            has_recovered: false,
+        }
+    }
+
+    /// Waits before the next recovery. False, and at once, where the time would be up then.
+    pub async fn wait(&mut self) -> bool {
+        let is_first = !std::mem::replace(&mut self.has_recovered, true);
+        is_first || self.backoff.wait(None).await
+    }
+}

@@ -133,9 +133,14 @@ impl Transport {
         self.used = (self.used + 1) % self.addresses.len();
     }
 
+    /// Pauses for as long as a request is sent again.
+    pub fn backoff(&self) -> Backoff {
+        Backoff::new(self.retry_for, self.carrier.clone())
+    }
+
     /// The answer to a request, which is sent again where that may help.
     pub async fn call(&mut self, request: &Request) -> Result<Reply, ClientError> {
-        let mut backoff = Backoff::new(self.retry_for, self.carrier.clone());
+        let mut backoff = self.backoff();
         // A line that was idle for long breaks at its next use: the first time nothing is meant by it.
         let mut has_broken = self.retry_for.is_zero();
         loop {

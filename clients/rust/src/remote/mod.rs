@@ -3,7 +3,7 @@
 
 mod checkpoint;
 
-use crate::backoff::Backoff;
+use crate::backoff::RecoveryBackoff;
 use crate::error::ClientError;
 use crate::kept::{Kept, MOST};
 use crate::transport::{Request, Standing, Transport};
@@ -118,8 +118,7 @@ impl Remote {
 
     /// Brings the service up to this frame; the answers to the request that has it.
     async fn deliver(&mut self, number: u64) -> Result<Vec<Answer>, ClientError> {
-        let mut backoff = Backoff::new(self.transport.retry_for, self.transport.carrier.clone());
-        let mut has_recovered = false;
+        let mut backoff = RecoveryBackoff::new(self.transport.backoff());
         loop {
             let next = (self.last_acknowledged + 1).min(number);
             let upload = self.kept.from(next);
@@ -142,11 +141,9 @@ impl Remote {
             let Some(recovery) = self.recovery(&problem, next, number) else {
                 return Err(problem.into());
             };
-            // Where every replica loses the session again, this ends with the time for retries.
-            if has_recovered && !backoff.wait(None).await {
+            if !backoff.wait().await {
                 return Err(problem.into());
             }
-            has_recovered = true;
             match recovery {
                 Recovery::GoOnWith(frame) => self.last_acknowledged = frame.saturating_sub(1),
                 Recovery::Reopen => self.reopen(problem).await?,
@@ -194,8 +191,7 @@ impl Remote {
     }
 
     pub async fn snapshot(&mut self) -> Result<Bytes, ClientError> {
-        let mut backoff = Backoff::new(self.transport.retry_for, self.transport.carrier.clone());
-        let mut has_recovered = false;
+        let mut backoff = RecoveryBackoff::new(self.transport.backoff());
         loop {
             if self.last_acknowledged < self.answered {
                 self.deliver(self.answered).await?;
@@ -207,10 +203,9 @@ impl Remote {
                 Err(problem) => return Err(problem.into()),
             };
             // An answer that is lost is asked for at the next replica, which may not have the session.
-            if has_recovered && !backoff.wait(None).await {
+            if !backoff.wait().await {
                 return Err(problem.into());
             }
-            has_recovered = true;
             self.reopen(problem).await?;
         }
     }
