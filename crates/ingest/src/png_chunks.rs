@@ -62,7 +62,8 @@ impl<'a> Png<'a> {
             }
             png.add(&kind, at..end);
             if &kind == b"IEND" {
-                return Ok(png);
+                let has_header = png.size != (0, 0);
+                return has_header.then_some(png).ok_or("it has no header");
             }
             at = end;
         }

@@ -63,6 +63,10 @@ impl<'file> WebPFile<'file> {
         let mut decoder =
             WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
         let (width, height) = decoder.dimensions();
+        if width == 0 || height == 0 {
+            // image-webp keeps 14 bits of a lossless side, so that of 16,384 pixels, which is the longest, becomes 0.
+            return Err(Format::WebP.damaged("its width or its height is 0, or 16384"));
+        }
         limits.check_size(width, height)?;
         let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
         Ok(Self {

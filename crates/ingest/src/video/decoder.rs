@@ -4,7 +4,7 @@ use super::child::{self, Launcher};
 use super::error::VideoError;
 use super::parts;
 use super::sniff::VideoFormat;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,8 +18,10 @@ const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg
 const NAMELESS: &str = "file:/proc/self/fd/0";
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
-/// Most bytes of a line of what the program says.
+/// Most characters that are told of a line of what the program says.
 const MAX_SAID: usize = 200;
+/// Most bytes of a line that are held; the rest counts as a line of its own.
+const MAX_LINE: u64 = 4096;
 
 /// What decoding a video may take.
 #[derive(Debug, Clone, Copy)]
@@ -286,10 +288,12 @@ impl Said {
         self.lock().unlisted
     }
 
-    /// Hears all, so that the program never waits.
+    /// Hears all, so that the program never waits. Whatever it says, little is held.
     fn hear(&self, mut said: impl BufRead) {
         let mut line = Vec::new();
         while said
+            .by_ref()
+            .take(MAX_LINE)
             .read_until(b'\n', &mut line)
             .is_ok_and(|count| count > 0)
         {
@@ -305,5 +309,37 @@ impl Said {
             }
             line.clear();
         }
+    }
+}
+
+/// The pictures, and the damage, that a program tells which writes and says these bytes; so that fuzzing needs no program.
+///
+/// # Errors
+/// What is written cannot be read.
+#[cfg(fuzzing)]
+pub fn read_output(
+    written: &[u8],
+    said: &[u8],
+    max_bytes: usize,
+) -> io::Result<(Vec<Vec<u8>>, Option<String>)> {
+    let heard = Said::default();
+    heard.hear(said);
+    let mut stream = written;
+    let pictures = std::iter::from_fn(|| parts::next_part(&mut stream, max_bytes).transpose());
+    Ok((pictures.collect::<io::Result<_>>()?, heard.damage()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The whole line was held: as many bytes as the program has time for.
+    #[test]
+    fn of_a_line_without_an_end_little_is_held() {
+        let said = Said::default();
+        let endless = BufReader::new(io::repeat(b'x').take(64 << 20));
+        let used = allocation_counter::measure(|| said.hear(endless));
+        assert!(used.bytes_max < 64 << 10, "{used:?}");
+        assert_eq!(said.damage(), Some("x".repeat(MAX_SAID)));
     }
 }

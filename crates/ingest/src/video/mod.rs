@@ -19,6 +19,8 @@ mod parts;
 mod sniff;
 
 pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
+#[cfg(fuzzing)]
+pub use decoder::read_output;
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
 pub use error::VideoError;
 pub use sniff::{VideoFormat, video_format};

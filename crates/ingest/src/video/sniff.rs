@@ -1,6 +1,6 @@
 //! Whether bytes are a video.
 
-use super::super::sniff::unread_type;
+use super::super::sniff::type_name;
 
 /// How a video is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum VideoFormat {
 
 /// The format of bytes that came with this media type; none where they are no video.
 pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
-    let is_container = bytes.get(4..8) == Some(b"ftyp") && unread_type(bytes).is_none()
+    let is_container = bytes.get(4..8) == Some(b"ftyp") && type_name(bytes).is_none()
         || bytes.starts_with(b"\x1A\x45\xDF\xA3")
         || bytes.starts_with(b"GIF8");
     let is_motion = matches!(media_type, "video/x-motion-jpeg" | "video/x-mjpeg");
@@ -21,5 +21,22 @@ pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
         (true, _) => Some(VideoFormat::Container),
         (_, true) => Some(VideoFormat::MotionJpeg),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// It was taken for an MP4 file.
+    #[test]
+    fn a_jpeg_whose_first_segment_spells_ftyp_is_a_picture() {
+        let jpeg = b"\xFF\xD8\xFF\xE0ftyp";
+        assert_eq!(video_format(jpeg, ""), None);
+        let motion = video_format(jpeg, "video/x-motion-jpeg");
+        assert_eq!(motion, Some(VideoFormat::MotionJpeg));
+        let video = video_format(b"\0\0\0\x18ftypisom", "");
+        assert_eq!(video, Some(VideoFormat::Container));
+        assert_eq!(video_format(b"\0\0\0\x18ftypavif", ""), None);
     }
 }

@@ -239,6 +239,39 @@ fn a_picture_without_height_or_width_is_a_typed_error() {
     }
 }
 
+/// It counted as a picture of 0 by 0 pixels, and the tracker's arithmetic panicked on that.
+#[test]
+fn a_png_without_its_header_is_a_typed_error() {
+    let image: DynamicImage = color(32, 32).into();
+    let mut png = encode(&image, ImageFormat::Png);
+    assert_eq!(png[12..16], *b"IHDR");
+    png[15] = b'H';
+    let result = inspect(&png, &SMALL).map(|file| file.size());
+    assert!(
+        matches!(result, Err(IngestError::Damaged { format: "PNG", .. })),
+        "{result:?}"
+    );
+}
+
+/// Its decoder tells a side of 0 pixels, and the tracker's arithmetic panicked on that.
+#[test]
+fn a_webp_of_the_longest_sides_is_a_typed_error() {
+    let image: DynamicImage = color(32, 32).into();
+    let webp = encode(&image, ImageFormat::WebP);
+    assert_eq!((&webp[12..16], webp[20]), (&b"VP8L"[..], 0x2F));
+    // Width and height less one, in 14 bits each behind the signature.
+    for sides in [0x3FFF, 0x3FFF << 14] {
+        let mut long = webp.clone();
+        let bits = long[21..25].first_chunk().copied().map(u32::from_le_bytes);
+        long[21..25].copy_from_slice(&(bits.unwrap() | sides).to_le_bytes());
+        let result = inspect(&long, &SMALL).map(|file| file.size());
+        assert!(
+            matches!(result, Err(IngestError::Damaged { format: "WebP", .. })),
+            "{result:?}"
+        );
+    }
+}
+
 /// A valid file with some bytes changed, a piece dropped and a piece repeated.
 fn mutated() -> impl Strategy<Value = Vec<u8>> {
     let edits = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..8);
