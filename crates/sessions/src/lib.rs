@@ -92,6 +92,8 @@ pub use store::{
 pub use store::{Counted, StoreShare};
 #[cfg(feature = "redis")]
 pub use store::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
+#[cfg(fuzzing)]
+pub use store::{record_of_row, row_and_state};
 pub use streams::{OpenStreams, StreamPlace};
 pub use targets::{
     Boxes, Correction, Estimates, MAX_LIST_BYTES, StartError, frame_format, largest_format,

@@ -4,7 +4,9 @@ use super::error::ActError;
 use super::service::SessionService;
 use crate::planted::PlantedFault;
 use crate::store::{Intent, Local, Record, Step, StoreUnavailable, reconcile};
-use crate::{Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState};
+use crate::{
+    Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState, SnapshotError,
+};
 use std::sync::Arc;
 use uuid::Uuid;
 
@@ -104,7 +106,11 @@ impl SessionService {
         self.run(queue, move |_| {
             let state = SessionState::from_stored(&record.state, max_recent, expert.as_ref());
             let state = state.map_err(ActError::StoredState)?;
-            Ok((state, record))
+            // From another frame on, the record's numbers would not be the session's.
+            match state.latest_frame() == record.version.checkpoint {
+                true => Ok((state, record)),
+                false => Err(ActError::StoredState(SnapshotError::Damaged)),
+            }
         })
         .await
     }

@@ -34,6 +34,8 @@ mod session_store;
 pub use self::redis::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
+#[cfg(fuzzing)]
+pub use file::{record_of_row, row_and_state};
 pub use reconcile::{Gone, Intent, Local, Step, reconcile};
 pub use record::{Record, SessionName, UnreadableRecord, Version};
 pub use session_store::{

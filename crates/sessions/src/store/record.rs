@@ -2,6 +2,7 @@
 
 use crate::opening::Opening;
 use crate::owner::Owner;
+use crate::per_target::{MAX_TARGETS, PerTarget};
 use crate::planted::PlantedFault;
 use crate::random::random;
 use serde::{Deserialize, Serialize};
@@ -10,6 +11,12 @@ use uuid::Uuid;
 
 /// The format of [`Record::head`]. Another one is not read; see [`UnreadableRecord`].
 const HEAD_FORMAT: u8 = 2;
+/// The greatest generation that is read: stores count it up as a signed number.
+const MAX_GENERATION: u64 = i64::MAX as u64 - 1;
+/// The last second of the year 9999, in seconds since 1970. Later moments cannot be told.
+const LAST_MOMENT: u64 = 253_402_300_799;
+/// No session lives longer without a frame: a hundred years, so that its end can be told.
+const MAX_TTL: Duration = Duration::from_secs(100 * 366 * 24 * 3600);
 
 /// Names a session. The id alone may be another session's later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -41,6 +48,11 @@ impl Version {
             frame,
             checkpoint: frame,
         }
+    }
+
+    /// Whether a generation of a record can be counted up. That of a damaged one may be any.
+    pub(super) fn is_generation(number: u64) -> bool {
+        number <= MAX_GENERATION
     }
 
     /// After the next generation has begun.
@@ -135,6 +147,9 @@ impl Record {
             }
             None => return Err(UnreadableRecord::Damaged),
         };
+        if !Version::is_generation(generation) || !can_be_told(&opening) {
+            return Err(UnreadableRecord::Damaged);
+        }
         Ok(Self {
             version: Version {
                 generation,
@@ -144,9 +159,18 @@ impl Record {
             owner: owner.map_or_else(Owner::default, |name| Owner::named(&name)),
             opening,
             state,
-            ttl,
+            ttl: ttl.min(MAX_TTL),
         })
     }
+}
+
+/// Whether a request that opens the session again can be answered: there are targets, and a moment at which it expires.
+fn can_be_told(opening: &Opening) -> bool {
+    let has_targets = match &opening.estimates {
+        PerTarget::One(_) => true,
+        PerTarget::List(list) => (1..=MAX_TARGETS).contains(&list.len()),
+    };
+    has_targets && opening.expires <= LAST_MOMENT
 }
 
 #[cfg(test)]
@@ -198,5 +222,31 @@ pub(crate) mod tests {
         let cut = &head[..head.len() - 3];
         assert_eq!(read(cut), Err(UnreadableRecord::Damaged));
         assert_eq!(read(&[]), Err(UnreadableRecord::Damaged));
+    }
+
+    /// Such a head was taken, and the request that opens the session again made the service panic.
+    #[test]
+    fn a_record_whose_opening_cannot_be_told_is_damaged() {
+        let read = |generation, change: fn(&mut Record)| {
+            let mut record = record(11, 0);
+            change(&mut record);
+            let (head, ttl) = (record.head(), record.ttl);
+            Record::at_checkpoint(generation, 0, &head, record.state, ttl).map(|read| read.ttl)
+        };
+        let damaged = Err(UnreadableRecord::Damaged);
+        assert_eq!(read(7, |_| ()), Ok(Duration::from_secs(60)));
+        let no_target = |record: &mut Record| record.opening.estimates = PerTarget::List(vec![]);
+        assert_eq!(read(7, no_target), damaged);
+        let too_many = |record: &mut Record| {
+            let first = *record.opening.estimates.first();
+            record.opening.estimates = PerTarget::List(vec![first; MAX_TARGETS + 1]);
+        };
+        assert_eq!(read(7, too_many), damaged);
+        let never = |record: &mut Record| record.opening.expires = u64::MAX;
+        assert_eq!(read(7, never), damaged);
+        // Nor can a generation be counted up that is the last one.
+        assert_eq!(read(u64::MAX, |_| ()), damaged);
+        let long = |record: &mut Record| record.ttl = Duration::from_millis(u64::MAX);
+        assert_eq!(read(7, long), Ok(MAX_TTL));
     }
 }

@@ -12,7 +12,7 @@ use crate::world::{NoQuota, keys, service};
 use bagtrack_sessions::{
     Boxes, Clock, CreationKey, Durability, Estimates, FileStore, Flow, FrameBatch, OpenRequest,
     Owner, PerTarget, RedisAddress, RedisStore, SNAPSHOT_MAGIC, SessionService, SessionStore,
-    Start,
+    Start, Version,
 };
 use bagtrack_tracker::{Params, Preset, Rect};
 use bytes::Bytes;
@@ -385,6 +385,23 @@ async fn what_a_later_version_has_in_a_folder_is_refused_and_left_as_it_is() {
         let later = service(Some(file_store(folder.path())), 1);
         release.goes_on(&later, kind).await;
     }
+}
+
+/// It was taken, and frames were then counted from the record's number.
+#[tokio::test]
+async fn a_record_whose_state_is_of_another_frame_is_refused() {
+    let release = &Release::all()[0];
+    let folder = copy(&release.0.join("sessions"));
+    let store = file_store(folder.path());
+    let mut record = store.load(Kind::One.id()).await.unwrap().unwrap();
+    record.version = Version::first(AT + 1);
+    let other = Uuid::from_u128(9);
+    store.create(other, &record).await.unwrap();
+    let here = service(Some(store), 1);
+    let refused = post(&here, other, release.frame(AT + 2)).await;
+    let refused = refused.unwrap_err();
+    assert!(refused.contains("it is damaged"), "{refused}");
+    release.goes_on(&here, Kind::One).await;
 }
 
 /// The record of a session, as a Redis has it.

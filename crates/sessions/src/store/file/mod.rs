@@ -28,3 +28,5 @@ mod writer;
 pub use calls::FileStore;
 pub use database::OpenError as FileStoreError;
 pub use durability::{Durability, DurabilityError};
+#[cfg(fuzzing)]
+pub use row::{record_of_row, row_and_state};

@@ -60,7 +60,12 @@ impl Row {
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, UnreadableRecord> {
         match bytes.split_first() {
             Some((&FORMAT, content)) => {
-                postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)
+                let row: Self =
+                    postcard::from_bytes(content).map_err(|_| UnreadableRecord::Damaged)?;
+                match Version::is_generation(row.generation) {
+                    true => Ok(row),
+                    false => Err(UnreadableRecord::Damaged),
+                }
             }
             Some((&found, _)) => Err(UnreadableRecord::Format {
                 found,
@@ -70,12 +75,82 @@ impl Row {
         }
     }
 
-    /// The record at its checkpoint.
+    /// Whether there are frames after the checkpoint.
+    pub(super) fn is_behind(&self) -> bool {
+        self.frame != self.checkpoint
+    }
+
+    /// The next generation begins at the checkpoint: a replica goes on from there.
+    pub(super) fn take_over(&mut self) {
+        self.generation += 1;
+        self.frame = self.checkpoint;
+    }
+
+    /// The record at its checkpoint. `state` is that which the database has: the number of its frame, and its bytes.
     ///
     /// # Errors
-    /// Its head cannot be read.
-    pub(super) fn record(&self, state: Vec<u8>, now: u64) -> Result<Record, UnreadableRecord> {
+    /// The head cannot be read, or the state is of another frame: one that damaged files have kept from before or after.
+    pub(super) fn record(
+        &self,
+        state: Option<&[u8]>,
+        now: u64,
+    ) -> Result<Record, UnreadableRecord> {
+        let state = state.and_then(<[u8]>::split_first_chunk);
+        let (frame, state) = state.ok_or(UnreadableRecord::Damaged)?;
+        if u64::from_be_bytes(*frame) != self.checkpoint {
+            return Err(UnreadableRecord::Damaged);
+        }
         let ttl = Duration::from_millis(self.expires.saturating_sub(now));
-        Record::at_checkpoint(self.generation, self.checkpoint, &self.head, state, ttl)
+        let (generation, checkpoint) = (self.generation, self.checkpoint);
+        Record::at_checkpoint(generation, checkpoint, &self.head, state.to_vec(), ttl)
+    }
+}
+
+/// A row, and a state as the database has it, of this record: what fuzzing begins with.
+#[cfg(fuzzing)]
+pub fn row_and_state(record: &Record) -> (Vec<u8>, Vec<u8>) {
+    let row = Row::of(record, u64::MAX / 2).to_bytes();
+    (row, with_frame(record.version.frame, &record.state))
+}
+
+/// The record of a row and a state that a folder may have, as a replica gets it that takes it over; so that fuzzing needs
+/// no folder.
+///
+/// # Errors
+/// See [`UnreadableRecord`].
+#[cfg(fuzzing)]
+pub fn record_of_row(row: &[u8], state: &[u8]) -> Result<Record, UnreadableRecord> {
+    let mut row = Row::from_bytes(row)?;
+    row.take_over();
+    row.record(Some(state), 0)
+}
+
+/// A state as the database has it.
+pub(super) fn with_frame(frame: u64, state: &[u8]) -> Vec<u8> {
+    [&frame.to_be_bytes(), state].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::record::tests::record;
+
+    /// Such a row was taken, and the thread of the store panicked when a replica took it over.
+    #[test]
+    fn a_row_whose_generation_cannot_be_counted_up_is_damaged() {
+        let record = record(11, 3);
+        let mut row = Row::of(&record, 9);
+        assert_eq!(Row::from_bytes(&row.to_bytes()), Ok(row.clone()));
+        let state = with_frame(3, &record.state);
+        assert_eq!(row.record(Some(&state), 0).unwrap().state, record.state);
+        let of_other_frame = with_frame(2, &record.state);
+        for state in [Some(&of_other_frame[..]), Some(&[1, 2]), None] {
+            assert_eq!(row.record(state, 0), Err(UnreadableRecord::Damaged));
+        }
+        row.generation = u64::MAX;
+        assert_eq!(
+            Row::from_bytes(&row.to_bytes()),
+            Err(UnreadableRecord::Damaged)
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
 use super::database::{Transaction, moment};
-use super::row::Row;
+use super::row::{Row, with_frame};
 use crate::owner::Owner;
 use fjall::Readable;
 use std::time::Duration;
@@ -122,7 +122,7 @@ impl Transaction<'_> {
 
     /// The state of a session, after the number of its frame.
     fn put_state(&mut self, id: Uuid, frame: u64, state: &[u8]) {
-        let bytes = [&frame.to_be_bytes(), state].concat();
+        let bytes = with_frame(frame, state);
         self.written_bytes += bytes.len() as u64;
         self.inner
             .insert(&self.tables.states, *id.as_bytes(), bytes);
@@ -155,29 +155,20 @@ impl Transaction<'_> {
 
     fn read_record(&self, id: Uuid, row: &Row) -> Result<Record, Fault> {
         let state = self.inner.get(&self.tables.states, id.as_bytes())?;
-        let (frame, state) = state
-            .as_ref()
-            .and_then(|bytes| bytes.split_first_chunk())
-            .ok_or(UnreadableRecord::Damaged)?;
-        // A state of another frame is one that the damaged files have kept from before or after.
-        if u64::from_be_bytes(*frame) != row.checkpoint {
-            return Err(UnreadableRecord::Damaged.into());
-        }
-        Ok(row.record(state.to_vec(), self.now)?)
+        Ok(row.record(state.as_deref(), self.now)?)
     }
 
     /// Tells the record. `takes_over` says whether the replica that asks goes on from the checkpoint.
     fn tell(&mut self, id: Uuid, row: Row, takes_over: bool) -> Result<Outcome, Fault> {
         let mut row = row;
-        let is_behind = row.frame != row.checkpoint;
-        if takes_over && is_behind {
-            row.generation += 1;
-            row.frame = row.checkpoint;
+        let goes_back = takes_over && row.is_behind();
+        if goes_back {
+            row.take_over();
         }
         let Some(record) = self.record(id, &row)? else {
             return Ok(Outcome::NotFound);
         };
-        if takes_over && is_behind {
+        if goes_back {
             self.put(id, &row);
             self.promises = true;
         }
