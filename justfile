@@ -52,9 +52,9 @@ attack *flags:
 instructions:
     tools/count_instructions.sh
 
-# One fuzz target, for a minute: `just fuzz decode`. Needs a nightly compiler and cargo-fuzz.
-fuzz target:
-    fuzz/run.sh 60 {{target}}
+# The fuzz targets, a minute each as CI does: `just fuzz 60 decode`, or an hour each: `just fuzz 3600`.
+fuzz seconds="60" *targets:
+    fuzz/run.sh {{seconds}} {{targets}}
 
 # The files of a release, in target/release-files.
 release:

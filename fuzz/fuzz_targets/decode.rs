@@ -11,7 +11,7 @@ static HOOK: Once = Once::new();
 
 fuzz_target!(|data: &[u8]| {
     // libFuzzer's hook aborts at every panic; those of a decoder are caught, and the file is refused.
-    HOOK.call_once(|| std::panic::set_hook(Box::new(|_| ())));
+    HOOK.call_once(|| std::panic::set_hook(Box::new(|panic| eprintln!("{panic}"))));
     let limits = Limits {
         max_side: 1024,
         max_pixels: 1 << 18,
@@ -20,6 +20,7 @@ fuzz_target!(|data: &[u8]| {
     };
     let stored = Cell::new((0, 0));
     let format = |source: (u32, u32)| {
+        assert!(source.0 > 0 && source.1 > 0, "it has no pixels");
         stored.set(source);
         FrameFormat {
             size: (source.0.div_ceil(2), source.1.div_ceil(2)),

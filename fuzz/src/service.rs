@@ -3,8 +3,10 @@
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, Method, Request, StatusCode};
 use axum::Router;
-use bagtrack::http::{Application, Config};
-use bagtrack_sessions::{MacKeys, MAC_BYTES, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC};
+use bagtrack::http::{Config, Parts};
+use bagtrack_sessions::{
+    Clock, Executor, MacKeys, SessionStore, MAC_BYTES, SNAPSHOT_KEY_CONTEXT, SNAPSHOT_MAGIC,
+};
 use flate2::read::DeflateDecoder;
 use flate2::write::DeflateEncoder;
 use flate2::Compression;
@@ -12,7 +14,10 @@ use http_body_util::BodyExt;
 use serde_json::Value;
 use std::cell::Cell;
 use std::convert::Infallible;
+use std::future::Future;
 use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use tower::ServiceExt;
@@ -24,6 +29,8 @@ const REQUESTS_BETWEEN_UPKEEP: u32 = 1000;
 pub struct Service {
     runtime: Runtime,
     router: Router,
+    /// Whether it may say that what the store has cannot be read.
+    has_store: bool,
     requests: Cell<u32>,
 }
 
@@ -48,39 +55,53 @@ impl Answer {
 }
 
 impl Service {
-    /// With small limits, so that inputs are small too.
+    /// Without a store. A panic that the service answers with an error counts as that answer.
     pub fn new() -> Self {
-        // libFuzzer's hook aborts at every panic, those that the service answers with an error too.
+        // libFuzzer's hook aborts at every panic, those of a decoder too, which the service catches.
         std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
-        let mut config = Config {
-            listen: ([127, 0, 0, 1], 0).into(),
-            workers: Some(1),
-            max_body_bytes: 1 << 20,
-            max_frame_side: 1024,
-            max_frame_pixels: 1 << 20,
-            max_frame_memory: 32 << 20,
-            max_frames: 4,
-            // A sanitizer makes work slow.
-            work_timeout: Duration::from_secs(600),
-            ..Config::default()
-        };
-        config.access.unsigned_snapshots = true;
-        config.limits.max_request_cpu = Duration::from_secs(600);
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build();
-        let runtime = runtime.expect("the system gives a runtime");
-        let application = runtime.block_on(Application::bind(config));
-        let router = application.expect("the settings are valid").into_router();
+        Self::on(new_runtime(), None)
+    }
+
+    /// With this store. Every panic is a finding.
+    pub fn with_store<S: SessionStore + Clone + 'static>(
+        store: impl Future<Output = S>,
+    ) -> (Self, S) {
+        let runtime = new_runtime();
+        let store = runtime.block_on(store);
+        (Self::on(runtime, Some(Arc::new(store.clone()))), store)
+    }
+
+    fn on(runtime: Runtime, store: Option<Arc<dyn SessionStore>>) -> Self {
+        let has_store = store.is_some();
+        let router = runtime.block_on(async {
+            let parts = Parts {
+                clock: Clock::default(),
+                store,
+                expert: None,
+                // On this thread, so that the same input does the same.
+                executor: Executor::on_one_thread(|work| {
+                    tokio::spawn(async move { work()() });
+                }),
+            };
+            let service = bagtrack::http::Service::new(config(), parts);
+            let service = service.expect("the settings are valid");
+            service.router(SocketAddr::from((Ipv4Addr::LOCALHOST, 1)))
+        });
         Self {
             runtime,
             router,
+            has_store,
             requests: Cell::new(0),
         }
     }
 
-    /// Sends a request whose body arrives in pieces of `piece` bytes. Every answer is success, or a problem document of
-    /// the client's doing.
+    /// Waits for something in the service's runtime.
+    pub fn wait<T>(&self, what: impl Future<Output = T>) -> T {
+        self.runtime.block_on(what)
+    }
+
+    /// Sends a request whose body arrives in pieces of `piece` bytes. Every answer is success, or a problem document: of
+    /// the client's doing, or about what a store has.
     pub fn send_in_pieces(
         &self,
         (method, path): (Method, &str),
@@ -110,13 +131,14 @@ impl Service {
             }
         });
         let text = || String::from_utf8_lossy(&answer.body).into_owned();
+        let is_failure = answer.status.is_server_error();
         assert!(
-            !answer.status.is_server_error(),
+            !is_failure || self.has_store,
             "{}: {}",
             answer.status,
             text()
         );
-        if answer.status.is_client_error() {
+        if answer.status.is_client_error() || is_failure {
             assert_eq!(
                 answer.headers["content-type"],
                 "application/problem+json",
@@ -177,35 +199,65 @@ impl Default for Service {
     }
 }
 
-/// Bytes of the length of a snapshot's content, which come before it.
-const LENGTH_BYTES: usize = 4;
-
-/// What a snapshot holds, uncompressed.
-pub fn content_of(snapshot: &[u8]) -> io::Result<Vec<u8>> {
-    let head = SNAPSHOT_MAGIC.len() + 1 + LENGTH_BYTES;
-    let compressed = &snapshot[head..snapshot.len() - MAC_BYTES];
-    let mut content = Vec::new();
-    DeflateDecoder::new(compressed).read_to_end(&mut content)?;
-    Ok(content)
+/// With small limits, so that inputs are small too.
+fn config() -> Config {
+    let mut config = Config {
+        workers: Some(1),
+        max_sessions: 64,
+        max_body_bytes: 1 << 20,
+        max_frame_side: 1024,
+        max_frame_pixels: 1 << 20,
+        max_frame_memory: 32 << 20,
+        max_frames: 4,
+        // A sanitizer makes work slow.
+        work_timeout: Duration::from_secs(600),
+        ..Config::default()
+    };
+    config.access.unsigned_snapshots = true;
+    config.limits.max_request_cpu = Duration::from_secs(600);
+    config
 }
 
-/// A snapshot with these bytes as its content, which is not compressed, with the code of unsigned ones.
+fn new_runtime() -> Runtime {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    runtime.expect("the system gives a runtime")
+}
+
+/// Bytes of the length of a state's content, which come before it.
+const LENGTH_BYTES: usize = 4;
+
+/// The version of a snapshot, and what it holds, uncompressed.
+pub fn content_of(snapshot: &[u8]) -> io::Result<(u8, Vec<u8>)> {
+    content_of_stored(&snapshot[..snapshot.len() - MAC_BYTES])
+}
+
+/// The version of a stored state, and what it holds, uncompressed.
+pub fn content_of_stored(state: &[u8]) -> io::Result<(u8, Vec<u8>)> {
+    let version = SNAPSHOT_MAGIC.len();
+    let compressed = &state[version + 1 + LENGTH_BYTES..];
+    let mut content = Vec::new();
+    DeflateDecoder::new(compressed).read_to_end(&mut content)?;
+    Ok((state[version], content))
+}
+
+/// A stored state with these bytes as its content, which is not compressed.
+pub fn stored_of(version: u8, content: &[u8]) -> Vec<u8> {
+    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::none());
+    let written = encoder.write_all(content);
+    written.expect("a vector takes all bytes");
+    let compressed = encoder.finish().expect("a vector takes all bytes");
+    let length = content.len() as u32;
+    let length = length.to_le_bytes();
+    [SNAPSHOT_MAGIC, &[version], &length, &compressed].concat()
+}
+
+/// A snapshot with these bytes as its content, with the code of unsigned ones.
 pub fn snapshot_of(version: u8, content: &[u8]) -> Vec<u8> {
     let none: &[&str] = &[];
     let keys = MacKeys::new(SNAPSHOT_KEY_CONTEXT, none).accepting_unsigned(false);
-    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::none());
-    encoder
-        .write_all(content)
-        .expect("a vector takes all bytes");
-    let compressed = encoder.finish().expect("a vector takes all bytes");
-    let length = content.len() as u32;
-    let mut bytes = [
-        SNAPSHOT_MAGIC,
-        &[version],
-        &length.to_le_bytes(),
-        &compressed,
-    ]
-    .concat();
+    let mut bytes = stored_of(version, content);
     let code = keys.sign(&bytes);
     bytes.extend_from_slice(&code);
     bytes

@@ -144,13 +144,6 @@ impl Application {
         self
     }
 
-    /// The routes alone, as a client on this machine meets them. Fuzzing sends more requests a second than connections
-    /// can be opened.
-    #[cfg(fuzzing)]
-    pub fn into_router(self) -> Router {
-        self.service.router(SocketAddr::from(([127, 0, 0, 1], 1)))
-    }
-
     /// Serves until `shutdown` is ready. Then `/readyz` answers 503 at once, no session can be opened, and all answers
     /// are marked `Draining: true`. After the configured delay no connection is accepted any more, and open requests get
     /// the configured time to end; then they are cut off. Returns whether all of them ended in time.
