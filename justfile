@@ -30,7 +30,7 @@ lint:
 
 # The replicas, with real servers: needs redis-server, haproxy, nginx and openssl.
 replicas *filter:
-    cargo test --test replicas -- --ignored {{filter}}
+    BAGTRACK_PREVIOUS=$(tools/previous_release.sh) cargo test --test replicas -- --ignored {{filter}}
 
 # Accuracy on annotated sequences: `just eval ../sequences/* --seeds 10`.
 eval *arguments:

@@ -17,5 +17,6 @@ mod stream_client;
 mod streams;
 mod tracking_client;
 mod trouble;
+mod upgrade;
 
 use bagtrack_testing::service::{lossy, replica, server};

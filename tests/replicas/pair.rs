@@ -4,8 +4,10 @@ use crate::clip::Clip;
 use crate::replica::Replica;
 use crate::server::Redis;
 use crate::tracking_client::{Answer, Track};
+use bagtrack_testing::command::program;
 use reqwest::{Client, Response, StatusCode};
 use serde_json::Value;
+use std::path::Path;
 use uuid::Uuid;
 
 /// The body of an answer that has this status.
@@ -27,10 +29,17 @@ pub struct Pair {
 impl Pair {
     /// Two replicas, and a session that was opened at the first.
     pub async fn open(flags: &[&str], frames: usize) -> Self {
+        let program = program("bagtrack");
+        Self::of([&program, &program], flags, frames).await
+    }
+
+    /// Two replicas, each of its build of the program.
+    pub async fn of(programs: [&Path; 2], flags: &[&str], frames: usize) -> Self {
         let redis = Redis::start();
-        let replica = || Replica::with_store(&redis.url(), flags);
+        let url = redis.url();
+        let flags = [&["--store", &url], flags].concat();
         let pair = Self {
-            replicas: [replica(), replica()],
+            replicas: programs.map(|program| Replica::start_program(program, &[], &flags)),
             redis,
             client: Client::new(),
             clip: Clip::of(0, frames),

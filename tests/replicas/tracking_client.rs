@@ -75,9 +75,14 @@ impl Track {
         self.session.resent()
     }
 
+    /// Whether the service lost the session, so that another one took its place.
+    pub fn was_lost(&self) -> bool {
+        self.session.id() != self.id
+    }
+
     /// Whether the service went back behind a frame that it had answered, or lost the session.
     pub fn went_back(&self) -> bool {
-        self.session.resent() > 0 || self.session.id() != self.id
+        self.session.resent() > 0 || self.was_lost()
     }
 
     /// The whole session as bytes: two are the same exactly if all boxes that follow are.

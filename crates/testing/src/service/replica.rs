@@ -5,10 +5,12 @@ use crate::command::program;
 use reqwest::StatusCode;
 use rustix::process::Signal;
 use std::net::SocketAddr;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus};
 
 pub struct Replica {
     process: Process,
+    program: PathBuf,
     flags: Vec<String>,
     environment: Vec<(String, String)>,
     pub address: SocketAddr,
@@ -21,6 +23,11 @@ impl Replica {
 
     /// With these variables.
     pub fn start_in(environment: &[(&str, &str)], flags: &[&str]) -> Self {
+        Self::start_program(&program("bagtrack"), environment, flags)
+    }
+
+    /// Another build of the program.
+    pub fn start_program(program: &Path, environment: &[(&str, &str)], flags: &[&str]) -> Self {
         let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
         let flags: Vec<String> = flags.iter().map(|flag| (*flag).to_owned()).collect();
         let environment = environment.iter();
@@ -28,7 +35,8 @@ impl Replica {
             .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
             .collect();
         Self {
-            process: Self::process(&environment, &flags, address),
+            process: Self::process(program, &environment, &flags, address),
+            program: program.to_owned(),
             flags,
             environment,
             address,
@@ -40,8 +48,13 @@ impl Replica {
         Self::start(&[&["--store", url], flags].concat())
     }
 
-    fn process(environment: &[(String, String)], flags: &[String], address: SocketAddr) -> Process {
-        let mut command = Command::new(program("bagtrack"));
+    fn process(
+        program: &Path,
+        environment: &[(String, String)],
+        flags: &[String],
+        address: SocketAddr,
+    ) -> Process {
+        let mut command = Command::new(program);
         command.envs(environment.iter().cloned());
         command.args(["serve", "--listen", &address.to_string()]);
         command.args([
@@ -76,13 +89,19 @@ impl Replica {
     }
 
     /// Asks it to end, and waits until it has.
-    pub fn end(&mut self) {
+    pub fn end(&mut self) -> ExitStatus {
         self.ask_to_end();
-        self.process.0.wait().expect("it was started");
+        self.process.0.wait().expect("it was started")
     }
 
     pub fn start_again(&mut self) {
-        self.process = Self::process(&self.environment, &self.flags, self.address);
+        let (environment, flags) = (&self.environment, &self.flags);
+        self.process = Self::process(&self.program, environment, flags, self.address);
+    }
+
+    /// Another build of the program, from the next start on.
+    pub fn change_program(&mut self, program: &Path) {
+        self.program = program.to_owned();
     }
 
     /// The status of `/readyz`.

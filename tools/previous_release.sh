@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Builds the program of the release before this commit, and prints its path: `tools/previous_release.sh [COMMIT]`.
+#
+# The release is the last tag v* before this commit. Where a clone has no tags, it is the commit that is named here.
+# COMMIT is any other one. Exits with 3 where the clone does not have the commit, as a shallow one.
+#
+# The sources are put into target/previous/source, the program into target/previous/debug. What cargo builds on the way
+# is with that of this checkout (the build directory), so most crates from the registry are built once.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# The last release, for clones without tags.
+v0_1_0=d086794020ed7640293d5eb45da77095d2e1a9b4
+
+commit=${1:-$(git describe --tags --abbrev=0 --match 'v[0-9]*' HEAD^ 2>/dev/null || echo "$v0_1_0")}
+if ! commit=$(git rev-parse --quiet --verify "$commit^{commit}"); then
+    echo "This clone does not have the commit of the release before." >&2
+    exit 3
+fi
+
+previous=$PWD/target/previous
+build=${CARGO_TARGET_DIR:-$PWD/target}
+rm -rf "$previous/source"
+mkdir -p "$previous/source"
+# Files have the time of their commit, so cargo builds again only what another commit changes.
+git archive "$commit" | tar --extract --directory "$previous/source"
+cd "$previous/source"
+CARGO_BUILD_BUILD_DIR=$build CARGO_TARGET_DIR=$previous \
+    cargo build --locked --bin bagtrack >&2
+echo "$previous/debug/bagtrack"
