@@ -4,7 +4,7 @@
 # The release is the last tag v* before this commit. Where a clone has no tags, it is the commit that is named here.
 # COMMIT is any other one. Exits with 3 where the clone does not have the commit, as a shallow one.
 #
-# The sources are put into target/previous/source, the program into target/previous/debug. What cargo builds on the way
+# The sources and the program are put into a folder of the commit, target/previous/COMMIT. What cargo builds on the way
 # is with that of this checkout (the build directory), so most crates from the registry are built once.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -18,13 +18,15 @@ if ! commit=$(git rev-parse --quiet --verify "$commit^{commit}"); then
     exit 3
 fi
 
-previous=$PWD/target/previous
 build=${CARGO_TARGET_DIR:-$PWD/target}
-rm -rf "$previous/source"
-mkdir -p "$previous/source"
-# Files have the time of their commit, so cargo builds again only what another commit changes.
-git archive "$commit" | tar --extract --directory "$previous/source"
-cd "$previous/source"
-CARGO_BUILD_BUILD_DIR=$build CARGO_TARGET_DIR=$previous \
-    cargo build --locked --bin bagtrack >&2
-echo "$previous/debug/bagtrack"
+# Cargo takes older files for built ones, so two commits have no folder in common.
+folder=$PWD/target/previous/$commit
+if [ ! -d "$folder/source" ]; then
+    rm -rf "$folder"
+    mkdir -p "$folder/part"
+    git archive "$commit" | tar --extract --directory "$folder/part"
+    mv "$folder/part" "$folder/source"
+fi
+cd "$folder/source"
+CARGO_BUILD_BUILD_DIR=$build CARGO_TARGET_DIR=$folder cargo build --locked --bin bagtrack >&2
+echo "$folder/debug/bagtrack"
