@@ -1,6 +1,6 @@
 //! Who may use a service with these settings.
 
-use bagtrack_access::{Access, AccessError, AllowedHosts, ApiKeys, KeysError};
+use bagtrack_access::{Access, AccessError, AllowedHosts, ApiKeys, KeysError, NotIdentified};
 use bagtrack_config::{AccessConfig, Config, Secret};
 use bagtrack_sessions::Owner;
 use std::fs;
@@ -50,6 +50,20 @@ fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
         matches!(contradiction, AccessError::Contradiction),
         "{contradiction}"
     );
+}
+
+#[tokio::test]
+async fn a_key_speaks_for_its_owner_where_keys_are_needed() {
+    let here = address("127.0.0.1:8080");
+    let (me, you) = (Owner::named("me"), Owner::named("you"));
+    let open = load(&AccessConfig::default(), here).unwrap();
+    assert!(!open.is_needed() && !open.has_owner(&me));
+    let closed = load(&with_key(), here).unwrap();
+    assert!(closed.is_needed());
+    assert!(closed.has_owner(&me) && !closed.has_owner(&you));
+    let identify = async |key| closed.identify(key, SystemTime::UNIX_EPOCH).await;
+    assert_eq!(identify(KEY).await, Ok((me, None)));
+    assert_eq!(identify(OTHER).await, Err(NotIdentified::Key));
 }
 
 #[test]

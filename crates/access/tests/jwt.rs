@@ -2,8 +2,11 @@
 
 #![cfg(feature = "jwt")]
 
-use bagtrack_access::{JwtError, KeySource, SourceError, TokenError, TokenVerifier};
-use bagtrack_config::JwtConfig;
+use bagtrack_access::{
+    Access, AccessError, JwtError, KeySource, NotIdentified, SourceError, TokenError, TokenVerifier,
+};
+use bagtrack_config::{AccessConfig, JwtConfig, Secret};
+use bagtrack_sessions::Owner;
 use bagtrack_testing::issuer::{IssuerKey, key_set, unsigned};
 use serde_json::{Value, json};
 use std::io::{Read, Write};
@@ -103,6 +106,91 @@ async fn a_token_speaks_for_its_subject_whatever_key_of_the_issuer_signed_it() {
     let token = keys[1].sign(&claims(json!({ "client_id": "camera 7", "aud": AUDIENCE })));
     let name = name_in(&verifier, &token).await;
     assert_eq!(name.as_deref(), Ok("jwt:camera 7"));
+}
+
+#[tokio::test]
+async fn a_key_of_rsa_signs_with_its_six_algorithms() {
+    for name in ["RS256", "RS384", "RS512", "PS256", "PS384", "PS512"] {
+        let key = IssuerKey::rsa("r", name);
+        let (verifier, _) = verifier(&[&key]);
+        let token = key.sign(&claims(json!({})));
+        let taken = name_in(&verifier, &token).await;
+        assert_eq!(taken.as_deref(), Ok("jwt:auth0|5f7c8e"), "{name}");
+        // Signed by the same key, and for other claims.
+        let (_, signature) = token.rsplit_once('.').unwrap();
+        let header = json!({ "alg": name, "kid": "r" });
+        let forged = unsigned(&header, &claims(json!({ "sub": "another" })));
+        let refused = name_in(&verifier, &format!("{forged}.{signature}")).await;
+        assert_eq!(refused, Err(TokenError::Signature), "{name}");
+    }
+}
+
+#[tokio::test]
+async fn a_key_that_names_its_algorithm_is_for_no_other() {
+    let (of_256, of_512) = (IssuerKey::rsa("r", "RS256"), IssuerKey::rsa("r", "PS512"));
+    for (named, takes_256, takes_512) in [("RS256", true, false), ("PS512", false, true)] {
+        let mut public = of_256.public();
+        public["alg"] = json!(named);
+        let source = Arc::new(Source::default());
+        *source.keys.lock().unwrap() = Some(json!({ "keys": [public] }).to_string());
+        let verifier = TokenVerifier::with_source(&config(), source, at(NOW)).unwrap();
+        for (key, is_taken) in [(&of_256, takes_256), (&of_512, takes_512)] {
+            let taken = name_in(&verifier, &key.sign(&claims(json!({})))).await;
+            match is_taken {
+                true => assert!(taken.is_ok(), "{named}: {taken:?}"),
+                false => assert_eq!(taken, Err(TokenError::UnknownKey), "{named}"),
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_token_names_its_key_unless_one_alone_can_have_signed_it() {
+    let (one, other) = (IssuerKey::p256("one"), IssuerKey::p256("other"));
+    let of_another_kind = IssuerKey::ed25519("e");
+    let nameless = one.sign_as(&json!({ "alg": "ES256" }), &claims(json!({})));
+    let (alone, _) = verifier(&[&one, &of_another_kind]);
+    assert!(name_in(&alone, &nameless).await.is_ok());
+    let (two, _) = verifier(&[&one, &other, &of_another_kind]);
+    let refused = name_in(&two, &nameless).await;
+    assert_eq!(refused, Err(TokenError::UnknownKey));
+}
+
+/// The clocks of issuer and service may be a minute apart.
+#[tokio::test]
+async fn a_token_holds_a_minute_before_and_after_its_times() {
+    let key = IssuerKey::p256("p");
+    let token = key.sign(&claims(json!({ "nbf": NOW + 60 })));
+    let early = verifier(&[&key]).0.identify(&token, at(NOW - 1)).await;
+    assert_eq!(early, Err(TokenError::Early));
+    for (seconds, expected) in [
+        (0, None),
+        (359, None),
+        (360, Some(TokenError::Expired)),
+        (361, Some(TokenError::Expired)),
+    ] {
+        // A token that was checked before ends at the same moment.
+        for is_known in [false, true] {
+            let (verifier, _) = verifier(&[&key]);
+            if is_known {
+                verifier.identify(&token, at(NOW)).await.unwrap();
+            }
+            let taken = verifier.identify(&token, at(NOW + seconds)).await;
+            assert_eq!(taken.err(), expected, "{is_known} {seconds}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_subject_may_have_255_bytes() {
+    let key = IssuerKey::p256("p");
+    let (verifier, _) = verifier(&[&key]);
+    let longest = "x".repeat(255);
+    let token = key.sign(&claims(json!({ "sub": longest })));
+    assert_eq!(
+        name_in(&verifier, &token).await,
+        Ok(format!("jwt:{longest}"))
+    );
 }
 
 #[tokio::test]
@@ -232,8 +320,54 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     assert_eq!(reads(), 6);
     assert!(verifier.reload(at(NOW + 1302)).is_err());
     assert!(taken(&of_new, 1303).await.is_ok());
+    source.give(&[&new, &old]);
+    assert_eq!(verifier.reload(at(NOW + 1304)).unwrap(), 2);
     // They end with their time all the same.
     assert_eq!(taken(&of_new, 7260).await, Err(TokenError::Expired));
+}
+
+/// Keys of an issuer and API keys are for two kinds of clients, who may both come.
+#[tokio::test]
+async fn an_issuer_makes_tokens_needed_beside_api_keys() {
+    let key = IssuerKey::p256("p");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys.json");
+    std::fs::write(&file, key_set(&[&key])).unwrap();
+    let jwt = JwtConfig {
+        jwt_keys: Some(file.display().to_string()),
+        ..config()
+    };
+    let mut access = AccessConfig {
+        jwt,
+        ..AccessConfig::default()
+    };
+    let everywhere = "0.0.0.0:8080".parse().unwrap();
+    let load = |config: &AccessConfig| Access::load(config, everywhere, at(NOW));
+    let alone = load(&access).unwrap();
+    assert!(alone.is_needed() && !alone.keys.are_needed());
+    assert!(alone.has_owner(&Owner::named("jwt:camera")));
+    assert!(!alone.has_owner(&Owner::named("camera")));
+
+    access.api_keys = vec![Secret::from("camera:0123456789abcdef")];
+    let both = load(&access).unwrap();
+    assert!(both.has_owner(&Owner::named("jwt:camera")) && both.has_owner(&Owner::named("camera")));
+    let token = key.sign(&claims(json!({ "sub": "camera" })));
+    let of_token = both.identify(&token, at(NOW)).await;
+    assert_eq!(
+        of_token,
+        Ok((Owner::named("jwt:camera"), Some(at(NOW + 300))))
+    );
+    let of_key = both.identify("0123456789abcdef", at(NOW)).await;
+    assert_eq!(of_key, Ok((Owner::named("camera"), None)));
+    let of_another = both.identify("fedcba9876543210", at(NOW)).await;
+    assert_eq!(of_another, Err(NotIdentified::Token(TokenError::Form)));
+
+    access.no_auth = true;
+    let contradiction = load(&access).unwrap_err();
+    assert!(
+        matches!(contradiction, AccessError::Contradiction),
+        "{contradiction}"
+    );
 }
 
 /// Answers each path with its text.

@@ -3,11 +3,15 @@
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use ring::rand::SystemRandom;
+use ring::rsa::PublicKeyComponents;
 use ring::signature::{
-    ECDSA_P256_SHA256_FIXED_SIGNING, ECDSA_P384_SHA384_FIXED_SIGNING, EcdsaKeyPair,
-    EcdsaSigningAlgorithm, Ed25519KeyPair, KeyPair,
+    self, ECDSA_P256_SHA256_FIXED_SIGNING, ECDSA_P384_SHA384_FIXED_SIGNING, EcdsaKeyPair,
+    EcdsaSigningAlgorithm, Ed25519KeyPair, KeyPair, RsaEncoding, RsaKeyPair,
 };
 use serde_json::{Value, json};
+
+/// A private key of RSA with 2,048 bits, for tests alone: ring makes none.
+const RSA_KEY: &[u8] = include_bytes!("issuer_rsa.pk8");
 
 /// A private key of an issuer.
 #[derive(Debug)]
@@ -21,6 +25,8 @@ enum Pair {
     /// Its curve, and its algorithm.
     Ecdsa(&'static str, &'static str, EcdsaKeyPair),
     Ed25519(Ed25519KeyPair),
+    /// Its algorithm.
+    Rsa(&'static str, RsaKeyPair),
 }
 
 impl IssuerKey {
@@ -41,6 +47,15 @@ impl IssuerKey {
         Self {
             id,
             pair: Pair::Ed25519(pair),
+        }
+    }
+
+    /// One of RSA, which signs with the algorithm of this name, and may sign with others. All are the same key.
+    pub fn rsa(id: &'static str, algorithm: &'static str) -> Self {
+        let pair = RsaKeyPair::from_pkcs8(RSA_KEY).expect("a key of RSA");
+        Self {
+            id,
+            pair: Pair::Rsa(algorithm, pair),
         }
     }
 
@@ -74,25 +89,56 @@ impl IssuerKey {
                 let x = URL_SAFE_NO_PAD.encode(pair.public_key());
                 json!({ "kty": "OKP", "crv": "Ed25519", "kid": self.id, "x": x })
             }
+            Pair::Rsa(_, pair) => {
+                let PublicKeyComponents::<Vec<u8>> { n, e } = pair.public().into();
+                let (n, e) = (URL_SAFE_NO_PAD.encode(n), URL_SAFE_NO_PAD.encode(e));
+                json!({ "kty": "RSA", "kid": self.id, "n": n, "e": e })
+            }
         }
     }
 
     /// A token with these claims.
     pub fn sign(&self, claims: &Value) -> String {
         let name = match &self.pair {
-            Pair::Ecdsa(_, name, _) => name,
+            Pair::Ecdsa(_, name, _) | Pair::Rsa(name, _) => name,
             Pair::Ed25519(_) => "EdDSA",
         };
         let header = json!({ "alg": name, "typ": "JWT", "kid": self.id });
-        let signed = unsigned(&header, claims);
+        self.sign_as(&header, claims)
+    }
+
+    /// The same with another header.
+    pub fn sign_as(&self, header: &Value, claims: &Value) -> String {
+        let signed = unsigned(header, claims);
         let signature = match &self.pair {
             Pair::Ecdsa(_, _, pair) => {
                 let signature = pair.sign(&SystemRandom::new(), signed.as_bytes());
                 signature.expect("randomness").as_ref().to_vec()
             }
             Pair::Ed25519(pair) => pair.sign(signed.as_bytes()).as_ref().to_vec(),
+            Pair::Rsa(name, pair) => {
+                let mut signature = vec![0; pair.public().modulus_len()];
+                let message = signed.as_bytes();
+                let random = SystemRandom::new();
+                let done = pair.sign(rsa_encoding(name), &random, message, &mut signature);
+                done.expect("randomness");
+                signature
+            }
         };
         format!("{signed}.{}", URL_SAFE_NO_PAD.encode(signature))
+    }
+}
+
+/// How RSA signs under the name of an algorithm (RFC 7518, sections 3.3 and 3.5).
+fn rsa_encoding(name: &str) -> &'static dyn RsaEncoding {
+    match name {
+        "RS256" => &signature::RSA_PKCS1_SHA256,
+        "RS384" => &signature::RSA_PKCS1_SHA384,
+        "RS512" => &signature::RSA_PKCS1_SHA512,
+        "PS256" => &signature::RSA_PSS_SHA256,
+        "PS384" => &signature::RSA_PSS_SHA384,
+        "PS512" => &signature::RSA_PSS_SHA512,
+        other => panic!("{other} is none of RSA"),
     }
 }
 

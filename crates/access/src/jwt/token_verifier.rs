@@ -344,3 +344,39 @@ fn refusal(error: &ErrorKind) -> TokenError {
         _ => TokenError::Form,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn so_many_tokens_are_remembered_and_those_that_ended_go_first() {
+        let now = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000);
+        let mut known = Known {
+            keys: Arc::default(),
+            asked: now,
+            came: now,
+            checked: HashMap::new(),
+        };
+        let mut remember = |number: usize, expires: SystemTime, now: SystemTime| {
+            let identity = Identity {
+                owner: Owner::named("jwt:somebody"),
+                expires,
+            };
+            known.remember(blake3::hash(&number.to_be_bytes()), identity, now);
+            known.checked.len()
+        };
+        let (soon, later) = (now + LEEWAY, now + MAX_AGE);
+        for number in 0..MAX_CHECKED {
+            // One of them lives.
+            let expires = if number == 0 { later } else { soon };
+            assert_eq!(remember(number, expires, now), number + 1);
+        }
+        assert_eq!(remember(MAX_CHECKED, later, soon), 2);
+        for number in 2..MAX_CHECKED {
+            assert_eq!(remember(MAX_CHECKED + number, later, soon), number + 1);
+        }
+        // All of them live.
+        assert_eq!(remember(3 * MAX_CHECKED, later, soon), 1);
+    }
+}
