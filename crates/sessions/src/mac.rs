@@ -98,6 +98,8 @@ mod tests {
         let code = open.sign(b"message");
         let signs = MacKeys::new("a use", &["secret"]).accepting_unsigned(true);
         assert!(signs.verify(b"message", &code));
+        assert!(signs.accept_unsigned() && open.accept_unsigned());
+        assert!(!MacKeys::new("a use", &["secret"]).accept_unsigned());
         assert!(!open.verify(b"message", &signs.sign(b"message")));
         assert!(!MacKeys::new("a use", &["secret"]).verify(b"message", &code));
     }

@@ -211,7 +211,10 @@ impl Registry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Admission, Fingerprint, Flow, NewSession, PerTarget, SessionState, WorkerSlot};
+    use crate::{
+        Admission, Fingerprint, Flow, InsertError, NewSession, PerTarget, SessionState, Version,
+        WorkerSlot,
+    };
     use bagtrack_tracker::{Frame, Preset, Rect};
     use std::sync::mpsc;
     use std::time::Duration;
@@ -223,6 +226,10 @@ mod tests {
     };
 
     fn insert(registry: &Registry) -> Arc<Session> {
+        registry.insert(new_session(registry)).unwrap()
+    }
+
+    fn new_session(registry: &Registry) -> NewSession {
         let luma = (0..64 * 48).map(|i| (i * 7 % 251) as u8).collect();
         let frame = Frame::from_luma(64, 48, luma).unwrap();
         let target = Rect {
@@ -241,7 +248,7 @@ mod tests {
             || Ok(()),
         )
         .unwrap();
-        let new = NewSession {
+        NewSession {
             id: crate::random::new_id(),
             opening: registry.opening([0; 32], &state),
             owner: Owner::default(),
@@ -249,8 +256,64 @@ mod tests {
             ttl: registry.first_lease(),
             state,
             held: Box::new(()),
+        }
+    }
+
+    #[test]
+    fn where_a_store_has_the_sessions_the_one_that_was_not_used_for_longest_makes_room() {
+        let (clock, version) = (Clock::default(), Some(Version::first(0)));
+        let registry = Registry::new(2, 9, LEASE, clock.clone()).with_eviction();
+        let old = insert(&registry);
+        clock.advance(Duration::from_secs(1));
+        let newer = insert(&registry);
+        // The store has neither.
+        let full = registry.insert(new_session(&registry)).unwrap_err();
+        assert_eq!(full, InsertError::Full(TooManySessions(2)));
+        old.set_version(version);
+        newer.set_version(version);
+        let permit = old.enter().unwrap();
+        let third = insert(&registry);
+        assert!(registry.is_live(old.id()), "it is in use");
+        assert!(!registry.is_live(newer.id()) && registry.len() == 2);
+        assert!(!newer.is_closed(), "it lives in the store");
+        drop(permit);
+        third.set_version(version);
+        insert(&registry);
+        assert!(!registry.is_live(old.id()) && registry.is_live(third.id()));
+        assert_eq!(registry.len(), 2);
+
+        // The same where there is no memory.
+        let bytes = third.params().session_bytes();
+        let registry = Registry::new(9, 9, LEASE, clock).with_eviction();
+        let registry = registry.with_memory(bytes);
+        let first = insert(&registry);
+        assert!(registry.insert(new_session(&registry)).is_err());
+        first.set_version(version);
+        let id = first.id();
+        drop(first);
+        insert(&registry);
+        assert!(!registry.is_live(id) && registry.len() == 1);
+    }
+
+    #[test]
+    fn an_id_is_taken_until_its_session_has_ended() {
+        let clock = Clock::default();
+        let registry = Registry::new(2, 9, LEASE, clock.clone());
+        let session = insert(&registry);
+        let again = || NewSession {
+            id: session.id(),
+            ..new_session(&registry)
         };
-        registry.insert(new).unwrap()
+        assert_eq!(registry.insert(again()).unwrap_err(), InsertError::Taken);
+        clock.advance(IDLE);
+        let other = registry.insert(again()).unwrap();
+        assert!(session.is_closed() && !other.is_closed());
+        // What is done to the one before is not done to this.
+        registry.forget(&session);
+        assert!(!registry.remove(session.name()));
+        assert!(registry.is_live(other.id()));
+        registry.forget(&other);
+        assert!(registry.is_empty() && !other.is_closed());
     }
 
     /// A session in a new registry, which notes whether the map's lock was free when the session was freed.

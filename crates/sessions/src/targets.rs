@@ -176,3 +176,20 @@ impl Targets {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_format_has_the_longest_sides_and_colour_where_one_has() {
+        let format = |size, has_color| FrameFormat { size, has_color };
+        let largest = |formats: &[FrameFormat]| largest_format(formats.iter().copied());
+        let (small, large) = (format((40, 30), true), format((80, 60), false));
+        for formats in [[small, large], [large, small]] {
+            assert_eq!(largest(&formats), format((80, 60), true));
+        }
+        assert_eq!(largest(&[large, large]), large);
+        assert_eq!(largest(&[small]), small);
+    }
+}

@@ -197,4 +197,65 @@ mod tests {
         let two = [rect([0.0, 0.0, 9.0, 9.0]), rect([-8.0, 0.0, 9.0, 9.0])];
         assert!(box_warnings(&two, SIZE).unwrap()[0].starts_with("Target 1 of 2"));
     }
+
+    #[test]
+    fn each_bound_of_a_likely_mistake_holds_by_itself() {
+        let told = |sides| check(&rect(sides), SIZE).map_err(|error| error.to_string());
+        // A side of nothing is the tracker's to refuse.
+        for sides in [[50.0, 50.0, 0.0, 30.0], [50.0, 50.0, 30.0, 0.0]] {
+            assert_eq!(told(sides), Ok(()), "{sides:?}");
+        }
+        let negative = told([50.0, 50.0, 0.0, -30.0]).unwrap_err();
+        assert!(negative.contains("negative height"), "{negative}");
+        // The whole frame in fractions; and numbers of which one is too large, or none is a side.
+        let fractions = told([0.0, 0.0, 1.0, 1.0]).unwrap_err();
+        assert!(fractions.contains("box=0,0,640,480"), "{fractions}");
+        for sides in [
+            [0.0, 0.0, 1.0, 2.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ] {
+            assert_eq!(told(sides), Ok(()), "{sides:?}");
+        }
+        // Half of it is in the frame, whether it is corners or not.
+        assert_eq!(told([320.0, 0.0, 640.0, 480.0]), Ok(()));
+        assert_eq!(
+            box_warnings(&[rect([-20.0, 100.0, 40.0, 60.0])], SIZE),
+            None
+        );
+        // Corners are four pixels apart.
+        let corners = told([600.0, 460.0, 604.0, 464.0]).unwrap_err();
+        assert!(corners.contains("box=600,460,4,4"), "{corners}");
+        for sides in [[600.0, 460.0, 603.9, 464.0], [600.0, 460.0, 604.0, 463.9]] {
+            assert_eq!(told(sides), Ok(()), "{sides:?}");
+        }
+    }
+
+    #[test]
+    fn corners_that_lie_in_the_frame_are_guessed_and_no_others() {
+        let guess = |sides| {
+            let warnings = box_warnings(&[rect(sides)], SIZE)?;
+            let (_, guess) = warnings[0].split_once("`box=")?;
+            Some(guess.trim_end_matches("`.").to_owned())
+        };
+        let of_all = guess([100.0, 100.0, 640.0, 480.0]);
+        assert_eq!(of_all.as_deref(), Some("100,100,540,380"));
+        let at_the_corner = guess([0.0, 0.0, 640.0, 490.0]);
+        assert_eq!(at_the_corner, None);
+        let rounded = guess([100.04, 100.06, 600.0, 470.0]);
+        assert_eq!(rounded.as_deref(), Some("100,100.1,500,369.9"));
+        for sides in [
+            [100.0, 100.0, 641.0, 480.0],
+            [100.0, 100.0, 640.0, 481.0],
+            [-10.0, 100.0, 300.0, 400.0],
+            [100.0, -10.0, 300.0, 300.0],
+            [500.0, 100.0, 503.0, 300.0],
+            [100.0, 400.0, 300.0, 403.0],
+        ] {
+            assert_eq!(guess(sides), None, "{sides:?}");
+        }
+        // Less than half a percent is told as one.
+        let warned = box_warnings(&[rect([100.0, 100.0, 546.0, 384.0])], SIZE).unwrap();
+        assert!(warned[0].starts_with("2 %"), "{warned:?}");
+    }
 }

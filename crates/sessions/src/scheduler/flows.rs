@@ -455,6 +455,54 @@ mod tests {
         assert!(begin(&mut flows, 2), "another has one of its own");
     }
 
+    #[test]
+    fn flows_that_are_idle_are_forgotten_and_those_that_owe_wait_or_are_slow_are_not() {
+        let mut flows = Flows::<u64>::new(4, Duration::ZERO);
+        let all = MAX_IDLE_FLOWS as u64;
+        for flow in 0..all {
+            flows.enter(Flow(100 + flow), Duration::ZERO);
+        }
+        flows.forget_idle_flows();
+        assert_eq!(flows.flows.len(), MAX_IDLE_FLOWS, "these are few");
+        ask(&mut flows, 1);
+        flows.enter(Flow(2), Duration::ZERO);
+        flows.serve(Flow(2), Job::Single, SizeClass::Small);
+        work(&mut flows, 3, 1_000);
+        // It has used more than any that was served.
+        work(&mut flows, 4, 15);
+        work(&mut flows, 4, 15);
+        flows.forget_idle_flows();
+        let mut left: Vec<u64> = flows.flows.keys().map(|flow| flow.0).collect();
+        left.sort_unstable();
+        assert_eq!(left, [1, 2, 3, 4]);
+        // What was slow long ago is quick again.
+        flows.passed += 60 * HALF_LIFE;
+        for flow in 0..all {
+            flows.enter(Flow(100 + flow), Duration::ZERO);
+        }
+        flows.forget_idle_flows();
+        assert!(flows.flows.contains_key(&Flow(1)) && flows.flows.contains_key(&Flow(2)));
+    }
+
+    #[test]
+    fn a_batch_gives_its_worker_to_the_flow_that_used_less_or_has_none_at_work() {
+        let mut flows = Flows::<u64>::new(1, Duration::ZERO);
+        let class = SizeClass::Small;
+        flows.enter(Flow(1), Duration::ZERO);
+        flows.serve(Flow(1), Job::Batch, class);
+        let has_better = |flows: &mut Flows<u64>, millis| {
+            let time = Duration::from_millis(millis);
+            let better = flows.has_better(Flow(1), class, time);
+            assert_eq!(flows.running(), 1, "the look changes nothing");
+            better
+        };
+        assert!(!has_better(&mut flows, 5), "nobody waits");
+        ask(&mut flows, 2);
+        assert!(!has_better(&mut flows, 0), "both have used as much");
+        assert!(has_better(&mut flows, 1));
+        assert!(!flows.has_better(Flow(3), class, Duration::ZERO), "unknown");
+    }
+
     /// A request of `flow`, which waits.
     fn ask(flows: &mut Flows<u64>, flow: u64) {
         flows.enter(Flow(flow), Duration::ZERO);

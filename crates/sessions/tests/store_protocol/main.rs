@@ -3,6 +3,7 @@
 //! [`suite`] holds for every store. [`schedule`] drives the real service, with trackers and workers, over a store that
 //! delays, drops, repeats and forgets.
 
+mod cached;
 mod flush;
 mod folder;
 mod formats;

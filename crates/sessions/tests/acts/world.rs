@@ -1,0 +1,212 @@
+//! A service without a store, its client, and pictures.
+
+use bagtrack_sessions::{
+    Admission, Boxes, Clock, CreationKey, Executor, Flow, FrameBatch, FramesError,
+    IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Opened, Owner,
+    QueuePermit, QuotaExhausted, Registry, Reservation, ServiceParts, ServiceSettings, Session,
+    SessionQuota, SessionService, Start, StoreShare, Tracked, TrackingMetrics,
+};
+use bagtrack_tracker::{Params, Preset, Rect};
+use bytes::Bytes;
+use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+use metrics::{Counter, Histogram};
+use std::io::Cursor;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+pub const FLOW: Flow = Flow(0);
+/// Width and height of the pictures.
+pub const SIZE: (u32, u32) = (96, 72);
+pub const PIXELS: u64 = 96 * 72;
+/// The target in the first picture.
+pub const FIRST: Rect = Rect {
+    x: 20.0,
+    y: 15.0,
+    width: 16.0,
+    height: 12.0,
+};
+/// Another one, which stands.
+pub const SECOND: Rect = Rect {
+    x: 60.0,
+    y: 40.0,
+    width: 20.0,
+    height: 16.0,
+};
+/// What a session lives before its first frame, and after one.
+pub const LEASE: Lease = Lease {
+    first: Duration::from_secs(60),
+    idle: Duration::from_secs(600),
+};
+/// What a request may take.
+pub const WORK_TIMEOUT: Duration = Duration::from_secs(30);
+/// Most sessions of a service.
+pub const SESSIONS: usize = 3;
+
+/// A client's quota.
+#[derive(Debug)]
+pub struct Quota {
+    /// Whether it may open one more session.
+    pub is_free: bool,
+    /// How many targets its sessions may have together.
+    pub targets: usize,
+}
+
+/// The quota of a client that may have as much as it likes.
+pub const FREE: Quota = Quota {
+    is_free: true,
+    targets: usize::MAX,
+};
+
+impl SessionQuota for Quota {
+    fn check(&self) -> Result<(), OpenError> {
+        match self.is_free {
+            true => Ok(()),
+            false => Err(exhausted("sessions", 0)),
+        }
+    }
+
+    fn reserve(&self, targets: usize, _bytes: usize) -> Result<Reservation, OpenError> {
+        match targets <= self.targets {
+            true => Ok(Box::new(())),
+            false => Err(exhausted("targets", self.targets)),
+        }
+    }
+
+    fn store_share(&self) -> StoreShare {
+        unreachable!("there is no store")
+    }
+}
+
+fn exhausted(what: &'static str, limit: usize) -> OpenError {
+    QuotaExhausted { what, limit }.into()
+}
+
+/// Picture `number`. The first target has moved by two pixels to the right, and by one down, from each to the next.
+pub fn picture(number: u32) -> Bytes {
+    let patch = |x: u32, y: u32, left: u32, top: u32, width: u32, height: u32| {
+        let (dx, dy) = (x.wrapping_sub(left), y.wrapping_sub(top));
+        (dx < width && dy < height).then(|| 150 + ((dx * 5) ^ (dy * 9)) as u8 % 100)
+    };
+    let scene = GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let first = patch(x, y, 20 + 2 * number, 15 + number, 16, 12);
+        let target = first.or_else(|| patch(x, y, 60, 40, 20, 16));
+        Luma([target.unwrap_or(40 + ((x * 3) ^ (y * 7)) as u8 % 60)])
+    });
+    let mut bytes = Cursor::new(Vec::new());
+    let scene = DynamicImage::ImageLuma8(scene);
+    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
+    bytes.into_inner().into()
+}
+
+/// Pictures of these numbers.
+pub fn pictures(numbers: std::ops::Range<u32>) -> Vec<Bytes> {
+    numbers.map(picture).collect()
+}
+
+/// A picture of another size.
+pub fn small_picture() -> Bytes {
+    let mut bytes = Cursor::new(Vec::new());
+    let scene = DynamicImage::ImageLuma8(GrayImage::new(48, 48));
+    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
+    bytes.into_inner().into()
+}
+
+pub fn params() -> Params {
+    let mut params = Preset::Paper.params();
+    params.particles = 20;
+    params
+}
+
+/// The parts of a service whose work is done at once, on the thread that asks for it.
+pub fn parts(clock: &Clock) -> ServiceParts {
+    let at_once = Executor::on_one_thread(|work| work()());
+    let counter = Counter::noop;
+    ServiceParts {
+        settings: ServiceSettings {
+            work_timeout: WORK_TIMEOUT,
+            max_request_cpu: WORK_TIMEOUT,
+            frame: bagtrack_ingest::Limits::default(),
+            max_request_pixels: u64::MAX,
+            max_frames: 64,
+            store_every: 1,
+        },
+        registry: Registry::new(SESSIONS, 4, LEASE, clock.clone()),
+        store: None,
+        admission: Admission::on(at_once, 8, 1, Duration::ZERO),
+        streams: OpenStreams::default(),
+        opened: IdempotencyStore::new(64),
+        keys: Arc::new(MacKeys::new("bagtrack tests of acts", &["secret"])),
+        expert: None,
+        tracking: TrackingMetrics {
+            decode: Histogram::noop(),
+            step: Histogram::noop(),
+            tracking: counter(),
+            uncertain: counter(),
+            lost: counter(),
+            losses: counter(),
+        },
+        queue_wait: Histogram::noop(),
+        draining: AtomicBool::new(false),
+    }
+}
+
+pub fn service(clock: &Clock) -> SessionService {
+    SessionService::new(parts(clock))
+}
+
+pub fn place(service: &SessionService) -> QueuePermit {
+    service.admission.enter(FLOW, Box::new(())).unwrap()
+}
+
+/// A session begins in the first picture, with a box or a list of them.
+pub fn at_first(boxes: Boxes) -> Start {
+    Start::Frame {
+        file: picture(0),
+        boxes,
+        params: Box::new(params()),
+    }
+}
+
+/// A request for a session, with the digest that is this byte again and again.
+pub fn request(
+    service: &SessionService,
+    key: Option<CreationKey>,
+    digest: u8,
+    start: Start,
+) -> OpenRequest {
+    OpenRequest {
+        key,
+        owner: Owner::default(),
+        digest: [digest; 32],
+        start,
+        quota: Arc::new(FREE),
+        queue: place(service),
+    }
+}
+
+pub async fn open(service: &SessionService, boxes: Boxes) -> Arc<Session> {
+    let opened = service.open(request(service, None, 0, at_first(boxes)));
+    let Opened { session, .. } = opened.await.unwrap();
+    session
+}
+
+pub async fn post(
+    service: &SessionService,
+    session: &Arc<Session>,
+    batch: FrameBatch,
+) -> Result<Tracked, FramesError> {
+    let permit = session.enter().unwrap();
+    service.advance(permit, place(service), batch).await
+}
+
+/// Posts pictures under the number of the first one.
+pub async fn post_numbered(
+    service: &SessionService,
+    session: &Arc<Session>,
+    number: u64,
+    files: Vec<Bytes>,
+) -> Result<Tracked, FramesError> {
+    let batch = FrameBatch::posted(Some(number), files, None);
+    post(service, session, batch).await
+}
