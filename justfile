@@ -48,6 +48,10 @@ load *flags:
 attack *flags:
     cargo build --release && cargo run --release --example attack -- {{flags}}
 
+# Faults put into the crates that hold who may do what: does a test fail? `just mutants sessions redis --shard 0/20`.
+mutants crate="access" features="jwt" *flags:
+    cargo mutants --package bagtrack-{{crate}} --features {{features}} {{flags}} -- --tests
+
 # Instructions of a step and of decoding, by callgrind.
 instructions:
     tools/count_instructions.sh
