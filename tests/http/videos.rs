@@ -151,7 +151,11 @@ async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_o
     damaged[start..end].fill(0);
     let request = app.request(Method::POST, "/frames", &[]);
     let answer = request.body(damaged).send().await.unwrap();
-    assert_eq!(answer.status(), 200);
+    if answer.status() != 200 {
+        // On a busy machine ffmpeg comes to the damage before the first picture is taken.
+        expect_problem(answer, "frame-damaged").await;
+        return;
+    }
     // A whole answer would say that the video has no more.
     let cut_off = answer.bytes().await.unwrap_err();
     assert!(cut_off.is_body() || cut_off.is_decode(), "{cut_off:?}");
