@@ -24,6 +24,18 @@ pub struct TrackingMetrics {
 }
 
 impl TrackingMetrics {
+    /// Metrics that nobody collects.
+    pub fn noop() -> Self {
+        Self {
+            decode: Histogram::noop(),
+            step: Histogram::noop(),
+            tracking: Counter::noop(),
+            uncertain: Counter::noop(),
+            lost: Counter::noop(),
+            losses: Counter::noop(),
+        }
+    }
+
     /// Decodes with `work`, and measures it.
     pub fn decoding<T>(&self, work: impl FnOnce() -> T) -> T {
         let started = clock::now();

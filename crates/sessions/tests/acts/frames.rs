@@ -9,7 +9,7 @@ use bagtrack_sessions::{
     ReplayError, Session, SessionService, Start, check_readable_pixels, is_snapshot,
 };
 use bagtrack_tracker::{Rect, Status, TrackerError};
-use metrics::{Counter, Histogram};
+use metrics::Counter;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -331,12 +331,11 @@ async fn each_answer_of_each_target_is_counted() {
         .map(|count| Counter::from_arc(count.clone()));
     let mut of = parts(&Clock::default());
     of.tracking = bagtrack_sessions::TrackingMetrics {
-        decode: Histogram::noop(),
-        step: Histogram::noop(),
         tracking,
         uncertain,
         lost,
         losses,
+        ..bagtrack_sessions::TrackingMetrics::noop()
     };
     let service = SessionService::new(of);
     let mut robust = bagtrack_tracker::Preset::Robust.params();

@@ -9,7 +9,7 @@ use bagtrack_sessions::{
 use bagtrack_tracker::{Params, Preset, Rect};
 use bytes::Bytes;
 use image::{DynamicImage, GrayImage, ImageFormat, Luma};
-use metrics::{Counter, Histogram};
+use metrics::Histogram;
 use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -121,7 +121,6 @@ pub fn params() -> Params {
 /// The parts of a service whose work is done at once, on the thread that asks for it.
 pub fn parts(clock: &Clock) -> ServiceParts {
     let at_once = Executor::on_one_thread(|work| work()());
-    let counter = Counter::noop;
     ServiceParts {
         settings: ServiceSettings {
             work_timeout: WORK_TIMEOUT,
@@ -138,14 +137,7 @@ pub fn parts(clock: &Clock) -> ServiceParts {
         opened: IdempotencyStore::new(64),
         keys: Arc::new(MacKeys::new("bagtrack tests of acts", &["secret"])),
         expert: None,
-        tracking: TrackingMetrics {
-            decode: Histogram::noop(),
-            step: Histogram::noop(),
-            tracking: counter(),
-            uncertain: counter(),
-            lost: counter(),
-            losses: counter(),
-        },
+        tracking: TrackingMetrics::noop(),
         queue_wait: Histogram::noop(),
         draining: AtomicBool::new(false),
     }

@@ -8,7 +8,7 @@ use bagtrack_sessions::{
     ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
     SessionStore, Start, StoreShare, StreamPlace, TrackingMetrics,
 };
-use metrics::{Counter, Histogram};
+use metrics::Histogram;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -106,7 +106,6 @@ pub fn service_by(
         first: LONG,
         idle: LONG,
     };
-    let counter = Counter::noop;
     SessionService::new(ServiceParts {
         settings: ServiceSettings {
             work_timeout: LONG,
@@ -123,14 +122,7 @@ pub fn service_by(
         opened: IdempotencyStore::new(64),
         expert: None,
         keys: Arc::new(keys()),
-        tracking: TrackingMetrics {
-            decode: Histogram::noop(),
-            step: Histogram::noop(),
-            tracking: counter(),
-            uncertain: counter(),
-            lost: counter(),
-            losses: counter(),
-        },
+        tracking: TrackingMetrics::noop(),
         queue_wait: Histogram::noop(),
         draining: AtomicBool::new(false),
     })
