@@ -2,8 +2,9 @@
 
 import json
 import pathlib
+import statistics
 
-from browser import DRAW, drag, frames, rows, said, saved, to_the_end
+from browser import DRAW, distance, drag, frames, rows, said, saved, to_the_end
 from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
@@ -39,15 +40,17 @@ def check_rows(table, path, truth, numbers, times):
     assert [int(frame) for frame, _ in told] == list(range(len(numbers))), (told, times)
     late = [(row["time"], time) for row, time in zip(table, times) if abs(float(row["time"]) - time) > 0.0015]
     assert not late, late
-    near = 0
-    for row, number in zip(table, numbers):
-        x, y, width, height = (float(row[name]) for name in ("x", "y", "width", "height"))
-        left, top, w, h = truth[number]
-        near += ((x + width / 2 - left - w / 2) ** 2 + (y + height / 2 - top - h / 2) ** 2) ** 0.5 <= 10
-        about = [row[name] for name in ("video", "video_width", "video_height")]
-        assert about == [path.name, str(SIZE[0]), str(SIZE[1])], about
-    print(f"  {path.name}: {len(table)} of {len(numbers)} frames, {near} within 10 px of the file")
-    assert near >= 0.9 * len(numbers), (near, [(row["frame"], row["x"], row["y"], row["status"]) for row in table])
+    about = [[row[name] for name in ("video", "video_width", "video_height")] for row in table]
+    assert about == [[path.name, str(SIZE[0]), str(SIZE[1])]] * len(table), about
+    check_distance(path, table, [truth[number] for number in numbers])
+
+
+def check_distance(path, table, truth):
+    """The boxes of these rows are where the target is. With 48 seeds their centres are 1.7 to 3.3 pixels from it on
+    average, and at least 9.5 pixels from where it is a frame earlier or later."""
+    mean = statistics.fmean(distance(row, box) for row, box in zip(table, truth, strict=True))
+    print(f"  {path.name}: {len(table)} frames, {mean:.1f} px from the target on average")
+    assert mean <= 6, (mean, [(row["frame"], row["x"], row["y"], row["status"]) for row in table])
 
 
 def check_video(video, numbers, seconds, size=SENT):

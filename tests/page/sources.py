@@ -4,7 +4,7 @@ import base64
 
 from browser import DRAW, begin_at, distance, drag, rows, said, to_the_end
 from clips import FRAMES, H264, MPEG4, VP8
-from files import check_rows, check_video, choose_file, saved_video, sent_box, times_of
+from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
 COUNT = 20
 """Images of a folder."""
@@ -67,9 +67,7 @@ def begun_in_the_middle(checks):
         assert [int(row["frame"]) for row in table] == list(range(first, FRAMES)), [row["frame"] for row in table]
         off = [row["time"] for row, time in zip(table, times_of(path)[first:]) if abs(float(row["time"]) - time) > 0.0015]
         assert not off, off
-        close = sum(distance(row, checks.files.truth[int(row["frame"])]) <= 10 for row in table)
-        print(f"  {path.name} from frame {first}: {close} of {len(table)} within 10 px")
-        assert close >= 0.9 * len(table)
+        check_distance(path, table, checks.files.truth[first:])
         page.context.close()
 
 
