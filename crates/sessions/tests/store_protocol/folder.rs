@@ -6,7 +6,9 @@ use bagtrack_sessions::{
     SessionStore, StoreShare, Version,
 };
 use std::fs::{self, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -19,6 +21,10 @@ const DURABILITIES: [Durability; 2] = [
 
 fn open(folder: &Path, durability: Durability) -> Result<FileStore, FileStoreError> {
     FileStore::open(folder, durability, LONG, Clock::default())
+}
+
+pub fn open_by(folder: &Path, clock: &Clock) -> FileStore {
+    FileStore::open(folder, Durability::default(), LONG, clock.clone()).unwrap()
 }
 
 /// A state of the usual size, which does not compress.
@@ -34,14 +40,14 @@ fn state(seed: u64) -> Vec<u8> {
 }
 
 /// A session in a store, as its client knows it.
-struct Known {
-    name: SessionName,
-    version: Version,
+pub struct Known {
+    pub name: SessionName,
+    pub version: Version,
     state: Vec<u8>,
 }
 
 impl Known {
-    async fn create(store: &dyn SessionStore, seed: u64, ttl: Duration) -> Self {
+    pub async fn create(store: &dyn SessionStore, seed: u64, ttl: Duration) -> Self {
         let (id, state) = (Uuid::from_u128(seed.into()), state(seed << 32));
         let mut written = record(seed, 0, &state);
         written.ttl = ttl;
@@ -57,7 +63,11 @@ impl Known {
         }
     }
 
-    async fn advance(&mut self, store: &dyn SessionStore) {
+    pub async fn advance(&mut self, store: &dyn SessionStore) {
+        self.advance_for(store, TTL).await;
+    }
+
+    pub async fn advance_for(&mut self, store: &dyn SessionStore, ttl: Duration) {
         let frame = self.version.frame + 1;
         let state = state((self.name.incarnation << 32) + frame);
         let commit = Commit {
@@ -66,7 +76,7 @@ impl Known {
             frame,
             state: Some(&state),
             takes_over: false,
-            ttl: TTL,
+            ttl,
         };
         let committed = store.commit(commit).await.unwrap();
         assert!(is_committed(&committed), "{committed:?}");
@@ -164,6 +174,17 @@ async fn a_folder_is_one_stores_alone() {
 }
 
 #[tokio::test]
+async fn a_folder_that_cannot_be_made_is_refused_with_what_the_system_says() {
+    let parent = TempDir::new().unwrap();
+    let file = parent.path().join("file");
+    fs::write(&file, "a file").unwrap();
+    let refused = open(&file.join("store"), Durability::default()).unwrap_err();
+    let text = refused.to_string();
+    assert!(matches!(refused, FileStoreError::Io { .. }), "{text}");
+    assert!(text.contains("cannot be opened: Not a directory"), "{text}");
+}
+
+#[tokio::test]
 async fn expired_sessions_are_swept_and_their_space_is_given_back() {
     let folder = tempfile::tempdir().unwrap();
     let clock = Clock::default();
@@ -208,6 +229,11 @@ async fn look(folder: &Path, sessions: &[Known], damage: &str) -> Result<usize, 
     let store = open(folder, Durability::default());
     let store = store.map_err(|refused| {
         let text = refused.to_string();
+        let is_other = matches!(
+            refused,
+            FileStoreError::Io { .. } | FileStoreError::Locked(_)
+        );
+        assert!(!is_other, "{damage}: {text}");
         assert!(text.contains(folder.to_str().unwrap()), "{damage}: {text}");
         text
     })?;
@@ -241,9 +267,98 @@ async fn a_write_that_was_cut_off_is_left_out_and_no_other() {
             .write(true)
             .open(torn.path().join(relative));
         file.unwrap().set_len((written - cut) as u64).unwrap();
-        let intact = look(torn.path(), &sessions, &format!("{cut} bytes cut off")).await;
+        let log = Log::default();
+        let intact = {
+            let _logged = log.begin();
+            look(torn.path(), &sessions, &format!("{cut} bytes cut off")).await
+        };
         assert_eq!(intact, Ok(3), "{cut} bytes cut off");
+        let told = format!(
+            "bytes={}",
+            left_out(torn.path(), relative, &bytes[..written - cut])
+        );
+        assert!(log.text().contains(&told), "{told}: {}", log.text());
     }
+    let log = Log::default();
+    let _logged = log.begin();
+    let intact = look(folder.path(), &sessions, "nothing").await;
+    assert_eq!((intact, log.text()), (Ok(4), String::new()));
+}
+
+/// How many bytes of a journal were left out when it was read. It has zeros after what it keeps, or nothing.
+fn left_out(folder: &Path, journal: &Path, torn: &[u8]) -> usize {
+    let kept = fs::read(folder.join(journal)).unwrap();
+    let same = kept
+        .iter()
+        .zip(torn)
+        .take_while(|(kept, torn)| kept == torn);
+    torn.len() - same.count()
+}
+
+/// What this thread logs.
+#[derive(Clone, Default)]
+struct Log(Arc<Mutex<Vec<u8>>>);
+
+impl Log {
+    fn begin(&self) -> tracing::subscriber::DefaultGuard {
+        let log = self.clone();
+        let lines = tracing_subscriber::fmt().with_ansi(false);
+        let lines = lines.with_max_level(tracing::Level::WARN);
+        tracing::subscriber::set_default(lines.with_writer(move || log.clone()).finish())
+    }
+
+    fn text(&self) -> String {
+        String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
+    }
+}
+
+impl io::Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[tokio::test]
+async fn a_folder_that_cannot_be_written_is_tried_again_and_nothing_answered_is_lost() {
+    let parent = TempDir::new().unwrap();
+    let (folder, aside) = (parent.path().join("store"), parent.path().join("aside"));
+    let store = open(&folder, DURABILITIES[1]).unwrap();
+    let mut session = Known::create(&store, 1, TTL).await;
+    session.advance(&store).await;
+    // A file takes the folder's place: what is open can be written, but no further table.
+    fs::rename(&folder, &aside).unwrap();
+    fs::write(&folder, "a file").unwrap();
+    let mut seed = 1;
+    let failed = loop {
+        seed += 1;
+        let record = record(seed, 0, &state(seed));
+        match store.create(Uuid::from_u128(seed.into()), &record).await {
+            Ok(created) => assert!(is_committed(&created), "{created:?}"),
+            Err(failed) => break failed.to_string(),
+        }
+        assert!(seed < 5000, "180 MB were written into a file");
+    };
+    println!("{failed} after {seed} sessions");
+    assert!(!store.is_ready());
+    let failures = store.failures();
+    assert!(failures > 0);
+    assert!(store.load(session.name.id).await.is_err());
+    assert!(store.failures() > failures);
+    fs::remove_file(&folder).unwrap();
+    fs::rename(&aside, &folder).unwrap();
+    let waits = bagtrack_sessions::clock::now();
+    while !store.is_ready() && waits.elapsed() < LONG {
+        bagtrack_sessions::clock::sleep(Duration::from_millis(10)).await;
+    }
+    let loaded = store.load(session.name.id).await.unwrap().unwrap();
+    assert!(session.is(&loaded));
+    let last = store.load(Uuid::from_u128(u128::from(seed - 1))).await;
+    assert!(last.unwrap().unwrap().state == state(seed - 1));
+    session.advance(&store).await;
 }
 
 #[tokio::test]

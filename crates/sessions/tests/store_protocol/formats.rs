@@ -7,7 +7,7 @@
 
 use crate::folder::copy;
 use crate::pictures::{FIRST, params, picture};
-use crate::suite::Redis;
+use crate::redis::Redis;
 use crate::world::{NoQuota, keys, service};
 use bagtrack_sessions::{
     Boxes, Clock, CreationKey, Durability, Estimates, FileStore, Flow, FrameBatch, OpenRequest,

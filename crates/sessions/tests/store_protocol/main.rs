@@ -4,6 +4,7 @@
 //! delays, drops, repeats and forgets.
 
 mod cached;
+mod expiry;
 mod flush;
 mod folder;
 mod formats;
@@ -11,6 +12,7 @@ mod hostile;
 mod memory;
 mod pictures;
 mod records;
+mod redis;
 mod schedule;
 mod suite;
 mod world;

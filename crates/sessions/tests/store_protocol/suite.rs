@@ -2,12 +2,9 @@
 
 use crate::memory::MemoryStore;
 use bagtrack_sessions::{
-    Commit, Estimates, Opening, Outcome, Owner, Record, RedisAddress, RedisStore, SessionName,
-    SessionStore, Version,
+    Commit, Estimates, Opening, Outcome, Owner, Record, SessionName, SessionStore, Version,
 };
 use bagtrack_tracker::{Estimate, Rect, Status};
-use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use uuid::Uuid;
 
@@ -210,48 +207,4 @@ pub async fn holds_for(store: &dyn SessionStore) {
 #[tokio::test]
 async fn the_store_in_memory_keeps_to_the_rules() {
     holds_for(&MemoryStore::default()).await;
-}
-
-/// A Redis that ends with the test.
-pub struct Redis {
-    process: Child,
-    pub port: u16,
-}
-
-impl Redis {
-    pub fn start() -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let port = listener.local_addr().expect("it is bound").port();
-        drop(listener);
-        let mut command = Command::new("redis-server");
-        command.args(["--bind", "127.0.0.1", "--save", "", "--port"]);
-        let command = command.arg(port.to_string()).stdout(Stdio::null());
-        let mut process = command.spawn().expect("redis-server is installed");
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            let ended = process.try_wait().expect("it was started");
-            assert!(ended.is_none(), "redis-server has ended: {ended:?}");
-            std::thread::yield_now();
-        }
-        Self { process, port }
-    }
-}
-
-impl Drop for Redis {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-#[tokio::test]
-#[ignore = "needs redis-server"]
-async fn redis_keeps_to_the_rules() {
-    let redis = Redis::start();
-    let timeout = Duration::from_secs(5);
-    let address = format!("redis://127.0.0.1:{}", redis.port);
-    let address = RedisAddress::parse(&address, timeout).unwrap();
-    let store = RedisStore::connect(address, "suite", timeout)
-        .await
-        .unwrap();
-    holds_for(&store).await;
 }

@@ -21,6 +21,8 @@ use uuid::Uuid;
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);
 /// How long a client's sessions are counted after it opened the last one.
 const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
+/// Most sessions of a client that are looked at together, and how often, where it has no room for another.
+const LOOKS: (usize, usize) = (32, 4);
 /// How often the store is asked whether it is there.
 const PROBE: Duration = Duration::from_millis(250);
 
@@ -169,11 +171,9 @@ impl RedisStore {
         let (places, bytes) = (session.places, session.bytes);
         let member = format!("{id}:{incarnation}:{places}:{bytes}");
         let mut script = self.0.scripts.admit.key(self.key_of_client(&share.client));
-        script
-            .arg(member)
-            .arg(self.now() + milliseconds(session.ttl));
+        script.arg(member).arg(self.now());
         script.arg(share.max_places).arg(share.max_bytes);
-        script.arg(milliseconds(COUNTED));
+        script.arg(milliseconds(COUNTED)).arg(LOOKS.0);
         let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
         Ok((answer.0 == 0).then_some(answer.1))
     }
@@ -192,16 +192,13 @@ impl RedisStore {
             };
             let mut lives = self.0.scripts.lives.key(self.key(id));
             lives.arg(incarnation);
-            let lives: i64 = self.0.connection.call(Call::Script(lives)).await?;
-            let until = u64::try_from(lives).ok().filter(|lives| *lives > 0);
+            let lives: bool = self.0.connection.call(Call::Script(lives)).await?;
             let mut script = self
                 .0
                 .scripts
                 .recount
                 .key(self.key_of_client(&share.client));
-            script
-                .arg(&member)
-                .arg(until.map_or(0, |lives| self.now() + lives));
+            script.arg(&member).arg(if lives { self.now() } else { 0 });
             let _: i64 = self.0.connection.call(Call::Script(script)).await?;
         }
         Ok(())
@@ -235,11 +232,17 @@ impl SessionStore for RedisStore {
 
     fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
         Box::pin(async move {
-            if let Some(counted) = self.try_admit(share, session).await? {
+            for _ in 0..LOOKS.1 {
+                let Some(counted) = self.try_admit(share, session).await? else {
+                    return Ok(true);
+                };
+                let are_all = counted.len() < LOOKS.0;
                 self.recount(share, counted).await?;
-                return Ok(self.try_admit(share, session).await?.is_none());
+                if are_all {
+                    break;
+                }
             }
-            Ok(true)
+            Ok(self.try_admit(share, session).await?.is_none())
         })
     }
 

@@ -108,8 +108,8 @@ return ARGV[1]
 ";
 
 /// KEYS: that of a client, whose members are its sessions as `id:incarnation:places:bytes`, by the time (in milliseconds)
-/// until which they are known to live. ARGV: member, time, most places, most bytes, milliseconds to keep the key. Answers
-/// whether the session is counted, and else the members that were looked at longest ago.
+/// when they were looked at last. ARGV: member, time, most places, most bytes, milliseconds to keep the key, a number.
+/// Answers whether the session is counted, and else so many members that were looked at longest ago.
 const ADMIT: &str = r"
 local places, bytes = 0, 0
 local function count(member)
@@ -119,23 +119,22 @@ end
 for _, member in ipairs(redis.call('ZRANGE', KEYS[1], 0, -1)) do count(member) end
 count(ARGV[1])
 if places > tonumber(ARGV[3]) or bytes > tonumber(ARGV[4]) then
-  return {0, redis.call('ZRANGE', KEYS[1], 0, 31)}
+  return {0, redis.call('ZRANGE', KEYS[1], 0, ARGV[6] - 1)}
 end
 redis.call('ZADD', KEYS[1], ARGV[2], ARGV[1])
 redis.call('PEXPIRE', KEYS[1], ARGV[5])
 return {1, {}}
 ";
 
-/// KEYS: that of a client. ARGV: a member of it, and until when its session is known to live; 0 where it has ended.
+/// KEYS: that of a client. ARGV: a member of it, and when its session was looked at; 0 where it has ended.
 const RECOUNT: &str = r"
 if ARGV[2] == '0' then return redis.call('ZREM', KEYS[1], ARGV[1]) end
 return redis.call('ZADD', KEYS[1], 'XX', ARGV[2], ARGV[1])
 ";
 
-/// KEYS: a record's. ARGV: incarnation. Answers the milliseconds that the session lives; 0 where it has ended.
+/// KEYS: a record's. ARGV: incarnation. Answers whether the session lives.
 const LIVES: &str = r"
-if redis.call('HGET', KEYS[1], 'incarnation') ~= ARGV[1] then return 0 end
-return redis.call('PTTL', KEYS[1])
+return redis.call('HGET', KEYS[1], 'incarnation') == ARGV[1]
 ";
 
 /// Whether the store takes writes.

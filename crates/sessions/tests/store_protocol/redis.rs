@@ -1,0 +1,228 @@
+//! The store in a Redis: what it counts, how long it keeps what it has, and what it does without a Redis.
+
+use crate::folder::Known;
+use crate::suite::{TTL, holds_for, is_committed, record};
+use bagtrack_sessions::{
+    Counted, Outcome, Owner, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
+};
+use redis::FromRedisValue;
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use uuid::Uuid;
+
+const LONG: Duration = Duration::from_secs(5);
+
+/// A Redis that ends with the test.
+pub struct Redis {
+    process: Child,
+    pub port: u16,
+}
+
+impl Redis {
+    pub fn start() -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let port = listener.local_addr().expect("it is bound").port();
+        drop(listener);
+        Self::start_at(port)
+    }
+
+    fn start_at(port: u16) -> Self {
+        let mut command = Command::new("redis-server");
+        command.args(["--bind", "127.0.0.1", "--save", "", "--port"]);
+        let command = command.arg(port.to_string()).stdout(Stdio::null());
+        let mut process = command.spawn().expect("redis-server is installed");
+        while TcpStream::connect(("127.0.0.1", port)).is_err() {
+            let ended = process.try_wait().expect("it was started");
+            assert!(ended.is_none(), "redis-server has ended: {ended:?}");
+            std::thread::yield_now();
+        }
+        Self { process, port }
+    }
+
+    async fn store(&self, timeout: Duration) -> RedisStore {
+        let address = format!("redis://127.0.0.1:{}", self.port);
+        let address = RedisAddress::parse(&address, timeout).unwrap();
+        RedisStore::connect(address, "suite", timeout)
+            .await
+            .unwrap()
+    }
+
+    /// What a command answers.
+    fn ask<T: FromRedisValue>(&self, words: &[&str]) -> T {
+        let client = redis::Client::open(format!("redis://127.0.0.1:{}", self.port)).unwrap();
+        let mut command = redis::cmd(words[0]);
+        command.arg(&words[1..]);
+        command
+            .query(&mut client.get_connection().unwrap())
+            .unwrap()
+    }
+}
+
+impl Drop for Redis {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+async fn until(what: &str, is_so: impl Fn() -> bool) {
+    let waits = bagtrack_sessions::clock::now();
+    while !is_so() {
+        assert!(waits.elapsed() < 12 * LONG, "{what}");
+        bagtrack_sessions::clock::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn redis_keeps_to_the_rules() {
+    let redis = Redis::start();
+    holds_for(&redis.store(LONG).await).await;
+}
+
+fn share(client: &str, max_places: usize, max_bytes: usize) -> StoreShare {
+    StoreShare {
+        client: client.to_owned(),
+        max_places,
+        max_bytes,
+    }
+}
+
+fn counted(seed: u64) -> Counted {
+    Counted {
+        name: SessionName {
+            id: Uuid::from_u128(seed.into()),
+            incarnation: seed,
+        },
+        places: 2,
+        bytes: 100,
+        ttl: TTL,
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn in_redis_a_client_has_so_many_places_and_bytes_until_its_sessions_end() {
+    let redis = Redis::start();
+    let store = redis.store(LONG).await;
+    let admit = async |client: &str, places, bytes, seed| {
+        let share = share(client, places, bytes);
+        store.admit(&share, counted(seed)).await.unwrap()
+    };
+    let mut known = Vec::new();
+    for seed in 1..=40 {
+        assert!(admit("one", 80, 4000, seed).await, "{seed}");
+        known.push(Known::create(&store, seed, TTL).await);
+    }
+    assert!(!admit("one", 81, 9000, 41).await, "it has 80 places of 81");
+    assert!(!admit("one", 100, 4099, 41).await, "it has 4,000 bytes");
+    assert!(admit("other", 80, 4000, 42).await);
+    // The newest is not among the 32 that are looked at first.
+    assert!(store.end(known[39].name, TTL).await.unwrap());
+    assert!(admit("one", 80, 4000, 43).await);
+    Known::create(&store, 43, TTL).await;
+    assert!(!admit("one", 80, 4000, 44).await);
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn all_that_is_in_redis_goes_by_itself() {
+    let redis = Redis::start();
+    let store = redis.store(LONG).await;
+    assert!(
+        store
+            .admit(&share("one", 9, 900), counted(1))
+            .await
+            .unwrap()
+    );
+    let mut session = Known::create(&store, 1, TTL / 2).await;
+    session.advance_for(&store, TTL).await;
+    let ended = Known::create(&store, 2, TTL).await;
+    assert!(store.end(ended.name, 2 * TTL).await.unwrap());
+    let owner = Owner::named("ann");
+    store.claim(&owner, "key", session.name.id).await.unwrap();
+    let keys: Vec<String> = redis.ask(&["KEYS", "*"]);
+    let day = Duration::from_secs(24 * 3600);
+    let mut kinds = Vec::new();
+    for key in keys {
+        let left: i64 = redis.ask(&["PTTL", &key]);
+        let kind = key.split(':').nth(1).unwrap().to_owned();
+        let (least, most) = match &kind[..] {
+            "probe" => (Duration::ZERO, Duration::from_secs(1)),
+            "session" => (TTL / 2, TTL),
+            "ended" => (TTL, 2 * TTL),
+            "key" => (day - TTL, day),
+            "client" => (7 * day - TTL, 7 * day),
+            _ => panic!("{key}"),
+        };
+        // One that has gone meanwhile has -2.
+        let is_gone = kind == "probe" && left == -2;
+        let left = Duration::from_millis(u64::try_from(left).unwrap_or(0));
+        assert!(is_gone || (left > least && left <= most), "{key}: {left:?}");
+        kinds.push(kind);
+    }
+    kinds.retain(|kind| kind != "probe");
+    kinds.sort();
+    assert_eq!(kinds, ["client", "ended", "key", "session"]);
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn a_redis_that_went_is_told_at_once_and_found_again() {
+    let redis = Redis::start();
+    let port = redis.port;
+    let store = redis.store(Duration::from_millis(300)).await;
+    assert!(store.is_ready());
+    assert_eq!(store.failures(), 0);
+    Known::create(&store, 1, TTL).await;
+    drop(redis);
+    assert!(store.load(Uuid::from_u128(1)).await.is_err());
+    assert!(!store.is_ready());
+    let failures = store.failures();
+    let asked = bagtrack_sessions::clock::now();
+    let refused = store.load(Uuid::from_u128(1)).await.unwrap_err();
+    assert!(refused.to_string().contains("lately"), "{refused}");
+    println!("refused after {:?}", asked.elapsed());
+    assert!(store.failures() > failures);
+    let _redis = Redis::start_at(port);
+    until("it is found again", || store.is_ready()).await;
+    assert!(store.load(Uuid::from_u128(1)).await.unwrap().is_none());
+    Known::create(&store, 1, TTL).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready() {
+    let redis = Redis::start();
+    let store = redis.store(LONG).await;
+    let mut session = Known::create(&store, 1, TTL).await;
+    assert!(!store.is_full());
+    let used: String = redis.ask(&["INFO", "memory"]);
+    let used = used
+        .lines()
+        .find_map(|line| line.strip_prefix("used_memory:"));
+    let used: u64 = used.unwrap().parse().unwrap();
+    // Some 95 % are used: frames are taken.
+    let most = (used + used / 20).to_string();
+    let set = |most: &str| redis.ask::<String>(&["CONFIG", "SET", "maxmemory", most]);
+    set(&most);
+    let created = store
+        .create(Uuid::from_u128(2), &record(2, 0, b"zero"))
+        .await;
+    assert_eq!(created.unwrap(), Outcome::Full);
+    assert!(store.is_full() && store.is_ready());
+    session.advance(&store).await;
+    // All of it is.
+    set("1");
+    let checked = store.fence(session.name, session.version).await;
+    assert!(checked.is_err(), "{checked:?}");
+    until("it is known to refuse", || !store.is_ready()).await;
+    set("0");
+    until("it takes writes again", || store.is_ready()).await;
+    let created = store
+        .create(Uuid::from_u128(2), &record(2, 0, b"zero"))
+        .await;
+    assert!(is_committed(&created.unwrap()) && !store.is_full());
+    session.advance(&store).await;
+}
