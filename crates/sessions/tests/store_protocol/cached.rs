@@ -2,10 +2,11 @@
 
 use crate::formats::{open, post};
 use crate::memory::MemoryStore;
-use crate::pictures::{FIRST, params, picture};
-use crate::world::{ID, service};
+use crate::pictures::{FIRST, FRAMES, params, picture};
+use crate::world::{ID, LONG, parts, service, service_by};
 use bagtrack_sessions::{
-    ActError, Boxes, Flow, NoSession, Owner, SessionService, SessionStore, Start, clock,
+    ActError, Boxes, Clock, Durability, FileStore, Flow, FrameBatch, FramesError, NoSession, Owner,
+    ReplayError, Session, SessionService, SessionStore, Start, Stopped, Tracked, clock,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -75,4 +76,187 @@ async fn an_early_frame_waits_for_those_that_another_replica_takes() {
     let waited = begun.elapsed();
     let patience = Duration::from_secs(2)..Duration::from_millis(2_400);
     assert!(patience.contains(&waited), "{waited:?}");
+}
+
+async fn cached(replica: &SessionService) -> Arc<Session> {
+    replica.find(ID, &Owner::default(), FLOW).await.unwrap()
+}
+
+/// The client's frame, or its rival's, with or without its number.
+async fn send(
+    replica: &SessionService,
+    number: Option<u64>,
+    picture: Vec<u8>,
+) -> Result<Tracked, FramesError> {
+    let session = cached(replica).await;
+    let place = replica.admission.enter(FLOW, Box::new(())).unwrap();
+    let batch = FrameBatch::posted(number, vec![picture.into()], None);
+    let permit = session.enter().unwrap();
+    replica.advance(permit, place, batch).await
+}
+
+#[tokio::test]
+async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
+    for is_numbered in [true, false] {
+        let replicas = two().await;
+        let alone = service(None, 1);
+        open(&alone, ID, start()).await;
+        for number in 1..=FRAMES {
+            let told = is_numbered.then_some(number);
+            let expected = send(&alone, told, picture(0, number)).await.unwrap();
+            let replica = &replicas[number as usize % 2];
+            let tracked = send(replica, told, picture(0, number)).await.unwrap();
+            assert_eq!(tracked.estimates, expected.estimates);
+            assert_eq!(
+                (tracked.replayed, tracked.checkpoint),
+                (false, Some(number))
+            );
+            assert_eq!(cached(replica).await.latest_frame(), number);
+        }
+    }
+}
+
+#[tokio::test]
+async fn what_another_replica_has_answered_is_answered_again() {
+    let [first, other] = two().await;
+    for number in 1..=3 {
+        let tracked = send(&other, Some(number), picture(0, number))
+            .await
+            .unwrap();
+        // Once the replica has the first frame in memory, and then the frame before.
+        for _ in 0..2 {
+            let again = send(&first, Some(number), picture(0, number))
+                .await
+                .unwrap();
+            assert!(again.replayed, "{number}");
+            assert_eq!(again.estimates, tracked.estimates);
+            assert_eq!(again.checkpoint, Some(number));
+        }
+        assert_eq!(cached(&first).await.latest_frame(), number);
+    }
+}
+
+#[tokio::test]
+async fn of_two_pictures_with_one_number_the_first_that_the_store_has_counts() {
+    let [first, other] = two().await;
+    let taken = send(&other, Some(1), picture(0, 1)).await.unwrap();
+    let send_late = async || send(&first, Some(1), picture(1, 1)).await.unwrap_err();
+    let late = send_late().await;
+    let next = |late: &FramesError| match late {
+        FramesError::Replay(ReplayError::OutOfOrder { got: 1, expected }) => Some(*expected),
+        _ => None,
+    };
+    assert_eq!(next(&late), Some(2), "{late}");
+    // The replica has the session from the store now, and knows the number.
+    let again = send_late().await;
+    let differs = matches!(
+        again,
+        FramesError::Replay(ReplayError::Differs {
+            got: 1,
+            expected: 2
+        })
+    );
+    assert!(differs, "{again}");
+    let same = send(&first, Some(1), picture(0, 1)).await.unwrap();
+    assert!(same.replayed);
+    assert_eq!(same.estimates, taken.estimates);
+}
+
+#[tokio::test]
+async fn a_look_at_a_replica_that_lacks_frames_tells_the_newest() {
+    let [first, other] = two().await;
+    send(&other, Some(1), picture(0, 1)).await.unwrap();
+    let session = cached(&first).await;
+    assert_eq!(session.latest_frame(), 0);
+    first.refresh(&session, None, FLOW).await.unwrap();
+    assert_eq!(session.latest_frame(), 1);
+    send(&other, Some(2), picture(0, 2)).await.unwrap();
+    let place = first.admission.enter(FLOW, Box::new(())).unwrap();
+    let snapshot = first.snapshot(session.read_permit().unwrap(), place).await;
+    let alone = service(None, 1);
+    open(&alone, ID, Start::Snapshot(snapshot.unwrap().into())).await;
+    assert_eq!(cached(&alone).await.latest_frame(), 2);
+    // A stream begins with the newest state, and no other copy goes on from there.
+    send(&other, Some(3), picture(0, 3)).await.unwrap();
+    let permit = session.read_permit().unwrap();
+    let mut fenced = first.fence(permit, FLOW).await.unwrap();
+    assert_eq!(fenced.state().latest_frame(), 3);
+    drop(fenced);
+    let copy = cached(&other).await.version().unwrap();
+    let newest = session.version().unwrap();
+    assert_eq!((copy.frame, newest.frame), (3, 3));
+    assert_ne!(copy.generation, newest.generation);
+    let next = send(&other, Some(4), picture(0, 4)).await.unwrap();
+    assert_eq!(next.estimates[0].first().frame, 4);
+}
+
+/// Two replicas by one clock, whose store is a folder, and the first of which has opened a session.
+async fn two_by(clock: &Clock, folder: &std::path::Path) -> ([SessionService; 2], Arc<FileStore>) {
+    let store = FileStore::open(folder, Durability::default(), LONG, clock.clone());
+    let store = Arc::new(store.unwrap());
+    let first = service_by(clock.clone(), Some(store.clone()), 1);
+    let mut of = parts(clock.clone(), Some(store.clone()), 1);
+    of.settings.work_timeout = Duration::from_millis(50);
+    open(&first, ID, start()).await;
+    ([first, SessionService::new(of)], store)
+}
+
+#[tokio::test]
+async fn a_session_lives_as_long_as_the_store_says() {
+    let (folder, clock) = (tempfile::tempdir().unwrap(), Clock::default());
+    let ([first, other], store) = two_by(&clock, folder.path()).await;
+    let (minute, later) = (Duration::from_secs(60), LONG - Duration::from_secs(60));
+    // It lives longer, for the other replica has answered a frame of it again.
+    send(&first, Some(1), picture(0, 1)).await.unwrap();
+    let session = cached(&other).await;
+    clock.advance(later);
+    assert!(session.ttl() <= minute);
+    send(&first, Some(1), picture(0, 1)).await.unwrap();
+    other.refresh(&session, None, FLOW).await.unwrap();
+    assert!(session.ttl() > later, "{:?}", session.ttl());
+    // There was no time for a frame, which renews it here and there.
+    clock.advance(later);
+    let at_work = session.enter().unwrap().lock().await.unwrap();
+    let refused = send(&other, Some(2), picture(0, 2)).await.unwrap_err();
+    let deadline = FramesError::Act(ActError::Stopped(Stopped::Deadline));
+    assert_eq!(refused.to_string(), deadline.to_string());
+    drop(at_work);
+    let stored = store.load(ID).await.unwrap().unwrap();
+    assert!(
+        stored.ttl > later && session.ttl() > later,
+        "{:?}",
+        stored.ttl
+    );
+    // A look does not.
+    clock.advance(later);
+    other.refresh(&session, None, FLOW).await.unwrap();
+    assert!(session.ttl() <= minute, "{:?}", session.ttl());
+    clock.advance(minute);
+    let expired = other.find(ID, &Owner::default(), FLOW).await.unwrap_err();
+    assert!(
+        matches!(expired, ActError::NoSession(NoSession::Expired)),
+        "{expired}"
+    );
+}
+
+#[tokio::test]
+async fn a_session_that_the_store_has_lost_is_told_as_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Clock::default();
+    let ([first, _], store) = two_by(&clock, folder.path()).await;
+    let session = cached(&first).await;
+    // As if the store had been begun anew: the record is gone, and no mark says that the session was ended.
+    assert!(
+        store
+            .end(session.name(), Duration::from_millis(1))
+            .await
+            .unwrap()
+    );
+    clock.advance(Duration::from_secs(1));
+    let lost = send(&first, Some(1), picture(0, 1)).await.unwrap_err();
+    assert!(
+        matches!(lost, FramesError::Act(ActError::NoSession(NoSession::Lost))),
+        "{lost}"
+    );
+    assert!(!first.registry.is_live(ID));
 }

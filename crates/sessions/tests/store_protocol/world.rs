@@ -102,11 +102,16 @@ pub fn service_by(
     store: Option<Arc<dyn SessionStore>>,
     store_every: u64,
 ) -> SessionService {
+    SessionService::new(parts(clock, store, store_every))
+}
+
+/// What such a replica is made of.
+pub fn parts(clock: Clock, store: Option<Arc<dyn SessionStore>>, store_every: u64) -> ServiceParts {
     let lease = Lease {
         first: LONG,
         idle: LONG,
     };
-    SessionService::new(ServiceParts {
+    ServiceParts {
         settings: ServiceSettings {
             work_timeout: LONG,
             max_request_cpu: LONG,
@@ -125,7 +130,7 @@ pub fn service_by(
         tracking: TrackingMetrics::noop(),
         queue_wait: Histogram::noop(),
         draining: AtomicBool::new(false),
-    })
+    }
 }
 
 impl Replica {
