@@ -8,6 +8,7 @@ use uuid::Uuid;
 
 const MINUTE: Duration = Duration::from_secs(60);
 const HOUR: Duration = Duration::from_secs(3600);
+/// A minute less than an hour. Where the store is opened anew its clock may differ by moments, so a test looks at minutes.
 const ALMOST: Duration = Duration::from_secs(3600 - 60);
 
 /// The store after it was closed and has looked for what has expired.
@@ -36,15 +37,15 @@ async fn a_session_is_kept_until_its_time_is_over() {
     clock.advance(ALMOST);
     store = swept(store, &folder, &clock).await;
     let record = store.load(session.name.id).await.unwrap().unwrap();
-    assert!(record.ttl <= MINUTE, "{:?}", record.ttl);
+    assert!(record.ttl < 2 * MINUTE, "{:?}", record.ttl);
     // A frame renews it.
     session.advance_for(&store, HOUR).await;
     clock.advance(ALMOST);
     store = swept(store, &folder, &clock).await;
     // A look does so only if it is to.
     let look = |renew| store.check(session.name, session.version, false, renew);
-    assert!(time_left(look(None).await.unwrap()) <= MINUTE);
-    assert!(time_left(look(None).await.unwrap()) <= MINUTE);
+    assert!(time_left(look(None).await.unwrap()) < 2 * MINUTE);
+    assert!(time_left(look(None).await.unwrap()) < 2 * MINUTE);
     assert!(time_left(look(Some(HOUR)).await.unwrap()) > ALMOST);
     assert!(time_left(look(None).await.unwrap()) > ALMOST);
     clock.advance(HOUR);
@@ -66,7 +67,7 @@ async fn an_ended_session_is_known_as_ended_for_its_time() {
     let look = || store.check(session.name, session.version, false, None);
     assert_eq!(look().await.unwrap(), Outcome::Tombstoned);
     assert!(!store.end(session.name, MINUTE).await.unwrap());
-    clock.advance(MINUTE);
+    clock.advance(2 * MINUTE);
     assert_eq!(look().await.unwrap(), Outcome::NotFound);
     Known::create(&store, 1, HOUR).await;
 }
@@ -80,7 +81,7 @@ async fn a_key_names_its_session_for_a_day() {
     clock.advance(23 * HOUR + ALMOST);
     store = swept(store, &folder, &clock).await;
     assert_eq!(store.claim(&ann, "key", second).await.unwrap(), first);
-    clock.advance(MINUTE);
+    clock.advance(2 * MINUTE);
     assert_eq!(store.claim(&ann, "key", second).await.unwrap(), second);
     assert_eq!(store.claim(&ann, "key", first).await.unwrap(), second);
 }
@@ -97,5 +98,5 @@ async fn the_time_in_which_the_store_is_closed_counts() {
     let store = open_by(folder.path(), &Clock::with_wall(later));
     assert!(store.load(short.name.id).await.unwrap().is_none());
     let left = store.load(long.name.id).await.unwrap().unwrap().ttl;
-    assert!(left <= MINUTE, "{left:?}");
+    assert!(left > MINUTE / 2 && left < 2 * MINUTE, "{left:?}");
 }

@@ -82,9 +82,14 @@ impl OpenError {
     }
 }
 
-/// Whether an error is of the system, and not of what a file holds or of one that is missing.
+/// Whether an error is of the system, and not of what a file holds, of one that is missing, or of one that is so short that
+/// the database reads from before its beginning.
 fn is_of_system(error: &io::Error) -> bool {
-    error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound
+    let is_of_file = matches!(
+        error.kind(),
+        io::ErrorKind::NotFound | io::ErrorKind::InvalidInput
+    );
+    error.raw_os_error().is_some() && !is_of_file
 }
 
 /// What the database has, each by its key.
