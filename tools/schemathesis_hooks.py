@@ -2,7 +2,8 @@
 
 schemathesis loads this file (`SCHEMATHESIS_HOOKS`). Pictures of one size are sent wherever a file is described, as are
 snapshots of a session that is opened here. Requests that are meant to be valid get a box inside the picture, a fresh
-idempotency key, and few tracker parameters. Requests that are meant to be invalid are sent as they were made.
+idempotency key, and few tracker parameters. Requests that are meant to be invalid are sent as they were made, but for
+flags of forms.
 """
 
 import base64
@@ -82,9 +83,23 @@ def path_takes_several(case):
     return case.operation.path in ("/track", "/sessions/{id}/frames")
 
 
+FLAGS = ["backwards", "draw", "keyframes", "until_lost", "verbose"]
+
+
+def leave_no_flag_in_figures(case):
+    """What is meant to be invalid is so: of a form, whose parts are texts, 0 and 1 are taken for false and true."""
+    if isinstance(case.body, dict) and case.media_type == "multipart/form-data":
+        for name in FLAGS:
+            if case.body.get(name) in (0, 1):
+                case.body[name] = "neither"
+
+
 @schemathesis.hook
 def before_call(context, case, kwargs):
-    if case.meta is None or not case.meta.generation.mode.is_positive:
+    if case.meta is None:
+        return
+    if not case.meta.generation.mode.is_positive:
+        leave_no_flag_in_figures(case)
         return
     before_call.count += 1
     count = before_call.count
