@@ -84,13 +84,16 @@ def path_takes_several(case):
 
 
 FLAGS = ["backwards", "draw", "keyframes", "until_lost", "verbose"]
+FLAG_TEXTS = ["", "0", "1", "False", "True", "false", "true"]
+"""A form has texts alone, and the service takes these for a flag."""
 
 
-def leave_no_flag_in_figures(case):
-    """What is meant to be invalid is so: of a form, whose parts are texts, 0 and 1 are taken for false and true."""
+def make_flags_invalid(case):
+    """A flag of a form that is invalid by its type alone has the same text as a valid one. It gets another."""
     if isinstance(case.body, dict) and case.media_type == "multipart/form-data":
         for name in FLAGS:
-            if case.body.get(name) in (0, 1):
+            value = case.body.get(name)
+            if isinstance(value, (int, str)) and not isinstance(value, bool) and str(value) in FLAG_TEXTS:
                 case.body[name] = "neither"
 
 
@@ -99,7 +102,7 @@ def before_call(context, case, kwargs):
     if case.meta is None:
         return
     if not case.meta.generation.mode.is_positive:
-        leave_no_flag_in_figures(case)
+        make_flags_invalid(case)
         return
     before_call.count += 1
     count = before_call.count

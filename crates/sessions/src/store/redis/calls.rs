@@ -21,8 +21,10 @@ use uuid::Uuid;
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);
 /// How long a client's sessions are counted after it opened the last one.
 const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
-/// Most sessions of a client that are looked at together, and how often, where it has no room for another.
-const LOOKS: (usize, usize) = (32, 4);
+/// Most sessions of a client that are looked at together, where it has no room for another.
+const LOOKED_AT: usize = 32;
+/// How often so many are looked at for one that is to be counted.
+const MAX_LOOKS: usize = 4;
 /// How often the store is asked whether it is there.
 const PROBE: Duration = Duration::from_millis(250);
 
@@ -173,7 +175,7 @@ impl RedisStore {
         let mut script = self.0.scripts.admit.key(self.key_of_client(&share.client));
         script.arg(member).arg(self.now());
         script.arg(share.max_places).arg(share.max_bytes);
-        script.arg(milliseconds(COUNTED)).arg(LOOKS.0);
+        script.arg(milliseconds(COUNTED)).arg(LOOKED_AT);
         let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
         Ok((answer.0 == 0).then_some(answer.1))
     }
@@ -232,11 +234,11 @@ impl SessionStore for RedisStore {
 
     fn admit<'a>(&'a self, share: &'a StoreShare, session: Counted) -> StoreFuture<'a, bool> {
         Box::pin(async move {
-            for _ in 0..LOOKS.1 {
+            for _ in 0..MAX_LOOKS {
                 let Some(counted) = self.try_admit(share, session).await? else {
                     return Ok(true);
                 };
-                let are_all = counted.len() < LOOKS.0;
+                let are_all = counted.len() < LOOKED_AT;
                 self.recount(share, counted).await?;
                 if are_all {
                     break;
