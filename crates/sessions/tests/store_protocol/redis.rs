@@ -6,8 +6,11 @@ use bagtrack_sessions::{
     Counted, Outcome, Owner, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
 };
 use redis::FromRedisValue;
+use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 use uuid::Uuid;
 
@@ -41,11 +44,7 @@ impl Redis {
     }
 
     async fn store(&self, timeout: Duration) -> RedisStore {
-        let address = format!("redis://127.0.0.1:{}", self.port);
-        let address = RedisAddress::parse(&address, timeout).unwrap();
-        RedisStore::connect(address, "suite", timeout)
-            .await
-            .unwrap()
+        store_at(self.port, timeout).await
     }
 
     /// What a command answers.
@@ -63,6 +62,56 @@ impl Drop for Redis {
     fn drop(&mut self) {
         let _ = self.process.kill();
         let _ = self.process.wait();
+    }
+}
+
+async fn store_at(port: u16, timeout: Duration) -> RedisStore {
+    let address = RedisAddress::parse(&format!("redis://127.0.0.1:{port}"), timeout).unwrap();
+    let store = RedisStore::connect(address, "suite", timeout);
+    store.await.unwrap()
+}
+
+/// A way to a Redis, whose connections of before a moment say nothing any more: neither a byte nor that they have ended.
+struct Link {
+    port: u16,
+    /// How often the connections of before went silent.
+    silences: Arc<AtomicUsize>,
+}
+
+impl Link {
+    fn to(redis: &Redis) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (port, to) = (listener.local_addr().unwrap().port(), redis.port);
+        let silences = Arc::new(AtomicUsize::new(0));
+        let all = silences.clone();
+        std::thread::spawn(move || {
+            for client in listener.incoming().map_while(Result::ok) {
+                let Ok(server) = TcpStream::connect(("127.0.0.1", to)) else {
+                    return;
+                };
+                let begun = all.load(Ordering::Acquire);
+                for (mut from, mut to) in [
+                    (client.try_clone().unwrap(), server.try_clone().unwrap()),
+                    (server, client),
+                ] {
+                    let all = all.clone();
+                    std::thread::spawn(move || {
+                        let mut bytes = [0; 4096];
+                        while let Ok(length @ 1..) = from.read(&mut bytes) {
+                            let speaks = all.load(Ordering::Acquire) == begun;
+                            if speaks && to.write_all(&bytes[..length]).is_err() {
+                                return;
+                            }
+                        }
+                    });
+                }
+            }
+        });
+        Self { port, silences }
+    }
+
+    fn silence(&self) {
+        self.silences.fetch_add(1, Ordering::AcqRel);
     }
 }
 
@@ -193,6 +242,22 @@ async fn a_redis_that_went_is_told_at_once_and_found_again() {
 
 #[tokio::test]
 #[ignore = "needs redis-server"]
+async fn a_connection_that_says_nothing_any_more_is_left_for_another() {
+    let redis = Redis::start();
+    let link = Link::to(&redis);
+    let store = store_at(link.port, Duration::from_millis(300)).await;
+    let mut session = Known::create(&store, 1, TTL).await;
+    for _ in 0..2 {
+        link.silence();
+        assert!(store.load(session.name.id).await.is_err());
+        until("another is made", || store.is_ready()).await;
+        assert!(store.load(session.name.id).await.unwrap().is_some());
+        session.advance(&store).await;
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
 async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready() {
     let redis = Redis::start();
     let store = redis.store(LONG).await;
@@ -215,8 +280,10 @@ async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready
     session.advance(&store).await;
     // All of it is.
     set("1");
-    let checked = store.fence(session.name, session.version).await;
-    assert!(checked.is_err(), "{checked:?}");
+    let asked = bagtrack_sessions::clock::now();
+    let refused = store.fence(session.name, session.version).await;
+    assert!(refused.is_err(), "{refused:?}");
+    assert!(asked.elapsed() < LONG, "it was asked again and again");
     until("it is known to refuse", || !store.is_ready()).await;
     set("0");
     until("it takes writes again", || store.is_ready()).await;

@@ -145,8 +145,12 @@ impl Connection {
                     }
                     return Err(StoreUnavailable(error.to_string()));
                 }
-                Ok(Err(error)) => reason = Some(error),
                 // A connection over which nothing comes may be dead without knowing it.
+                Ok(Err(error)) if error.is_timeout() => {
+                    reason = Some(error);
+                    self.replace(number);
+                }
+                Ok(Err(error)) => reason = Some(error),
                 Err(_) => self.replace(number),
             }
             sleep(PAUSE).await;
