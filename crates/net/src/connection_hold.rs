@@ -56,10 +56,11 @@ impl ConnectionHold {
         let activity = self.activity().clone();
         let mut cut_off = self.clone();
         tokio::select! {
-            begun = beginning => Some(begun),
+            biased;
+            () = cut_off.cut_off() => None,
             () = self.ending() => None,
             () = activity.shed.notified() => None,
-            () = cut_off.cut_off() => None,
+            begun = beginning => Some(begun),
         }
     }
 
@@ -75,12 +76,8 @@ impl ConnectionHold {
         let mut asked = false;
         loop {
             tokio::select! {
-                result = &mut connection => {
-                    if let Err(error) = result {
-                        tracing::debug!(%error, "connection ended");
-                    }
-                    return;
-                }
+                biased;
+                () = cut_off.cut_off() => return tracing::warn!("connection cut off"),
                 () = self.ending(), if !asked => {
                     asked = true;
                     connection.as_mut().graceful_shutdown();
@@ -88,7 +85,12 @@ impl ConnectionHold {
                 () = activity.shed.notified() => {
                     return tracing::debug!("idle connection closed for another");
                 }
-                () = cut_off.cut_off() => return tracing::warn!("connection cut off"),
+                result = &mut connection => {
+                    if let Err(error) = result {
+                        tracing::debug!(%error, "connection ended");
+                    }
+                    return;
+                }
             }
         }
     }

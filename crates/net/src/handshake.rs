@@ -3,15 +3,13 @@
 //! A client that speaks plain HTTP to a service with TLS shows it by its first byte. It can be served, too: by
 //! routes that tell it the right address.
 
+use std::fmt::Debug;
 use std::io;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 
 #[cfg(feature = "tls")]
 use super::certificate::Certificate;
-#[cfg(feature = "tls")]
-use tokio_rustls::server::TlsStream;
-#[cfg(feature = "tls")]
-use tokio_util::either::Either;
 
 /// The first byte of a TLS handshake: the type of its record (RFC 8446, section 5.1).
 #[cfg(feature = "tls")]
@@ -21,13 +19,13 @@ const HANDSHAKE_RECORD: u8 = 22;
 #[cfg(feature = "tls")]
 pub const MAX_UNSENT_BYTES: usize = 32 << 10;
 
-/// A connection's bytes, decrypted.
-#[cfg(feature = "tls")]
-pub type Transport = Either<TcpStream, Box<TlsStream<TcpStream>>>;
+/// What the bytes of a connection come over, decrypted: a socket, TLS over one, or the line of a simulation.
+pub trait ByteStream: AsyncRead + AsyncWrite + Debug + Send + Unpin {}
 
-/// A connection's bytes.
-#[cfg(not(feature = "tls"))]
-pub type Transport = TcpStream;
+impl<T: AsyncRead + AsyncWrite + Debug + Send + Unpin> ByteStream for T {}
+
+/// Any of these.
+pub type Transport = Box<dyn ByteStream>;
 
 /// How the connections of a service begin.
 #[derive(Debug, Clone)]
@@ -70,24 +68,19 @@ impl Security {
     /// The connection breaks, or the client and the service do not agree.
     pub async fn begin(&self, stream: TcpStream) -> io::Result<Begun> {
         match self {
-            #[cfg(not(feature = "tls"))]
-            Self::Plain => Ok(Begun::AsConfigured(stream)),
-            #[cfg(feature = "tls")]
-            Self::Plain => Ok(Begun::AsConfigured(Either::Left(stream))),
+            Self::Plain => Ok(Begun::AsConfigured(Box::new(stream))),
             #[cfg(feature = "tls")]
             Self::Tls(certificate) => {
                 let mut first = [0];
                 match stream.peek(&mut first).await? {
                     0 => Err(io::ErrorKind::UnexpectedEof.into()),
-                    _ if first[0] != HANDSHAKE_RECORD => {
-                        Ok(Begun::WithoutTls(Either::Left(stream)))
-                    }
+                    _ if first[0] != HANDSHAKE_RECORD => Ok(Begun::WithoutTls(Box::new(stream))),
                     _ => {
                         let limit = |connection: &mut rustls::ServerConnection| {
                             connection.set_buffer_limit(Some(MAX_UNSENT_BYTES));
                         };
                         let accepted = certificate.acceptor().accept_with(stream, limit).await?;
-                        Ok(Begun::AsConfigured(Either::Right(Box::new(accepted))))
+                        Ok(Begun::AsConfigured(Box::new(accepted)))
                     }
                 }
             }

@@ -32,5 +32,5 @@ pub use forwarded::{client_address, is_trusted};
 pub use fragments::{Fragments, MessageRate, MessageTooSlow, Rates};
 #[cfg(feature = "tls")]
 pub use handshake::MAX_UNSENT_BYTES;
-pub use handshake::{Begun, Security, Transport};
+pub use handshake::{Begun, ByteStream, Security, Transport};
 pub use least_rate::LeastRate;

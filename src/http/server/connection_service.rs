@@ -73,6 +73,12 @@ impl ConnectionService {
         self.speak_http(transport, peer, routes.clone(), hold).await;
     }
 
+    /// Serves HTTP over these bytes until they end, or a stream that has taken them over does.
+    pub async fn serve_http(&self, transport: Transport, peer: SocketAddr, hold: ConnectionHold) {
+        let routes = self.routes.clone();
+        self.speak_http(transport, peer, routes, hold).await;
+    }
+
     async fn speak_http(
         &self,
         transport: Transport,

@@ -8,7 +8,7 @@
 
 pub mod application;
 pub mod bind_error;
-mod connection_service;
+pub mod connection_service;
 mod refusal;
 pub mod router;
 pub mod service;

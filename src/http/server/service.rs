@@ -2,11 +2,13 @@
 
 use super::bind_error::BindError;
 use crate::http::quotas::client::Peer;
+use crate::http::server::connection_service::ConnectionService;
 use crate::http::server::router::router;
 use crate::http::state::AppState;
 use axum::{Extension, Router};
 use bagtrack_access::Access;
 use bagtrack_config::Config;
+use bagtrack_net::Security;
 use bagtrack_sessions::clock::interval;
 use bagtrack_sessions::{Clock, Executor, SessionStore};
 use bagtrack_tracker::Expert;
@@ -63,6 +65,12 @@ impl Service {
     /// The routes, as a client at this address meets them.
     pub fn router(&self, client: SocketAddr) -> Router {
         self.routes(Router::new()).layer(Extension(Peer(client)))
+    }
+
+    /// What serves connections that are brought to it.
+    pub fn connections(&self) -> ConnectionService {
+        let routes = self.routes(Router::new());
+        ConnectionService::new(self.state.clone(), Security::Plain, routes)
     }
 
     /// The routes, beside these.

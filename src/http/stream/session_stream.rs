@@ -69,8 +69,9 @@ impl SessionStream {
         let mut counts = Counts::default();
         let mut cut_off = self.connection.clone();
         let end = tokio::select! {
-            end = self.serve(&mut socket, &mut counts) => end,
+            biased;
             () = cut_off.cut_off() => return tracing::warn!("stream cut off"),
+            end = self.serve(&mut socket, &mut counts) => end,
         };
         let Counts {
             answered,
@@ -110,17 +111,21 @@ impl SessionStream {
             if !may_come {
                 socket.get_mut().pause();
             }
+            // In this order a client that sends all the time holds up nothing.
             tokio::select! {
-                message = socket.next(), if may_come => {
-                    is_heard = true;
-                    if let Some(end) = self.read(socket, message, &mut header) {
-                        return Ok(end);
-                    }
-                }
+                biased;
+                () = self.connection.ending(), if !is_ending => is_ending = true,
+                () = work.place.replaced() => return Ok(End::Replaced),
                 done = wait_for(&mut answering) => {
                     answering = None;
                     let Some(done) = done else { continue };
                     if let Some(end) = self.deliver(socket, done, counts).await? {
+                        return Ok(end);
+                    }
+                }
+                message = socket.next(), if may_come => {
+                    is_heard = true;
+                    if let Some(end) = self.read(socket, message, &mut header) {
                         return Ok(end);
                     }
                 }
@@ -138,8 +143,6 @@ impl SessionStream {
                     is_heard = false;
                     socket.send(Message::Ping(Bytes::new())).await?;
                 }
-                () = work.place.replaced() => return Ok(End::Replaced),
-                () = self.connection.ending(), if !is_ending => is_ending = true,
             }
         }
     }
