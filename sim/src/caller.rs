@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Longest time of a request.
-const TIMEOUT: Duration = Duration::from_secs(5);
+pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A caller.
 #[derive(Debug)]
@@ -24,6 +24,10 @@ pub struct Caller {
     pub name: String,
     /// Sends its requests.
     pub client: Client,
+    /// Its way to the replicas, for streams.
+    pub wire: Wire,
+    /// The share of its sessions whose frames it sends over a stream.
+    pub streams: f64,
     /// Draws what it does.
     pub chance: Chance,
     /// What goes wrong.
@@ -40,19 +44,21 @@ pub struct Caller {
 
 /// A session, as its caller sees it.
 #[derive(Debug, Clone)]
-struct Account {
-    opening: Opening,
+pub(crate) struct Account {
+    pub(crate) opening: Opening,
     /// What was sent up to the last answer; by frame.
-    sent: Vec<Sent>,
+    pub(crate) sent: Vec<Sent>,
     /// What was sent after it, and had no answer.
-    unanswered: Vec<Sent>,
-    answers: Vec<(usize, String)>,
+    pub(crate) unanswered: Vec<Sent>,
+    /// Which picture a stream sends next. It sends none a second time.
+    pub(crate) drawn: usize,
+    pub(crate) answers: Vec<(usize, String)>,
     /// When the service had a sign of life last.
-    touched: Instant,
+    pub(crate) touched: Instant,
 }
 
 /// Why a session does not go on.
-enum Ended {
+pub(crate) enum Ended {
     /// It has expired, which may be.
     Expired,
     /// It has not, and is gone.
@@ -117,10 +123,14 @@ impl Caller {
             opening,
             sent: vec![sent(0)],
             unanswered: Vec::new(),
+            drawn: 1,
             answers: Vec::new(),
             touched: now(),
         };
-        self.go_on(session, account).await;
+        match self.chance.happens(self.streams) {
+            true => self.stream(session, account).await,
+            false => self.go_on(session, account).await,
+        }
     }
 
     /// Sends frames, until it has enough.
@@ -141,7 +151,7 @@ impl Caller {
         self.finish(account, ended);
     }
 
-    fn pause(&self) -> Duration {
+    pub(crate) fn pause(&self) -> Duration {
         match self.chance.happens(0.05) {
             true => self.chance.millis(1000..50_000),
             false => self.chance.millis(0..1000),
@@ -275,22 +285,27 @@ impl Caller {
     }
 
     /// What no answer means: the session goes on, or it has ended.
-    fn refused(&self, account: &Account, error: ClientError) -> Result<(), Ended> {
+    pub(crate) fn refused(&self, account: &Account, error: ClientError) -> Result<(), Ended> {
         match error {
             ClientError::Refused(problem) if matches!(problem.status, 404 | 410) => {
-                // The lease began when the service answered, which the caller may have heard one time-out later.
-                match account.touched.elapsed() + TIMEOUT + Duration::from_secs(1) >= self.idle {
-                    true => Err(Ended::Expired),
-                    false => Err(Ended::Lost(format!("{problem:?}"))),
-                }
+                Err(self.gone(account, format!("{problem:?}")))
             }
             ClientError::Unavailable(_) | ClientError::Transport(_) if !self.is_quiet() => Ok(()),
             error => Err(Ended::Lost(format!("{error:?}"))),
         }
     }
 
+    /// What it means that the service does not have the session.
+    pub(crate) fn gone(&self, account: &Account, why: String) -> Ended {
+        // The lease began when the service answered, which the caller may have heard one time-out later.
+        match account.touched.elapsed() + TIMEOUT + Duration::from_secs(1) >= self.idle {
+            true => Ended::Expired,
+            false => Ended::Lost(why),
+        }
+    }
+
     /// Compares what was answered with the tracker alone.
-    fn finish(&self, account: Account, ended: Option<Ended>) {
+    pub(crate) fn finish(&self, account: Account, ended: Option<Ended>) {
         if let Some(Ended::Lost(why)) = &ended {
             self.fault(&format!("a session is gone: {why}"));
         }
@@ -315,11 +330,11 @@ impl Caller {
         ));
     }
 
-    fn is_quiet(&self) -> bool {
+    pub(crate) fn is_quiet(&self) -> bool {
         self.is_quiet.load(Ordering::Relaxed)
     }
 
-    fn fault(&self, fault: &str) {
+    pub(crate) fn fault(&self, fault: &str) {
         self.trace
             .note(format_args!("FAULT {}: {fault}", self.name));
         self.journal.fault(format!("{}: {fault}", self.name));
@@ -340,7 +355,7 @@ fn sent(picture: usize) -> Sent {
     }
 }
 
-fn rect(clip: usize, picture: usize) -> Rect {
+pub(crate) fn rect(clip: usize, picture: usize) -> Rect {
     let target = scenes::target(clip, picture);
     Rect {
         x: target.x,

@@ -109,8 +109,12 @@ impl Cluster {
         let flushed = replica.service.clone();
         tokio::spawn(replica.life.run(async move { flushed.flush().await }));
         sleep(delay).await;
-        let last = replica.service.clone();
-        let _ = replica.life.run(async move { last.flush().await }).await;
+        let last = replica.clone();
+        let ending = async move {
+            last.end_connections().await;
+            last.service.flush().await;
+        };
+        let _ = replica.life.run(ending).await;
         self.setup.trace.note(format_args!("{} ends", replica.name));
         replica.life.end();
     }

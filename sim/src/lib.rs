@@ -4,6 +4,7 @@
 //! | who | what is real | what is simulated |
 //! |---|---|---|
 //! | [callers](caller) | the client `bagtrack-client` with its rules (docs/PROTOCOL.md) | what they want, and their patience |
+//! | streams | HTTP/1.1 and WebSockets, both ends | the caller's rules: those of a camera |
 //! | [the network](network) | requests and answers as HTTP has them | lines that lose, delay, double and break |
 //! | [replicas](replica) | routes, acts, store, scheduler, tracker | sockets, threads, processor time |
 //! | [the store](redis) | its Lua scripts | the server: keys, times to live, and whether it is there |
@@ -24,6 +25,7 @@ pub mod cluster;
 pub mod faults;
 pub mod journal;
 pub mod life;
+mod line;
 pub mod nemesis;
 pub mod network;
 #[cfg(feature = "planted-faults")]
@@ -32,6 +34,7 @@ pub mod redis;
 pub mod replay;
 pub mod replica;
 pub mod scenes;
+mod streamer;
 pub mod trace;
 pub mod world;
 

@@ -1,8 +1,10 @@
 //! The life of a replica: it ends at any await.
 
+use std::io;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
+use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
 
 /// The life. Clones are the same.
 #[derive(Debug, Clone, Default)]
@@ -96,5 +98,54 @@ impl<T> Future for Mortal<T> {
             None => Poll::Ready(None),
             Some(task) => task.as_mut().poll(context).map(Some),
         }
+    }
+}
+
+/// A connection of a replica. It is cut when the replica has died.
+#[derive(Debug)]
+pub struct MortalStream {
+    life: Life,
+    line: DuplexStream,
+}
+
+impl MortalStream {
+    /// Over this line.
+    pub fn new(life: Life, line: DuplexStream) -> Self {
+        Self { life, line }
+    }
+
+    fn alive(&mut self, context: &Context) -> io::Result<Pin<&mut DuplexStream>> {
+        match self.life.goes_on(context) {
+            true => Ok(Pin::new(&mut self.line)),
+            false => Err(io::ErrorKind::ConnectionAborted.into()),
+        }
+    }
+}
+
+impl AsyncRead for MortalStream {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context,
+        buffer: &mut ReadBuf,
+    ) -> Poll<io::Result<()>> {
+        self.alive(context)?.poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for MortalStream {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        self.alive(context)?.poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context) -> Poll<io::Result<()>> {
+        self.alive(context)?.poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context) -> Poll<io::Result<()>> {
+        self.alive(context)?.poll_shutdown(context)
     }
 }

@@ -217,7 +217,7 @@ impl Wire {
 }
 
 /// An answer in one line.
-fn text(answer: &serde_json::Value) -> String {
+pub(crate) fn text(answer: &serde_json::Value) -> String {
     let side = |name: &str| answer["box"][name].as_f64().unwrap_or(f64::NAN);
     let rect = [side("x"), side("y"), side("width"), side("height")];
     let score = answer["score"].as_f64().unwrap_or(f64::NAN);

@@ -2,27 +2,34 @@
 
 use crate::chance::Chance;
 use crate::faults::Rates;
-use crate::life::Life;
+use crate::life::{Life, MortalStream};
 use crate::redis::line::Line;
 use crate::redis::server::Server;
 use crate::trace::Trace;
 use axum::Router;
 use axum::body::Body;
-use bagtrack::http::{Config, Parts, Service};
-use bagtrack_sessions::clock::{Instant, now, sleep};
+use bagtrack::http::{Config, ConnectionService, Parts, Service};
+use bagtrack_net::{ConnectionHold, Connections};
+use bagtrack_sessions::clock::{Instant, now, sleep, timeout};
 use bagtrack_sessions::{Clock, Executor, RedisStore, SessionStore};
 use bytes::Bytes;
 use http::{Request, Response};
 use http_body_util::BodyExt;
+use metrics::Counter;
 use std::cell::Cell;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
-use tokio::sync::oneshot;
+use tokio::io::DuplexStream;
+use tokio::sync::{oneshot, watch};
 use tower::ServiceExt;
 
 /// How long a session lives without a frame.
 pub const IDLE: Duration = Duration::from_secs(40);
+/// Longest time for connections to end.
+const SHUTDOWN: Duration = Duration::from_secs(2);
+/// All callers have one address.
+const CLIENT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 1);
 /// Longest time of a call to the store.
 const STORE_TIMEOUT: Duration = Duration::from_millis(800);
 
@@ -55,6 +62,18 @@ pub struct Replica {
     /// What its sessions expire by.
     pub clock: Clock,
     router: Router,
+    connections: Arc<Lines>,
+}
+
+/// The connections to a replica, for streams.
+#[derive(Debug)]
+struct Lines {
+    service: ConnectionService,
+    open: Arc<Connections>,
+    /// Told when they are to end.
+    ending: watch::Sender<bool>,
+    /// Never dropped before the replica.
+    keep_alive: watch::Sender<()>,
 }
 
 thread_local! {
@@ -107,7 +126,13 @@ impl Replica {
             let service = service.clone();
             async move { service.sweep().await }
         }));
-        let router = service.router(SocketAddr::from((Ipv4Addr::LOCALHOST, 1)));
+        let router = service.router(CLIENT);
+        let connections = Lines {
+            service: service.connections(),
+            open: Connections::new(1000, 1000, Counter::noop()),
+            ending: watch::Sender::new(false),
+            keep_alive: watch::Sender::new(()),
+        };
         setup.trace.note(format_args!("{name} started"));
         Self {
             name,
@@ -115,7 +140,26 @@ impl Replica {
             service,
             clock,
             router,
+            connections: Arc::new(connections),
         }
+    }
+
+    /// Serves a connection until its client or the replica ends it.
+    pub fn connect(&self, line: DuplexStream) {
+        let connections = self.connections.clone();
+        let permit = connections.open.enter(CLIENT.ip(), true);
+        let permit = permit.expect("there are few of them");
+        let (ending, cut_off) = (&connections.ending, &connections.keep_alive);
+        let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.subscribe());
+        let line = Box::new(MortalStream::new(self.life.clone(), line));
+        let serving = async move { connections.service.serve_http(line, CLIENT, hold).await };
+        tokio::spawn(self.life.run(serving));
+    }
+
+    /// Asks connections to end, and waits some time until they have.
+    pub async fn end_connections(&self) {
+        self.connections.ending.send_replace(true);
+        let _ = timeout(SHUTDOWN, self.connections.ending.closed()).await;
     }
 
     /// The answer to a request, with its whole body; none where the replica dies before. The request goes on when this

@@ -116,9 +116,16 @@ fn callers(
             };
             let every = *chance.one_of(&[1, 3, 30]);
             let addresses = if is_balanced { &any } else { &addresses };
+            // Of a stream without numbers each frame has to be in the store.
+            let streams = match setup.store.is_some() && setup.store_every == 1 {
+                true => 0.4,
+                false => 0.0,
+            };
             let caller = Caller {
                 name: name.clone(),
-                client: Caller::client(wire, http.clone(), addresses, every),
+                client: Caller::client(wire.clone(), http.clone(), addresses, every),
+                wire,
+                streams,
                 chance: chance.clone(),
                 rates: setup.rates.clone(),
                 trace: setup.trace.clone(),

@@ -29,12 +29,14 @@ pub enum PlantedFault {
     TracksTwice,
     /// A request whose client has gone keeps its place in the queue.
     KeepsPlace,
+    /// A stream begins, and another replica still goes on from its own copy.
+    BeginsWithoutFence,
 }
 
 impl PlantedFault {
     /// All of them.
     #[cfg(feature = "planted-faults")]
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::AnswersBeforeCommit,
         Self::TakesSilenceForConsent,
         Self::KeepsUncommitted,
@@ -46,6 +48,7 @@ impl PlantedFault {
         Self::LivesForEver,
         Self::TracksTwice,
         Self::KeepsPlace,
+        Self::BeginsWithoutFence,
     ];
 
     /// Whether this thread has it.

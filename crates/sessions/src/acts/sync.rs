@@ -5,6 +5,7 @@
 use super::error::ActError;
 use super::service::SessionService;
 use crate::clock::timeout;
+use crate::planted::PlantedFault;
 use crate::store::{Gone, Intent, Local, Outcome, Step, reconcile};
 use crate::{
     Flow, LockedSession, NoSession, QueuePermit, Session, SessionBusy, SessionPermit, SessionState,
@@ -125,12 +126,18 @@ impl SessionService {
             let Some(version) = session.version() else {
                 return Ok(locked);
             };
-            let outcome = store.fence(session.name(), version).await;
+            let is_planted = PlantedFault::BeginsWithoutFence.is_here();
+            let outcome = match is_planted {
+                true => store.check(session.name(), version, true, None).await,
+                false => store.fence(session.name(), version).await,
+            };
             let step = reconcile(local(&session), outcome);
             let is_fenced = matches!(step, Step::Commit(_));
             self.follow(&mut locked, step, flow).await?;
             if is_fenced {
-                locked.fenced();
+                if !is_planted {
+                    locked.fenced();
+                }
                 return Ok(locked);
             }
         }
