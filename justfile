@@ -18,7 +18,7 @@ test *filter:
 
 # Locks and threads of sessions, in orders that shuttle chooses.
 interleavings:
-    cargo test --package bagtrack-sessions --features shuttle --lib interleavings --target-dir target/shuttle
+    cargo test --package bagtrack-sessions --features shuttle --lib interleavings
 
 # Everything that is checked before a change lands.
 ci:
