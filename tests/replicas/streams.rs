@@ -4,6 +4,8 @@ use crate::pair::{Pair, json};
 use crate::stream_client::StreamClient;
 use reqwest::StatusCode;
 use serde_json::Value;
+use std::time::Duration;
+use tokio::time::timeout;
 use uuid::Uuid;
 
 /// The replica to which a stream went that a newer one replaced.
@@ -56,6 +58,26 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
     assert_eq!(answer_of(&third.track(&frames[14]).await), expected[13]);
     let view = json(pair.view(1).await, StatusCode::OK).await;
     assert_eq!(view["frames"], 15);
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
+    let flags = ["--ping-interval", "100ms", "--store-timeout", "10s"];
+    let pair = Pair::open(&flags, 6).await;
+    let expected = pair.undisturbed().await;
+    let address = pair.replicas[0].address;
+    let mut stream = StreamClient::open(address, pair.id, "").await;
+    for number in 1..6 {
+        // What comes to the store meanwhile is done in order: the frame first, then what a ping asks.
+        pair.redis.pause();
+        stream.send(&pair.clip.frames[number]).await;
+        let early = timeout(Duration::from_millis(300), stream.receive()).await;
+        assert!(early.is_err(), "{early:?} without the store");
+        pair.redis.go_on();
+        let answer = stream.message().await;
+        assert_eq!(answer_of(&answer), expected[number - 1]);
+    }
 }
 
 #[tokio::test]

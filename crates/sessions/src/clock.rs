@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 pub use tokio::time::{
-    Instant, Sleep, interval, interval_at, sleep, sleep_until, timeout, timeout_at,
+    Instant, MissedTickBehavior, Sleep, interval, interval_at, sleep, sleep_until, timeout,
+    timeout_at,
 };
 
 /// The moment now.

@@ -12,7 +12,7 @@ use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::{FrameHeader, Hello, StreamAnswer};
 use bagtrack_net::{ConnectionHold, MessageTooSlow};
-use bagtrack_sessions::clock::{self, interval_at, timeout};
+use bagtrack_sessions::clock::{self, MissedTickBehavior, interval_at, timeout};
 use bagtrack_sessions::{BudgetFull, Charge, ChargedBytes, Estimates};
 use futures_util::stream::FusedStream;
 use futures_util::{SinkExt, StreamExt};
@@ -21,6 +21,7 @@ use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio_tungstenite::tungstenite::error::ProtocolError;
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 /// Time for a client to answer the close.
@@ -99,6 +100,8 @@ impl SessionStream {
         let mut answering: Option<Answering> = None;
         let period = work.state.config.limits.ping_interval;
         let mut pings = interval_at(clock::now() + period, period);
+        // A client is silent for the whole of a period, also after one that took long here.
+        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut is_heard, mut is_ending) = (true, false);
         loop {
             if answering.is_none() && !work.waiting().is_empty() {
@@ -130,10 +133,9 @@ impl SessionStream {
                     }
                 }
                 _ = pings.tick() => {
-                    match work.check_newest().await {
-                        Err(problem) if ends_stream(problem.kind()) => return Ok(End::Problem(problem)),
-                        _ if work.place.is_replaced() => return Ok(End::Replaced),
-                        _ => {}
+                    // A frame at work has the session, and asks the store itself. It stands still in here.
+                    if answering.is_none() && let Some(end) = self.check_newest().await {
+                        return Ok(end);
                     }
                     // While frames wait nothing is read, so nothing can be heard.
                     is_heard |= socket.get_mut().take_heard();
@@ -144,6 +146,14 @@ impl SessionStream {
                     socket.send(Message::Ping(Bytes::new())).await?;
                 }
             }
+        }
+    }
+
+    /// Whether the stream ends, since its session has, its token, or its place.
+    async fn check_newest(&self) -> Option<End> {
+        match self.work.check_newest().await {
+            Err(problem) if ends_stream(problem.kind()) => Some(End::Problem(problem)),
+            _ => self.work.place.is_replaced().then_some(End::Replaced),
         }
     }
 
@@ -183,7 +193,7 @@ impl SessionStream {
                 self.work.waiting().push(arrived);
             }
             Some(Ok(_)) => {}
-            Some(Err(error)) => return Some(End::Problem(unreadable(&error))),
+            Some(Err(error)) => return Some(unreadable(&error)),
         }
         None
     }
@@ -260,18 +270,22 @@ impl SessionStream {
     }
 }
 
-/// The problem that a message is which could not be read.
-fn unreadable(error: &Error) -> Problem {
-    if let Error::Io(error) = error {
-        let cause = error.get_ref();
-        if let Some(full) = cause.and_then(|cause| cause.downcast_ref::<BudgetFull>()) {
-            return (*full).into();
-        }
-        if cause.is_some_and(|cause| cause.is::<MessageTooSlow>()) {
-            return Problem::body_timeout();
-        }
-    }
-    Problem::malformed(format!("The message cannot be read: {error}."))
+/// What it means that a message cannot be read.
+fn unreadable(error: &Error) -> End {
+    let problem = match error {
+        // Its connection ends without a word before.
+        Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => return End::Gone,
+        Error::Io(error) => match error.get_ref() {
+            Some(cause) if cause.is::<MessageTooSlow>() => Problem::body_timeout(),
+            Some(cause) => match cause.downcast_ref::<BudgetFull>() {
+                Some(full) => (*full).into(),
+                None => return End::Gone,
+            },
+            None => return End::Gone,
+        },
+        error => Problem::malformed(format!("The message cannot be read: {error}.")),
+    };
+    End::Problem(problem)
 }
 
 /// Whether nothing can be tracked after this problem.
