@@ -48,6 +48,8 @@ pub(crate) struct Account {
     pub(crate) opening: Opening,
     /// What was sent up to the last answer; by frame.
     pub(crate) sent: Vec<Sent>,
+    /// What may have been sent instead: a stream does not tell which frames it has tracked.
+    pub(crate) others: Vec<Vec<Sent>>,
     /// What was sent after it, and had no answer.
     pub(crate) unanswered: Vec<Sent>,
     /// Which picture a stream sends next. It sends none a second time.
@@ -122,6 +124,7 @@ impl Caller {
         let account = Account {
             opening,
             sent: vec![sent(0)],
+            others: Vec::new(),
             unanswered: Vec::new(),
             drawn: 1,
             answers: Vec::new(),

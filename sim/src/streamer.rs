@@ -44,6 +44,7 @@ impl Caller {
                 }
             }
         }
+        account.choose();
         if ended.is_ok() {
             // What is on its way when the session ends has no answer.
             account.unanswered.clear();
@@ -107,9 +108,9 @@ impl Caller {
                 return Err(refusal(&answer));
             }
             let frame = account.unanswered.remove(0);
-            account.sent.push(frame);
+            account.push(frame);
             account.touched = now();
-            self.answered(session, account, &answer);
+            self.answered(session, account, account.sent.len() - 1, &answer);
         }
         Ok(())
     }
@@ -199,22 +200,20 @@ impl Caller {
             stored.push(message(&mut socket, TIMEOUT).await?);
         }
         let texts: Vec<String> = stored.iter().map(network::text).collect();
-        let Some(taken) = taken(account, &texts) else {
+        if !account.take(&texts) {
             let of = account.unanswered.len();
             self.fault(&format!("{of} frames have the answers {texts:?}"));
             return Err(Left::Gone("it has other frames".to_owned()));
-        };
-        account.unanswered.clear();
-        for (frame, answer) in taken.into_iter().zip(stored) {
-            account.sent.push(frame);
-            self.answered(session, account, &answer);
+        }
+        let first = account.sent.len() - stored.len();
+        for (index, answer) in stored.iter().enumerate() {
+            self.answered(session, account, first + index, answer);
         }
         Ok(socket)
     }
 
-    /// The last frame that was sent has this answer.
-    fn answered(&self, session: &str, account: &mut Account, answer: &Value) {
-        let frame = account.sent.len() - 1;
+    /// A frame has this answer.
+    fn answered(&self, session: &str, account: &mut Account, frame: usize, answer: &Value) {
         let told = answer["frame"].as_u64();
         if told != Some(frame as u64) {
             self.fault(&format!("a stream answers frame {told:?}, not {frame}"));
@@ -234,22 +233,55 @@ impl Caller {
     }
 }
 
-/// Which of the frames without an answer have these: as many of them, in their order.
-fn taken(account: &Account, answers: &[String]) -> Option<Vec<Sent>> {
-    let unanswered = &account.unanswered;
-    let first = account.sent.len();
-    // They are few: those of one stream.
-    (0..1_u32 << unanswered.len())
-        .filter(|chosen| chosen.count_ones() as usize == answers.len())
-        .map(|chosen| {
-            let all = unanswered.iter().enumerate();
-            let chosen = all.filter(|(index, _)| chosen >> index & 1 == 1);
-            chosen.map(|(_, frame)| *frame).collect::<Vec<Sent>>()
-        })
-        .find(|chosen| {
-            let frames = [account.sent.as_slice(), chosen.as_slice()].concat();
-            replay::answers(account.opening, &frames)[first..] == *answers
-        })
+impl Account {
+    fn push(&mut self, frame: Sent) {
+        self.sent.push(frame);
+        self.others.iter_mut().for_each(|sent| sent.push(frame));
+    }
+
+    /// As many of the frames without an answer were tracked, and have these answers. Two pictures may have the same one,
+    /// so several choices may have them. Whether there is any.
+    fn take(&mut self, answers: &[String]) -> bool {
+        let unanswered = std::mem::take(&mut self.unanswered);
+        let others = std::mem::take(&mut self.others);
+        let before = std::iter::once(&self.sent).chain(&others);
+        // They are few: those of one stream.
+        let choices: Vec<Vec<Sent>> = (0..1_u32 << unanswered.len())
+            .filter(|chosen| chosen.count_ones() as usize == answers.len())
+            .map(|chosen| {
+                let all = unanswered.iter().enumerate();
+                let chosen = all.filter(|(index, _)| chosen >> index & 1 == 1);
+                chosen.map(|(_, frame)| *frame).collect()
+            })
+            .collect();
+        let possible = before.flat_map(|sent| {
+            let with = |chosen: &Vec<Sent>| [sent.as_slice(), chosen.as_slice()].concat();
+            choices.iter().map(with)
+        });
+        let first = self.sent.len();
+        let mut possible = possible
+            .filter(|frames| replay::answers(self.opening, frames)[first..] == *answers)
+            .collect::<Vec<Vec<Sent>>>()
+            .into_iter();
+        let Some(sent) = possible.next() else {
+            self.unanswered = unanswered;
+            return false;
+        };
+        (self.sent, self.others) = (sent, possible.collect());
+        true
+    }
+
+    /// Of what may have been sent, takes what has all answers that came.
+    fn choose(&mut self) {
+        let has_all = |sent: &Vec<Sent>| {
+            let expected = replay::answers(self.opening, sent);
+            let mut answers = self.answers.iter();
+            answers.all(|(frame, answer)| expected.get(*frame) == Some(answer))
+        };
+        if let Some(right) = self.others.iter().position(has_all) {
+            self.sent = self.others.swap_remove(right);
+        }
+    }
 }
 
 /// The next message of the service.
