@@ -5,7 +5,8 @@
 # COMMIT is any other one. Exits with 3 where the clone does not have the commit, as a shallow one.
 #
 # The sources and the program are put into a folder of the commit, target/previous/COMMIT. What cargo builds on the way
-# is with that of this checkout (the build directory), so most crates from the registry are built once.
+# is with that of this checkout (the build directory), so most crates from the registry are built once. Crates of the
+# project get another version, for cargo would take them for those of this checkout.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -25,6 +26,11 @@ if [ ! -d "$folder/source" ]; then
     rm -rf "$folder"
     mkdir -p "$folder/part"
     git archive "$commit" | tar --extract --directory "$folder/part"
+    (
+        cd "$folder/part"
+        sed -i '/^\[workspace.package\]/,/^$/s/^version = "\(.*\)"/version = "\1+previous"/' Cargo.toml
+        cargo update --quiet --workspace
+    )
     mv "$folder/part" "$folder/source"
 fi
 cd "$folder/source"
