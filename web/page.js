@@ -203,7 +203,7 @@ export class Page {
     const { run } = this;
     if (!run) return;
     this.stage.show(shown.image, shownIn(run, shown.frame, shown.image), particles);
-    this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame);
+    this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, wholeLength(run));
     this.editing.list.show(run.objects, run.chosen);
     const isKnown = run.chosen?.rows.has(shown.frame) ?? false;
     button("backwards").disabled = !isKnown || shown.frame === 0 || run.isOver;
@@ -272,4 +272,11 @@ export class Page {
     this.repaint();
     this.changed();
   }
+}
+
+/** About the last frame of a video that is still tracked, as far as is known.
+ * @param {Run} run */
+function wholeLength({ hasAll, source: { duration = 0, rate = 0 } }) {
+  const last = Math.round(duration * rate);
+  return hasAll || !Number.isFinite(last) ? 0 : last;
 }
