@@ -28,13 +28,16 @@ export function rowOf({ box, score, status }, { frame, time, image }, size, corr
  * @param {import("./run.js").Run} run
  * @param {number} frame
  * @param {{width: number, height: number}} image
+ * @param {import("./objects.js").FollowedObject} [chosen] The one that stands out; all of them where there is none.
  * @returns {import("./stage.js").Shown[]} */
-export function shownIn({ objects, source }, frame, image) {
+export function shownIn({ objects, source }, frame, image, chosen) {
   const isNamed = objects.length > 1;
-  return objects.flatMap(({ rows, name, color, isShown }) => {
+  return objects.flatMap((object) => {
+    const { rows, name, color, isShown } = object;
     const row = rows.get(frame);
     if (!row || !isShown) return [];
     const box = scaled(row.box, image, source.size);
-    return [{ box, color, name: isNamed ? name : "", isLost: row.status === "lost" }];
+    const isChosen = !chosen || object === chosen;
+    return [{ box, color, name: isNamed ? name : "", isLost: row.status === "lost", isChosen }];
   });
 }

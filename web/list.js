@@ -39,12 +39,10 @@ export class ObjectList {
   /** @param {FollowedObject} object */
   item(object) {
     const item = document.createElement("li");
+    item.style.setProperty("--color", object.color);
     const radio = input("radio", `Choose ${object.name}`);
     radio.name = "object";
     radio.addEventListener("change", () => this.told.choose(object));
-    const swatch = document.createElement("span");
-    swatch.className = "swatch";
-    swatch.style.setProperty("background", object.color);
     const name = input("text", "Name");
     name.value = object.name;
     name.addEventListener("input", () => {
@@ -57,9 +55,9 @@ export class ObjectList {
       object.isShown = shown.checked;
       this.told.change();
     });
-    const doubt = button("Next doubt", `Next doubtful frame of ${object.name}`, () => this.told.doubt(object));
-    const remove = button("Delete", `Delete ${object.name}`, () => this.told.remove(object));
-    item.append(radio, swatch, name, shown, doubt, remove);
+    const doubt = button("doubt", `Next doubtful frame of ${object.name}`, () => this.told.doubt(object));
+    const remove = button("remove", `Delete ${object.name}`, () => this.told.remove(object));
+    item.append(radio, name, shown, doubt, remove);
     return item;
   }
 }
@@ -72,19 +70,21 @@ function input(type, label) {
   const element = document.createElement("input");
   element.type = type;
   element.setAttribute("aria-label", label);
+  if (type !== "text") element.title = label;
   return element;
 }
 
 /**
- * @param {string} text
+ * @param {string} icon
  * @param {string} label
  * @param {() => void} act
  */
-function button(text, label, act) {
+function button(icon, label, act) {
   const element = document.createElement("button");
   element.type = "button";
-  element.textContent = text;
+  element.className = `icon quiet ${icon}`;
   element.setAttribute("aria-label", label);
+  element.title = label;
   element.addEventListener("click", act);
   return element;
 }

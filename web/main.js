@@ -50,7 +50,17 @@ get("timeline").addEventListener("keydown", ({ key }) => (key === "d" ? step(-1)
 
 input("see").addEventListener("change", () => {
   if (page.run) page.run.sees = page.seen.isOn;
-  get("seen").hidden = !page.seen.isOn || !page.seen.hasShown;
+  page.seen.fit();
+});
+addEventListener("click", ({ target }) => {
+  const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
+  if (page.run && target instanceof Node && !sources.contains(target)) sources.open = false;
+});
+get("sources").addEventListener("keydown", ({ key }) => {
+  const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
+  if (!page.run || key !== "Escape") return;
+  sources.open = false;
+  sources.querySelector("summary")?.focus();
 });
 get("key-form").addEventListener("submit", (event) => {
   event.preventDefault();

@@ -28,7 +28,7 @@ export class Page {
     this.client = new Client(new URL(".", location.href), { patience: 1500 });
     this.local = new LocalClient();
     this.message = new Message(get("message"));
-    this.stage = new Stage(canvas("picture"));
+    this.stage = new Stage(canvas("picture"), canvas("overlay"));
     this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame));
     this.seen = new Seen();
     this.editing = new Editing(this);
@@ -37,6 +37,8 @@ export class Page {
     this.run = undefined;
     /** @type {Picture | undefined} An earlier frame that is shown. */
     this.viewed = undefined;
+    /** @type {number[][] | undefined} Of the last frame. */
+    this.particles = undefined;
     /** Counts the frames that are to be shown: one that is overtaken by another is dropped. */
     this.view = 0;
     /** @type {Promise<Picture> | undefined} What the camera saw as the drawing began. */
@@ -68,6 +70,7 @@ export class Page {
 
   /** @param {State} state */
   enter(state) {
+    const sources = /** @type {HTMLDetailsElement} */ (get("sources"));
     this.state = state;
     document.body.dataset.state = state;
     const has = (/** @type {string | undefined} */ states) => (states ?? "").split(" ").includes(state);
@@ -80,7 +83,7 @@ export class Page {
     get("begin").hidden = state !== "first" || !this.run?.source.goTo;
     get("hand-over").hidden = !this.run?.isLocal;
     button("pause").textContent = state === "paused" ? "Go on" : "Pause";
-    if (!this.seen.hasShown) get("seen").hidden = true;
+    sources.open = state === "start";
   }
 
   /** @param {string} text
@@ -118,6 +121,7 @@ export class Page {
       this.stage.draw(undefined);
       this.stage.show(first.image);
       prepareSaving();
+      this.seen.prepare().catch(() => undefined);
       if (resume) return await resume(this.run);
       this.enter("first");
       this.beginning.reset();
@@ -183,7 +187,6 @@ export class Page {
   async follow(own, box) {
     this.message.follow();
     this.again = () => this.follow(own, box);
-    this.seen.given(this.stage, box);
     await this.beginning.going;
     this.enter("following");
     try {
@@ -202,7 +205,7 @@ export class Page {
   show(shown, particles) {
     const { run } = this;
     if (!run) return;
-    this.stage.show(shown.image, shownIn(run, shown.frame, shown.image), particles);
+    this.stage.show(shown.image, shownIn(run, shown.frame, shown.image, run.chosen), particles);
     this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, wholeLength(run));
     this.editing.list.show(run.objects, run.chosen);
     const isKnown = run.chosen?.rows.has(shown.frame) ?? false;
@@ -211,20 +214,22 @@ export class Page {
 
   /** Shows again what is shown, after a change. */
   repaint() {
-    if (this.hasRows && this.shown) this.show(this.shown);
+    const isLast = !this.viewed && this.seen.shown === this.run?.chosen;
+    if (this.hasRows && this.shown) this.show(this.shown, isLast ? this.particles : undefined);
   }
 
   /** @type {import("./run.js").Told["answer"]} */
   answered(shown, answer) {
     const { run } = this;
     if (!run) return;
+    this.particles = answer?.particles;
     // Who looks at an earlier frame goes on doing so.
     if (!this.viewed) this.show(shown, answer?.particles);
     this.seen.figures(run, answer);
     this.isUnsaved = run.frames.times.size > 1;
     this.changed();
     if (!answer) return;
-    this.seen.take(run, answer, this.stage);
+    this.seen.take(run, shown, answer);
     this.message.take(answer.status);
   }
 

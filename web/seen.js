@@ -1,40 +1,57 @@
-// What the tracker sees beside the picture: the target as given and as found, the bag with its votes, the figures.
+// What the tracker sees beside the picture: where it searches, the target as given and as found, the bag with its votes,
+// the figures.
 
+import { scaled } from "./boxes.js";
 import { canvas, get, input } from "./dom.js";
+import { close } from "./frames.js";
+import { copyPatch } from "./stage.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
+ * @typedef {import("./objects.js").FollowedObject} FollowedObject
  * @typedef {import("./run.js").Run} Run
- * @typedef {import("./stage.js").Stage} Stage
+ * @typedef {import("./source.js").Picture} Picture
  */
 
 /** From this width of the window on there is room beside the picture. */
 const ROOM = matchMedia("(min-width: 64rem)");
 /** Milliseconds after which the bag is shown again. */
-const BAG_EVERY = 2000;
+const BAG_EVERY = 1000;
 
 export class Seen {
   constructor() {
+    /** @type {{search: import("./search.js").Search, votes: import("./votes.js").Votes} | undefined} */
+    this.views = undefined;
     this.hasShown = false;
     this.bagShownAt = 0;
+    this.bagSize = 0;
+    /** @type {FollowedObject | undefined} The one that is shown. */
+    this.shown = undefined;
     input("see").checked = ROOM.matches;
+    this.fit();
   }
 
   get isOn() {
     return input("see").checked;
   }
 
-  reset() {
-    this.hasShown = false;
-    this.bagShownAt = 0;
+  /** Loads what draws it: the first screen does not need it. */
+  async prepare() {
+    const [{ Search }, { Votes }] = await Promise.all([import("./search.js"), import("./votes.js")]);
+    this.views ??= { search: new Search(canvas("search")), votes: new Votes(canvas("votes"), canvas("bag")) };
   }
 
-  /** The target as it was given.
-   * @param {Stage} stage
-   * @param {import("./js/bagtrack.js").Box} box */
-  given(stage, box) {
-    stage.copyPatch(canvas("first-patch"), box);
-    stage.copyPatch(canvas("patch"), box);
+  reset() {
+    this.hasShown = false;
+    this.shown = undefined;
+    this.views?.votes.reset();
+    this.fit();
+  }
+
+  /** Shows or hides what there is. */
+  fit() {
+    get("seen-now").hidden = !this.isOn || !this.hasShown;
+    get("seen-later").hidden = !this.isOn || this.hasShown;
   }
 
   /** @param {Run} run
@@ -47,56 +64,51 @@ export class Seen {
     set("skipped", String(run.skipped));
     if (!answer) return;
     set("status", answer.status);
-    get("status").className = answer.status;
+    get("figures").className = answer.status;
+    get("figures").style.setProperty("--score", String(answer.score));
     set("score", answer.score.toFixed(2));
   }
 
   /**
    * @param {Run} run
+   * @param {Picture} picture
    * @param {Answer} answer Of the chosen object.
-   * @param {Stage} stage
    */
-  take(run, answer, stage) {
-    if (!answer.votes || !this.isOn) return;
+  take(run, { image }, { box, status, particles = [], votes }) {
+    const [{ chosen }, { views }] = [run, this];
+    if (!votes || !this.isOn || !chosen || !views) return;
     this.hasShown = true;
-    get("seen").hidden = false;
-    this.bag(run);
-    showVotes(canvas("votes"), answer.votes);
-    if (answer.status !== "lost") stage.copyPatch(canvas("patch"), answer.box);
+    this.fit();
+    if (chosen !== this.shown) this.given(run, chosen);
+    this.bag(chosen, votes.length);
+    views.search.show(image, box, particles, chosen.color);
+    views.votes.show(votes);
+    if (status !== "lost") copyPatch(canvas("patch"), image, box);
   }
 
-  /** Shows the bag, now and then.
-   * @param {Run} run */
-  async bag(run) {
+  /** Shows an object as it was given.
+   * @param {Run} run
+   * @param {FollowedObject} object */
+  async given(run, object) {
+    this.shown = object;
+    this.bagShownAt = 0;
+    const row = [...object.rows.values()].find(({ corrected }) => corrected);
+    const picture = row && (await run.frames.at(row.frame));
+    if (!picture) return;
+    if (this.shown === object) copyPatch(canvas("first-patch"), picture.image, scaled(row.box, picture.image, run.source.size));
+    close(picture);
+  }
+
+  /** Shows the bag of an object, now and then and when it grows.
+   * @param {FollowedObject} object
+   * @param {number} size */
+  async bag(object, size) {
     const now = performance.now();
-    if (now - this.bagShownAt < BAG_EVERY) return;
+    if (now - this.bagShownAt < BAG_EVERY && size === this.bagSize) return;
     this.bagShownAt = now;
+    this.bagSize = size;
     // The session may end meanwhile; then the last picture stays.
-    const blob = await run.chosen?.follower.bag().catch(() => undefined);
-    const shown = /** @type {HTMLImageElement} */ (get("bag"));
-    if (!blob) return;
-    if (shown.src) URL.revokeObjectURL(shown.src);
-    shown.src = URL.createObjectURL(blob);
-    shown.hidden = false;
+    const blob = await object.follower.bag().catch(() => undefined);
+    if (blob && object === this.shown) await this.views?.votes.take(blob);
   }
-}
-
-/** The votes as bars.
- * @param {HTMLCanvasElement} chart
- * @param {number[]} votes */
-function showVotes(chart, votes) {
-  const ratio = devicePixelRatio;
-  chart.width = Math.round(chart.clientWidth * ratio);
-  chart.height = Math.round(chart.clientHeight * ratio);
-  const context = chart.getContext("2d");
-  if (!context || votes.length === 0) return;
-  const most = Math.max(...votes);
-  const width = chart.width / votes.length;
-  context.fillStyle = getComputedStyle(chart).getPropertyValue("--accent");
-  votes.forEach((vote, index) => {
-    const height = (vote / most) * (chart.height - 8 * ratio);
-    context.fillRect(index * width + ratio, chart.height - height, width - 2 * ratio, height);
-  });
-  const first = Math.round(100 * votes[0]);
-  chart.setAttribute("aria-label", `${votes.length} subspaces; the first has ${first} % of the vote`);
 }

@@ -1,4 +1,6 @@
-// The picture with its box and particles.
+// The picture, and over it what is known of it: boxes and particles, as sharp as the screen is.
+
+import { paintParticles } from "./particles.js";
 
 /** @typedef {import("./js/bagtrack.js").Box} Box */
 
@@ -8,16 +10,27 @@
  * @property {string} color
  * @property {string} name Empty where there is one object alone.
  * @property {boolean} isLost
+ * @property {boolean} isChosen
  */
 
 /** Of a box that is being drawn. */
 const DRAWN = "#ffffff";
+const DARK = "#0b0c0f";
+/** What is outside of it. */
+const OUTSIDE = "#0b0c0f73";
+/** Pixels of the screen in the width of a picture that is not on a screen. */
+const USUAL_WIDTH = 640;
 
 export class Stage {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {HTMLCanvasElement} overlay
+   */
+  constructor(canvas, overlay) {
     this.canvas = canvas;
+    this.overlay = overlay;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    this.over = /** @type {CanvasRenderingContext2D} */ (overlay.getContext("2d"));
     /** @type {ImageBitmap | HTMLCanvasElement | undefined} The picture that is shown. */
     this.image = undefined;
     /** @type {Shown[]} */
@@ -26,6 +39,7 @@ export class Stage {
     this.particles = [];
     /** @type {Box | undefined} The box that is being drawn. */
     this.drawn = undefined;
+    new ResizeObserver(() => this.paint()).observe(overlay);
   }
 
   /**
@@ -40,8 +54,9 @@ export class Stage {
     this.particles = particles;
     if (canvas.width !== image.width || canvas.height !== image.height) {
       [canvas.width, canvas.height] = [image.width, image.height];
-      canvas.style.setProperty("--aspect", String(image.width / image.height));
+      canvas.parentElement?.style.setProperty("--aspect", String(image.width / image.height));
     }
+    this.context.drawImage(image, 0, 0);
     this.paint();
   }
 
@@ -51,63 +66,84 @@ export class Stage {
     this.paint();
   }
 
+  /** Paints what is over the picture, in the picture's coordinates. */
   paint() {
-    if (!this.image) return;
-    this.context.drawImage(this.image, 0, 0);
-    if (this.drawn) {
-      paintBox(this.context, { box: this.drawn, color: DRAWN, name: "", isLost: true });
-      return;
-    }
-    this.dots(this.particles);
-    for (const object of this.objects) paintBox(this.context, object);
+    const { canvas, over, overlay } = this;
+    if (!this.image || overlay.clientWidth === 0) return;
+    const width = Math.round(overlay.clientWidth * devicePixelRatio);
+    const height = Math.round(overlay.clientHeight * devicePixelRatio);
+    if (overlay.width !== width || overlay.height !== height) [overlay.width, overlay.height] = [width, height];
+    over.setTransform(width / canvas.width, 0, 0, height / canvas.height, 0, 0);
+    over.clearRect(0, 0, canvas.width, canvas.height);
+    const unit = canvas.width / overlay.clientWidth;
+    if (this.drawn) return this.paintDrawn(this.drawn, unit);
+    paintParticles(over, this.particles, unit);
+    for (const object of this.objects) paintBox(over, object, unit);
   }
 
-  /** @param {number[][]} particles Likeliest first. */
-  dots(particles) {
-    const { context } = this;
-    const unit = this.canvas.width / 320;
-    const most = particles[0]?.[3] || 1;
-    for (const [x, y, , weight] of [...particles].reverse()) {
-      const share = Math.sqrt(weight / most);
-      context.beginPath();
-      context.arc(x, y, (0.7 + 2.3 * share) * unit, 0, 2 * Math.PI);
-      context.fillStyle = `hsl(${190 - 140 * share} 95% 60% / ${0.35 + 0.55 * share})`;
-      context.fill();
-    }
-  }
-
-  /** Copies what is in a box, into a square canvas.
-   * @param {HTMLCanvasElement} target
-   * @param {Box} box */
-  copyPatch(target, box) {
-    if (!this.image || !(box.width > 0 && box.height > 0)) return;
-    target.width = target.height = 112;
-    const scale = target.width / Math.max(box.width, box.height);
-    const [width, height] = [box.width * scale, box.height * scale];
-    const left = (target.width - width) / 2;
-    const top = (target.height - height) / 2;
-    target.getContext("2d")?.drawImage(this.image, box.x, box.y, box.width, box.height, left, top, width, height);
+  /** The box that is being drawn; the rest is darker.
+   * @param {Box} box
+   * @param {number} unit */
+  paintDrawn(box, unit) {
+    const { canvas, over } = this;
+    over.fillStyle = OUTSIDE;
+    over.beginPath();
+    over.rect(0, 0, canvas.width, canvas.height);
+    over.rect(box.x, box.y, box.width, box.height);
+    over.fill("evenodd");
+    const name = `${Math.round(box.width)} × ${Math.round(box.height)}`;
+    paintBox(over, { box, color: DRAWN, name, isLost: false, isChosen: true }, unit);
   }
 }
 
-/** Paints the box of an object, dashed where it is lost.
+/** Copies what is in a box of an image, into a square canvas.
+ * @param {HTMLCanvasElement} target
+ * @param {ImageBitmap | HTMLCanvasElement} image
+ * @param {Box} box */
+export function copyPatch(target, image, box) {
+  if (!(box.width > 0 && box.height > 0)) return;
+  target.width = target.height = Math.round(target.clientWidth * devicePixelRatio) || 224;
+  const scale = target.width / Math.max(box.width, box.height);
+  const [width, height] = [box.width * scale, box.height * scale];
+  const left = (target.width - width) / 2;
+  const top = (target.height - height) / 2;
+  target.getContext("2d")?.drawImage(image, box.x, box.y, box.width, box.height, left, top, width, height);
+}
+
+/** Paints the box of an object, dashed where it is lost, and its name.
  * @param {CanvasRenderingContext2D} context
- * @param {Shown} object */
-export function paintBox(context, { box: { x, y, width, height }, color, name, isLost }) {
-  const unit = context.canvas.width / 320;
-  context.setLineDash(isLost ? [5 * unit, 3 * unit] : []);
-  for (const [line, style] of /** @type {const} */ ([[2.75, "#000000aa"], [1.25, color]])) {
+ * @param {Shown} object
+ * @param {number} [unit] A pixel of the screen. */
+export function paintBox(context, { box, color, name, isLost, isChosen }, unit = context.canvas.width / USUAL_WIDTH) {
+  const { x, y, width, height } = box;
+  context.setLineDash(isLost ? [7 * unit, 5 * unit] : []);
+  for (const [line, style] of /** @type {const} */ ([[isChosen ? 4.5 : 3.5, `${DARK}99`], [isChosen ? 2.5 : 1.5, color]])) {
     context.lineWidth = line * unit;
     context.strokeStyle = style;
-    context.strokeRect(x, y, width, height);
+    context.beginPath();
+    context.roundRect(x, y, width, height, 3 * unit);
+    context.stroke();
   }
   context.setLineDash([]);
-  if (!name) return;
-  context.font = `600 ${9 * unit}px system-ui, sans-serif`;
-  const [left, base] = [x, Math.max(y - 3 * unit, 9 * unit)];
-  context.lineWidth = 2 * unit;
-  context.strokeStyle = "#000000aa";
-  context.strokeText(name, left, base);
-  context.fillStyle = color;
-  context.fillText(name, left, base);
+  if (name) paintName(context, name, x, y, isChosen ? [color, DARK] : [`${DARK}cc`, color], unit);
+}
+
+/** Paints a name over the upper left corner of a box; inside where there is no room over it.
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} name
+ * @param {number} x
+ * @param {number} y
+ * @param {string[]} colors Of the ground and of the text.
+ * @param {number} unit */
+function paintName(context, name, x, y, [ground, text], unit) {
+  context.font = `600 ${12 * unit}px system-ui, sans-serif`;
+  const [width, height] = [context.measureText(name).width + 12 * unit, 20 * unit];
+  const [left, top] = [Math.max(0, x - unit), y < height + 4 * unit ? Math.max(0, y) + 4 * unit : y - height - 4 * unit];
+  context.fillStyle = ground;
+  context.beginPath();
+  context.roundRect(left, top, width, height, 5 * unit);
+  context.fill();
+  context.fillStyle = text;
+  context.textBaseline = "middle";
+  context.fillText(name, left + 6 * unit, top + height / 2);
 }

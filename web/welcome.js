@@ -42,21 +42,24 @@ function paint(context, frame) {
   });
   const isLost = score < 0.25;
   context.setLineDash(isLost ? [8, 6] : []);
-  for (const [line, style] of /** @type {const} */ ([[5, "#00000088"], [2.5, isLost ? LOST : COLOR]])) {
+  for (const [line, style] of /** @type {const} */ ([[3.5, "#00000088"], [1.75, isLost ? LOST : COLOR]])) {
     context.lineWidth = line;
     context.strokeStyle = style;
     context.strokeRect(box.x, box.y, box.width, box.height);
   }
   context.setLineDash([]);
   context.fillStyle = isLost ? LOST : COLOR;
-  context.fillRect(box.x - 1.25, box.y - 9, (box.width + 2.5) * Math.min(1, score), 4);
+  context.fillRect(box.x, box.y - 6, box.width * Math.min(1, score), 2.5);
 }
 
 /** Plays the clip as long as the first screen is shown. */
 export function playWelcome() {
   const own = canvas("hero");
-  [own.width, own.height] = [WIDTH, HEIGHT];
+  // As sharp as where it is shown, up to twice.
+  const scale = Math.min(2, Math.max(1, (own.clientWidth * devicePixelRatio) / WIDTH));
+  [own.width, own.height] = [WIDTH * scale, HEIGHT * scale];
   const context = /** @type {CanvasRenderingContext2D} */ (own.getContext("2d"));
+  context.scale(own.width / WIDTH, own.height / HEIGHT);
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   let painted = -1;
   /** @param {number} now */

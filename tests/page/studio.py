@@ -92,7 +92,7 @@ def objects_in(checks, where):
     assert all(abs(one - other) <= 1 for one, other in zip(numbers(redone[CORRECTED]), box)), redone[CORRECTED]
     assert values(redone[CORRECTED:]) != values(first[CORRECTED:])
     check_exports(page, after)
-    page.locator("#list li:nth-child(2)").get_by_text("Delete").click()
+    page.get_by_role("button", name="Delete Object 2").click()
     assert not of_target(rows(page), 1)
     page.context.close()
 

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 60] = [
+const FILES: [File; 63] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -75,6 +75,7 @@ const FILES: [File; 60] = [
     file!("message.js", SCRIPT),
     file!("objects.js", SCRIPT),
     file!("page.js", SCRIPT),
+    file!("particles.js", SCRIPT),
     file!("playback.js", SCRIPT),
     file!("problems.js", SCRIPT),
     file!("project.js", SCRIPT),
@@ -83,12 +84,14 @@ const FILES: [File; 60] = [
     file!("save.js", SCRIPT),
     file!("saving.js", SCRIPT),
     file!("scene.js", SCRIPT),
+    file!("search.js", SCRIPT),
     file!("seen.js", SCRIPT),
     file!("source.js", SCRIPT),
     file!("sources.js", SCRIPT),
     file!("stage.js", SCRIPT),
     file!("stills.js", SCRIPT),
     file!("timeline.js", SCRIPT),
+    file!("votes.js", SCRIPT),
     file!("welcome-rows.js", SCRIPT),
     file!("welcome.js", SCRIPT),
     file!("zip.js", SCRIPT),
