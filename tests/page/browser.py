@@ -107,6 +107,19 @@ def drag(page, box):
     page.mouse.up()
 
 
+def painted(page, *names):
+    """That something is painted on these canvases."""
+    blank = page.evaluate(
+        """(names) => names.filter((name) => {
+            const canvas = document.getElementById(name);
+            const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            return !pixels.data.some((value, at) => at % 4 === 3 && value > 0);
+        })""",
+        list(names),
+    )
+    assert not blank, f"nothing on {blank}"
+
+
 def begin_at(page, time, frame):
     """Moves the bar under the first picture, and waits for the frame."""
     moved = "(bar, at) => { bar.value = String(at); bar.dispatchEvent(new Event('input')); }"

@@ -34,6 +34,13 @@ MAX_BYTES = 200_000
 MAX_SECONDS_TO_PICTURE = 1.0
 EXAMPLES = WEB.parent / "clients" / "js" / "examples"
 PICTURE = "document.getElementById('picture').toDataURL('image/png')"
+LEAST_TARGET = 44
+"""Least side of what a finger presses, in pixels of the screen."""
+SMALL = """(least) => [...document.querySelectorAll("button, summary, a, input, canvas[role=slider]")]
+    .map((element) => element.closest("label") ?? element)
+    .filter((element) => element.checkVisibility() && !element.classList.contains("hidden"))
+    .filter((element) => Math.min(element.offsetWidth, element.offsetHeight) < least)
+    .map((element) => element.outerHTML)"""
 
 
 def opened(page, start):
@@ -152,6 +159,7 @@ def phone_by_touch(checks):
             finger("touchMove", (x, y - 12 * step))
             page.wait_for_timeout(16)
         finger("touchEnd")
+        stands_still(page)
         scrolled = page.evaluate("scrollY") - before
         assert scrolled > 50, scrolled
         page.evaluate("y => scrollTo(0, y)", before)
@@ -173,10 +181,30 @@ def phone_by_touch(checks):
     checks.shot(page, "phone")
     width = page.evaluate("document.documentElement.scrollWidth")
     assert width <= 390, f"{width} px wide"
+    small = page.evaluate(SMALL, LEAST_TARGET)
+    assert not small, small
     to_the_end(page)
+    stays_while_scrolled(page)
     table = rows(page)
     assert near(table, truth) >= 100 and len(table) == 150
     page.context.close()
+
+
+def stands_still(page):
+    """Waits until the page rolls no more: a tap would only stop it."""
+    before = None
+    while (now := page.evaluate("scrollY")) != before:
+        before = now
+        page.wait_for_timeout(100)
+
+
+def stays_while_scrolled(page):
+    """The picture stays, and the buttons are at the lower edge, while what is under them is scrolled to its end."""
+    page.locator("#results").get_by_text("Label Studio").scroll_into_view_if_needed()
+    assert page.evaluate("scrollY") > 200
+    picture, controls = (page.locator(name).bounding_box() for name in ("#picture", "#controls"))
+    assert picture["y"] >= 0 and picture["y"] + picture["height"] < controls["y"], (picture, controls)
+    assert round(controls["y"] + controls["height"]) == 844, controls
 
 
 def keyboard_alone(checks):

@@ -3,7 +3,7 @@
 import json
 import subprocess
 
-from browser import DRAW, choose, drag, frames, near, numbers, rows, said, to_the_end
+from browser import DRAW, choose, drag, frames, near, numbers, painted, rows, said, to_the_end
 from clips import FRAMES, H264
 from files import sent_box
 
@@ -34,6 +34,7 @@ def sample_in_the_page(checks):
     drag(page, truth[0])
     frames(page, 60)
     page.locator("#bag").wait_for()
+    painted(page, "overlay", "timeline", "search", "patch", "first-patch", "votes", "bag")
     checks.no_axe_violations(page, "following in the page")
     checks.shot(page, "local-light")
     print(f"  {page.locator('#rate').inner_text()} frames/s, {page.locator('#trip').inner_text()}")

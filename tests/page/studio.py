@@ -3,6 +3,7 @@
 import io
 import json
 import re
+import time
 import xml.etree.ElementTree
 import zipfile
 
@@ -80,6 +81,7 @@ def objects_in(checks, where):
     assert numbers(second[0]) == [20, 20, 60, 60], second[0]
 
     to_frame(page, CORRECTED)
+    mouse_tells_a_frame(page)
     checks.shot(page, f"earlier-{where}")
     box = [30, 200, 80, 60]
     drag(page, box)
@@ -95,6 +97,19 @@ def objects_in(checks, where):
     page.get_by_role("button", name="Delete Object 2").click()
     assert not of_target(rows(page), 1)
     page.context.close()
+
+
+def mouse_tells_a_frame(page):
+    """Where the mouse is over the timeline, a line with the frame and its score is drawn."""
+    timeline = page.locator("#timeline")
+    drawn = lambda: timeline.evaluate("canvas => canvas.toDataURL('image/png')")
+    before = drawn()
+    timeline.hover(position={"x": 100, "y": 40})
+    late = time.monotonic() + 10
+    while drawn() == before:
+        assert time.monotonic() < late, "it tells nothing"
+        page.wait_for_timeout(50)
+    assert timeline.get_attribute("aria-valuenow") == str(CORRECTED), "the mouse has moved it"
 
 
 def check_exports(page, table):
