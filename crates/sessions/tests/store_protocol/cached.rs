@@ -117,6 +117,24 @@ async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
 }
 
 #[tokio::test]
+async fn the_state_is_written_at_every_third_frame_and_at_each_before_the_end() {
+    let store: Arc<dyn SessionStore> = Arc::new(MemoryStore::default());
+    let replica = service(Some(store.clone()), 3);
+    open(&replica, ID, start()).await;
+    for (number, checkpoint) in [(1, 0), (2, 0), (3, 3), (4, 3)] {
+        let tracked = send(&replica, Some(number), picture(0, number)).await;
+        assert_eq!(tracked.unwrap().checkpoint, Some(checkpoint));
+    }
+    replica.drain();
+    let tracked = send(&replica, Some(5), picture(0, 5)).await.unwrap();
+    assert_eq!(tracked.checkpoint, Some(5));
+    // Another replica goes on from there.
+    let other = service(Some(store), 3);
+    let tracked = send(&other, Some(6), picture(0, 6)).await.unwrap();
+    assert_eq!(tracked.checkpoint, Some(5));
+}
+
+#[tokio::test]
 async fn what_another_replica_has_answered_is_answered_again() {
     let [first, other] = two().await;
     for number in 1..=3 {
