@@ -3,8 +3,10 @@
 import { LONGEST_SIDE, drawScaled, encoded } from "./source.js";
 import { Stills } from "./stills.js";
 
-/** Images have no times of their own. */
+/** Images of a folder have no times of their own. */
 const FRAMES_A_SECOND = 25;
+/** Bytes within which such a comment ends. */
+const LONGEST_COMMENT = 64;
 const IMAGE = /\.(jpe?g|png|webp|bmp|gif|avif)$/i;
 
 /** Whether a file is an image that a browser may show.
@@ -13,6 +15,27 @@ export const isImage = (file) => file.type.startsWith("image/") || IMAGE.test(fi
 
 /** @param {File} file */
 const pathOf = (file) => file.webkitRelativePath || file.name;
+
+/** The time in a JPEG file that the service made of a frame of a video: in its first comment.
+ * @param {File} file */
+async function timeIn(file) {
+  // A byte that is no text is read as one character.
+  const head = await file.slice(0, LONGEST_COMMENT).text();
+  const time = /^.{6}time=(-?[\d.]+)/s.exec(head)?.[1];
+  return time === undefined ? undefined : Number(time);
+}
+
+/** The times of such files; nothing where they are other images.
+ * @param {File[]} images */
+async function timesIn(images) {
+  const times = [];
+  for (const image of images) {
+    const time = await timeIn(image);
+    if (time === undefined) return undefined;
+    times.push(time);
+  }
+  return times;
+}
 
 /** @param {File[]} files Images, all of one size. */
 export async function openImages(files) {
@@ -38,6 +61,8 @@ export async function openImages(files) {
     return { ...shown, image, blob: await encoded(image) };
   };
   source.count = images.length;
+  source.times = await timesIn(images);
+  if (source.times && images.length > 1) source.rate = (images.length - 1) / source.duration;
   await source.first();
   source.size = size ?? source.size;
   source.files = images;

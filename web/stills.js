@@ -22,6 +22,8 @@ export class Stills {
     /** @type {number} */
     this.rate = rate;
     this.load = load;
+    /** @type {number[] | undefined} In seconds, ascending, where they are not those of the rate. */
+    this.times = undefined;
     this.skipped = 0;
     /** How many there are. */
     this.count = 0;
@@ -36,7 +38,12 @@ export class Stills {
   }
 
   get duration() {
-    return (this.count - 1) / this.rate;
+    return this.timeOf(this.count - 1);
+  }
+
+  /** @param {number} index */
+  timeOf(index) {
+    return this.times ? this.times[index] : index / this.rate;
   }
 
   async first() {
@@ -45,7 +52,12 @@ export class Stills {
 
   /** @param {number} time */
   goTo(time) {
-    this.index = Math.min(Math.max(0, this.count - 1), Math.round(time * this.rate));
+    let index = Math.min(Math.max(0, this.count - 1), Math.round(time * this.rate));
+    // The rate may be that of the mean. The nearest in time is not far.
+    const distance = (/** @type {number} */ at) => Math.abs(this.timeOf(at) - time);
+    while (index > 0 && distance(index - 1) < distance(index)) index -= 1;
+    while (index + 1 < this.count && distance(index + 1) < distance(index)) index += 1;
+    this.index = index;
     return this.picture(this.index);
   }
 
@@ -58,7 +70,7 @@ export class Stills {
    * @returns {Promise<Picture>} */
   async picture(index) {
     const blob = await this.load(index);
-    return { blob, image: await createImageBitmap(blob), time: index / this.rate, frame: index };
+    return { blob, image: await createImageBitmap(blob), time: this.timeOf(index), frame: index };
   }
 
   /** @param {number} index */
@@ -82,7 +94,7 @@ export class Stills {
       for (let next = index; next < Math.min(index + AHEAD, this.count); next += 1) this.ahead(next);
       const picture = await this.ahead(index);
       this.loaded.delete(index);
-      due = Math.max(due + 1000 / this.rate, performance.now() - 100);
+      due = Math.max(due + 1000 * (this.timeOf(index) - this.timeOf(index - 1)), performance.now() - 100);
       do {
         await new Promise((resolve) => setTimeout(resolve, Math.max(0, due - performance.now())));
         if (this.isHeld) due = performance.now() + 10;

@@ -50,8 +50,8 @@ fn output(bytes: &[u8]) {
     let Ok((pictures, damage)) = read_output(written, said, MAX_BYTES) else {
         return;
     };
-    assert!(pictures.iter().all(|picture| picture.len() <= MAX_BYTES));
-    let all: usize = pictures.iter().map(Vec::len).sum();
+    assert!(pictures.iter().all(|picture| picture.jpeg.len() <= MAX_BYTES));
+    let all: usize = pictures.iter().map(|picture| picture.jpeg.len()).sum();
     assert!(all <= written.len());
     if let Some(damage) = damage {
         assert!(damage.chars().count() <= MAX_SAID && !damage.contains('\n'));
@@ -64,7 +64,7 @@ fn output(bytes: &[u8]) {
         ..Limits::default()
     };
     for picture in pictures.iter().take(2) {
-        if let Ok(frame) = decode(picture, &limits) {
+        if let Ok(frame) = decode(&picture.jpeg, &limits) {
             recycle(frame);
         }
     }

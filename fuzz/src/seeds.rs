@@ -56,13 +56,13 @@ impl Seeds {
         for (name, file) in files {
             self.write("video", name, &[&[0], file].concat())?;
         }
-        let part = |picture: &[u8]| {
+        let shown = |picture: &[u8]| {
             let length = picture.len();
-            let head =
-                format!("--ffmpeg\r\nContent-type: image/jpeg\r\nContent-length: {length}\r\n\r\n");
-            [head.as_bytes(), picture, b"\r\n"].concat()
+            let line = format!("0, 40000, 40000, 40000, {length}, 0x034c072f, S=1, 8\n");
+            [line.as_bytes(), picture].concat()
         };
-        let written = [part(&jpeg(0)), part(&jpeg(1)), b"--ffmpeg--\r\n".to_vec()].concat();
+        let head = b"#software: Lavf59.27.100\n#tb 0: 1/1000000\n".to_vec();
+        let written = [head, shown(&jpeg(0)), shown(&jpeg(1))].concat();
         let noise = "[cache @ 0x55] Inner protocol failed to seekback end : -38\n    Last message repeated 1 times\n";
         let unlisted = "[matroska @ 0x55] Codec (vorbis) not on whitelist 'h264,vp8'\n";
         let damage = "[h264 @ 0x55] error while decoding MB 3 4, bytestream -5\r\n";

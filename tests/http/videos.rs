@@ -52,10 +52,17 @@ pub fn video(extension: &str) -> Vec<u8> {
 
 /// So many pictures of ffmpeg's own test pattern, 320 by 240 pixels, as a video of this kind.
 fn pattern(extension: &str, pictures: u32) -> Vec<u8> {
+    filtered(extension, pictures, &[])
+}
+
+/// The same, with further arguments.
+fn filtered(extension: &str, pictures: u32, arguments: &[&str]) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("pattern").with_extension(extension);
     let mut command = Command::new("ffmpeg");
-    command.args(["-v", "error", "-f", "lavfi", "-i", "testsrc2=size=320x240"]);
+    let source = "testsrc2=size=320x240:rate=30";
+    command.args(["-v", "error", "-f", "lavfi", "-i", source]);
+    command.args(arguments);
     command.args(["-frames:v", &pictures.to_string(), "-b:v", "2M"]);
     assert!(command.arg(&file).status().unwrap().success());
     std::fs::read(file).unwrap()
@@ -149,6 +156,48 @@ async fn a_video_comes_back_frame_by_frame() {
     let nothing = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
     let request = app.request(Method::POST, "/frames", &[]);
     expect_problem(request.body(nothing).send().await.unwrap(), "frame-damaged").await;
+}
+
+/// The times that JPEG files which follow each other tell in their first comments.
+fn times(motion_jpeg: &[u8]) -> Vec<f64> {
+    let begins = |window: &[u8]| window == b"\xFF\xD8\xFF\xFE";
+    let files = (0..motion_jpeg.len() - 4).filter(|at| begins(&motion_jpeg[*at..at + 4]));
+    let comment = |at: usize| {
+        let length = u16::from_be_bytes([motion_jpeg[at + 4], motion_jpeg[at + 5]]);
+        let comment = str::from_utf8(&motion_jpeg[at + 6..at + 4 + usize::from(length)]).unwrap();
+        comment.strip_prefix("time=").unwrap().parse().unwrap()
+    };
+    files.map(comment).collect()
+}
+
+#[tokio::test]
+async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let app = TestApplication::start().await;
+    for extension in ["mp4", "webm"] {
+        // Of 30 frames a second the first two, and then every third.
+        let video = filtered(
+            extension,
+            5,
+            &["-vf", "select=eq(n\\,1)+not(mod(n\\,3))", "-vsync", "vfr"],
+        );
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request.body(video).send().await.unwrap();
+        let times = times(&answer.bytes().await.unwrap());
+        let expected = [0, 1, 3, 6, 9].map(|frame| f64::from(frame) / 30.0);
+        assert_eq!(times.len(), expected.len(), "{extension}: {times:?}");
+        // A WebM file counts milliseconds.
+        let apart = times
+            .iter()
+            .zip(expected)
+            .map(|(time, expected)| time - expected);
+        assert!(
+            apart.into_iter().all(|apart| apart.abs() < 0.001),
+            "{extension}: {times:?}"
+        );
+    }
 }
 
 #[tokio::test]

@@ -202,7 +202,10 @@ impl Frames {
             Source::Video(pictures, info) => {
                 let shown = format!("{}, frame {index}", self.shown);
                 let picture = match pictures {
-                    Pictures::Forwards(decoder) => decoder.next_picture().map_err(Box::from),
+                    Pictures::Forwards(decoder) => {
+                        let picture = decoder.next_picture().map_err(Box::from);
+                        picture.map(|picture| picture.map(|picture| picture.jpeg))
+                    }
                     Pictures::Backwards(reversed) => reversed.next_picture(info),
                 };
                 let picture = picture.map_err(|error| format!("{shown}: {error}"))?;

@@ -61,7 +61,7 @@ fn pictures(
             return Ok(Vec::new());
         };
         if index >= passed_over {
-            found.push(picture);
+            found.push(picture.jpeg);
         }
     }
     Ok(found)

@@ -6,7 +6,9 @@ use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_config::OFF;
-use bagtrack_ingest::video::{Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits};
+use bagtrack_ingest::video::{
+    Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits, VideoPicture,
+};
 use bagtrack_sessions::clock::timeout;
 use std::sync::Arc;
 use std::thread;
@@ -19,7 +21,7 @@ const MAX_WAITING: usize = 2;
 /// The frames of a video. Its process ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoFrames {
-    pictures: mpsc::Receiver<Result<Vec<u8>, VideoError>>,
+    pictures: mpsc::Receiver<Result<VideoPicture, VideoError>>,
     patience: Duration,
     max_frames: usize,
     count: usize,
@@ -92,6 +94,12 @@ impl VideoFrames {
 
     /// The next frame, as a JPEG file; none after the last.
     pub async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
+        let picture = self.next_picture().await?;
+        Some(picture.map(|picture| picture.jpeg.into()))
+    }
+
+    /// The next frame with its time; none after the last.
+    pub async fn next_picture(&mut self) -> Option<Result<VideoPicture, Problem>> {
         let next = timeout(self.patience, self.pictures.recv()).await;
         let Ok(next) = next else {
             return Some(Err(Problem::work_timeout()));
@@ -101,7 +109,7 @@ impl VideoFrames {
             Some(Ok(_)) if self.count > self.max_frames => {
                 Some(Err(Problem::too_many_frames(self.max_frames)))
             }
-            Some(Ok(picture)) => Some(Ok(picture.into())),
+            Some(Ok(picture)) => Some(Ok(picture)),
             Some(Err(error)) => Some(Err(error.into())),
             None if self.count == 0 => {
                 let detail = "The video has no pictures. Send the whole file again.";

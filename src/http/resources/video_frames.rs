@@ -11,18 +11,25 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::requests::{BinaryBody, DecodeSettings};
+use bagtrack_ingest::video::VideoPicture;
 use futures_util::{Stream, StreamExt, stream};
 use std::future::ready;
 use std::io;
 
 /// JPEG files that follow each other.
 const MOTION_JPEG: &str = "video/x-motion-jpeg";
+/// Bytes of the marker that a JPEG file begins with.
+const START_OF_IMAGE: usize = 2;
+/// The marker of a comment in a JPEG file.
+const COMMENT: [u8; 2] = [0xFF, 0xFE];
 
 /// Get the frames of a video
 ///
 /// A video of any kind that the service's `ffmpeg` reads comes back as Motion JPEG, a JPEG file after the other: every
-/// frame once, in its own pixels, as soon as it is decoded. The page asks for it where the browser cannot play a file.
-/// Where the rest cannot be decoded, the answer is cut off after the last whole frame, and not ended.
+/// frame once, in its own pixels, as soon as it is decoded. Each file begins with a comment that tells when the frame is
+/// shown, in seconds from the video's beginning, for example `time=1.533333`. The page asks for it where the browser
+/// cannot play a file. Where the rest cannot be decoded, the answer is cut off after the last whole frame, and not
+/// ended.
 ///
 /// `curl --data-binary @clip.mp4 http://localhost:8080/frames -o clip.mjpeg`
 #[utoipa::path(
@@ -62,11 +69,29 @@ async fn next(
     request: &StatelessRequest<DecodeSettings>,
     video: &mut VideoFrames,
 ) -> Option<Result<Bytes, Problem>> {
-    let frame = video.next().await?;
+    let frame = video.next_picture().await?;
     match count_frame(state, &request.client).await {
-        Ok(()) => Some(frame),
+        Ok(()) => Some(frame.map(with_time)),
         Err(problem) => Some(Err(problem)),
     }
+}
+
+/// The picture as a JPEG file whose first segment is a comment with its time.
+fn with_time(VideoPicture { jpeg, time }: VideoPicture) -> Bytes {
+    let comment = format!("time={time:.6}");
+    // The length counts itself.
+    let length = u16::try_from(comment.len() + 2).expect("a number is short");
+    let begin = jpeg.len().min(START_OF_IMAGE);
+    let (start, rest) = jpeg.split_at(begin);
+    [
+        start,
+        &COMMENT,
+        &length.to_be_bytes(),
+        comment.as_bytes(),
+        rest,
+    ]
+    .concat()
+    .into()
 }
 
 /// The frames after the first. One that cannot be had is the last, and cuts the answer off.

@@ -2,7 +2,7 @@
 
 use super::child::{self, Launcher};
 use super::error::VideoError;
-use super::parts;
+use super::output::{self, VideoPicture};
 use super::sniff::VideoFormat;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -150,21 +150,19 @@ impl VideoDecoder {
             "-frames:v",
             &count,
         ];
-        // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
-        let times = ["-enc_time_base", "1:1000000"];
         let coded = [
             "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
         ];
-        let output = ["-f", "mpjpeg", "pipe:1"];
         let arguments = [
             &before[..],
             &strict,
             &limit,
             input,
             &chosen,
-            &times,
+            // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
+            &output::TIME_BASE,
             &coded,
-            &output,
+            &output::FORMAT,
         ]
         .concat();
         let mut child = child::start(launcher, program, arguments, stdin)?;
@@ -193,12 +191,12 @@ impl VideoDecoder {
         Stop(self.child.clone())
     }
 
-    /// The next picture, as a JPEG file; none after the last.
+    /// The next picture; none after the last.
     ///
     /// # Errors
     /// The rest cannot be decoded.
-    pub fn next_picture(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
-        let read = parts::next_part(&mut self.pictures, self.limits.max_bytes);
+    pub fn next_picture(&mut self) -> Result<Option<VideoPicture>, VideoError> {
+        let read = output::next_picture(&mut self.pictures, self.limits.max_bytes);
         let picture = read.map_err(|error| self.damaged(error.to_string()))?;
         if picture.is_none() {
             return self.end();
@@ -212,7 +210,7 @@ impl VideoDecoder {
     }
 
     /// Whether the pictures that were given are all.
-    fn end(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
+    fn end(&mut self) -> Result<Option<VideoPicture>, VideoError> {
         let Some(hearing) = self.hearing.take() else {
             return Ok(None);
         };
@@ -321,11 +319,11 @@ pub fn read_output(
     written: &[u8],
     said: &[u8],
     max_bytes: usize,
-) -> io::Result<(Vec<Vec<u8>>, Option<String>)> {
+) -> io::Result<(Vec<VideoPicture>, Option<String>)> {
     let heard = Said::default();
     heard.hear(said);
     let mut stream = written;
-    let pictures = std::iter::from_fn(|| parts::next_part(&mut stream, max_bytes).transpose());
+    let pictures = std::iter::from_fn(|| output::next_picture(&mut stream, max_bytes).transpose());
     Ok((pictures.collect::<io::Result<_>>()?, heard.damage()))
 }
 

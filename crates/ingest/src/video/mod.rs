@@ -1,7 +1,7 @@
 //! Videos to pictures, by an installed `ffmpeg`.
 //!
-//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality, which then go the way
-//! of uploaded frames.
+//! In: the bytes of a video, or a file. Out: its pictures in order, as JPEG files of high quality with their times, which
+//! then go the way of uploaded frames.
 //!
 //! A video comes from anywhere, and its decoder is a large program in C. So it runs in a process of its own: it reads one
 //! file or pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor time,
@@ -15,7 +15,7 @@
 mod child;
 mod decoder;
 mod error;
-mod parts;
+mod output;
 mod sniff;
 
 pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
@@ -23,4 +23,5 @@ pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
 pub use decoder::read_output;
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
 pub use error::VideoError;
+pub use output::VideoPicture;
 pub use sniff::{VideoFormat, video_format};
