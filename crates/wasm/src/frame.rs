@@ -16,14 +16,14 @@ impl WasmFrame {
     /// A side of 0, or a number of bytes that is not `4 * width * height`.
     #[wasm_bindgen(js_name = fromRgba)]
     pub fn from_rgba(width: u32, height: u32, rgba: &[u8]) -> Result<WasmFrame, JsError> {
-        // A frame that is cut short is refused by the number of its bytes.
-        let rgb: Vec<u8> = rgba
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .flat_map(over_black)
-            .collect();
-        made(Frame::from_rgb(width, height, &rgb))
+        let is_opaque = |pixel: &[u8; 4]| pixel[3] == 255;
+        // Pictures of videos have nothing transparent.
+        if rgba.as_chunks::<4>().0.iter().all(is_opaque) {
+            return made(Frame::from_rgbx(width, height, rgba));
+        }
+        let mut blended = rgba.to_vec();
+        blended.as_chunks_mut().0.iter_mut().for_each(over_black);
+        made(Frame::from_rgbx(width, height, &blended))
     }
 
     /// A frame of planes, as JPEG has them (Rec. 601, full range): `width` x `height` values of luma and, where there is
@@ -49,10 +49,9 @@ fn made(frame: Result<Frame, FrameError>) -> Result<WasmFrame, JsError> {
     Ok(WasmFrame(frame?))
 }
 
-fn over_black(&[red, green, blue, alpha]: &[u8; 4]) -> [u8; 3] {
-    match alpha {
-        255 => [red, green, blue],
-        _ => [red, green, blue]
-            .map(|value| ((u32::from(value) * u32::from(alpha) + 127) / 255) as u8),
+/// Blends a pixel over black.
+fn over_black([red, green, blue, alpha]: &mut [u8; 4]) {
+    for value in [red, green, blue] {
+        *value = ((u32::from(*value) * u32::from(*alpha) + 127) / 255) as u8;
     }
 }

@@ -57,7 +57,16 @@ impl Frame {
     /// # Errors
     /// As [`from_luma`](Self::from_luma).
     pub fn from_rgb(width: u32, height: u32, rgb: &[u8]) -> Result<Self, FrameError> {
-        Self::from_triples((width, height), rgb, Order::Rgb)
+        Self::from_pixels::<3>((width, height), rgb, Order::Rgb)
+    }
+
+    /// As [`from_rgb`](Self::from_rgb), of RGBX quadruples, the order of a browser's canvas. Their fourth value is
+    /// passed over.
+    ///
+    /// # Errors
+    /// As [`from_luma`](Self::from_luma).
+    pub fn from_rgbx(width: u32, height: u32, rgbx: &[u8]) -> Result<Self, FrameError> {
+        Self::from_pixels::<4>((width, height), rgbx, Order::Rgb)
     }
 
     /// As [`from_rgb`](Self::from_rgb), of BGR triples, the order of OpenCV.
@@ -65,12 +74,17 @@ impl Frame {
     /// # Errors
     /// As [`from_luma`](Self::from_luma).
     pub fn from_bgr(width: u32, height: u32, bgr: &[u8]) -> Result<Self, FrameError> {
-        Self::from_triples((width, height), bgr, Order::Bgr)
+        Self::from_pixels::<3>((width, height), bgr, Order::Bgr)
     }
 
-    fn from_triples(size: (u32, u32), triples: &[u8], order: Order) -> Result<Self, FrameError> {
-        let pixels = triples.as_chunks::<3>().0;
-        if triples.len() as u64 != 3 * u64::from(size.0) * u64::from(size.1) || pixels.is_empty() {
+    fn from_pixels<const N: usize>(
+        size: (u32, u32),
+        values: &[u8],
+        order: Order,
+    ) -> Result<Self, FrameError> {
+        let (pixels, rest) = values.as_chunks::<N>();
+        let wanted = u64::from(size.0) * u64::from(size.1);
+        if pixels.len() as u64 != wanted || pixels.is_empty() || !rest.is_empty() {
             return Err(FrameError::Size {
                 width: size.0,
                 height: size.1,

@@ -51,8 +51,12 @@ pub enum Order {
     Bgr,
 }
 
-/// Luma and chroma of an image of `size` in rows of whole pixels.
-pub fn planes(pixels: &[[u8; 3]], size: (u32, u32), order: Order) -> (Vec<u8>, [Vec<u8>; 2]) {
+/// Luma and chroma of an image of `size` in rows of whole pixels. A fourth value of a pixel is passed over.
+pub fn planes<const N: usize>(
+    pixels: &[[u8; N]],
+    size: (u32, u32),
+    order: Order,
+) -> (Vec<u8>, [Vec<u8>; 2]) {
     let half = chroma_size(size);
     let half = half.0 as usize * half.1 as usize;
     let mut weights = [LUMA, CHROMA[0], CHROMA[1]];
@@ -67,9 +71,9 @@ pub fn planes(pixels: &[[u8; 3]], size: (u32, u32), order: Order) -> (Vec<u8>, [
 
 #[pulp::with_simd(fill_planes = Arch::new())]
 #[inline(always)]
-fn fill_planes_simd<S: Simd>(
+fn fill_planes_simd<S: Simd, const N: usize>(
     _: S,
-    pixels: &[[u8; 3]],
+    pixels: &[[u8; N]],
     width: usize,
     [of_luma, of_cb, of_cr]: [[i32; 3]; 3],
     luma: &mut [u8],
@@ -78,10 +82,11 @@ fn fill_planes_simd<S: Simd>(
     let weigh = |values: [i32; 3], weights: [i32; 3]| {
         values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2]
     };
-    for (luma, &pixel) in luma.iter_mut().zip(pixels) {
-        *luma = ((weigh(pixel.map(i32::from), of_luma) + (1 << 15)) >> 16) as u8;
+    for (luma, pixel) in luma.iter_mut().zip(pixels) {
+        let values = [pixel[0], pixel[1], pixel[2]].map(i32::from);
+        *luma = ((weigh(values, of_luma) + (1 << 15)) >> 16) as u8;
     }
-    let of_square = |[a, b, c, d]: [[u8; 3]; 4]| {
+    let of_square = |[a, b, c, d]: [[u8; N]; 4]| {
         let sum = |channel: usize| {
             let values = [a[channel], b[channel], c[channel], d[channel]].map(i32::from);
             values[0] + values[1] + values[2] + values[3]
@@ -128,6 +133,8 @@ mod tests {
             assert_eq!(planes(&rgb, size, Order::Rgb), expected);
             let bgr: Vec<[u8; 3]> = rgb.iter().map(|&[r, g, b]| [b, g, r]).collect();
             assert_eq!(planes(&bgr, size, Order::Bgr), expected);
+            let rgbx: Vec<[u8; 4]> = rgb.iter().map(|&[r, g, b]| [r, g, b, r ^ b]).collect();
+            assert_eq!(planes(&rgbx, size, Order::Rgb), expected);
         }
     }
 
