@@ -50,7 +50,9 @@ fn output(bytes: &[u8]) {
     let Ok((pictures, damage)) = read_output(written, said, MAX_BYTES) else {
         return;
     };
-    assert!(pictures.iter().all(|picture| picture.jpeg.len() <= MAX_BYTES));
+    assert!(pictures
+        .iter()
+        .all(|picture| picture.jpeg.len() <= MAX_BYTES));
     let all: usize = pictures.iter().map(|picture| picture.jpeg.len()).sum();
     assert!(all <= written.len());
     if let Some(damage) = damage {
