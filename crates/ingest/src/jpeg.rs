@@ -160,7 +160,7 @@ fn decode_pixels<'memory>(
     if output == ColorSpace::Luma {
         return Ok((channel(Cow::Borrowed(&pixels[..]), size), None));
     }
-    let (luma, chroma) = ycbcr::planes(pixels.as_chunks().0, size, Order::Rgb);
+    let (luma, chroma) = ycbcr::planes(pixels.as_chunks::<3>().0, size, Order::Rgb);
     let half = ycbcr::chroma_size(size);
     let chroma = has_color.then(|| chroma.map(|plane| channel(Cow::Owned(plane), half)));
     Ok((channel(Cow::Owned(luma), size), chroma))
