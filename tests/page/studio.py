@@ -163,7 +163,8 @@ def check_exports(page, table):
         for box in region["value"]["sequence"]:
             scaled = [box["x"] * 4.8, box["y"] * 3.6, box["width"] * 4.8, box["height"] * 3.6]
             found[box["frame"] - 1, int(region["id"].split("-")[1]) - 1] = scaled
-    assert task["data"] == {"video": "card"} and len(found) == len(table)
+    # An object that is lost has no box of its own there.
+    assert task["data"] == {"video": "card"} and told.keys() <= found.keys(), told.keys() - found.keys()
     same(found, 0.01)
 
 
