@@ -62,7 +62,7 @@ export async function openImages(files) {
   };
   source.count = images.length;
   source.times = await timesIn(images);
-  if (source.times && images.length > 1) source.rate = (images.length - 1) / source.duration;
+  if (source.times && source.duration > 0) source.rate = (images.length - 1) / source.duration;
   await source.first();
   source.size = size ?? source.size;
   source.files = images;
