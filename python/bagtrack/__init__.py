@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bagtrack import cv
-from bagtrack._native import Tracker, __version__
+from bagtrack._native import NanoTrack, Tracker, __version__
 from bagtrack.answer import Answer, Box, Status, TargetAnswer
 from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.propagation import propagate
@@ -24,6 +24,7 @@ __all__ = [
     "AsyncClient",
     "Box",
     "Client",
+    "NanoTrack",
     "ServiceError",
     "ServiceUnavailable",
     "Status",

@@ -1,3 +1,4 @@
+import os
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,21 @@ from bagtrack.answer import Box, BoxLike, Status
 __version__: str
 """The version of the package."""
 
+class NanoTrack:
+    """A network that gives trackers a second opinion of every frame, or, `in_doubt`, of those of which the tracker is not
+    sure: with a score below 0.95. Trackers share it. Pickle and copy read its files again.
+    """
+
+    def __init__(
+        self,
+        backbone: str | os.PathLike[str],
+        head: str | os.PathLike[str],
+        in_doubt: bool = False,
+    ) -> None:
+        """The ONNX files of NanoTrack, version 2 or 3, which its author publishes. `OSError` for a file that cannot be
+        read, `ValueError` for files that are no such network.
+        """
+
 class Tracker:
     """Follows one object through frames, in this process.
 
@@ -17,11 +33,18 @@ class Tracker:
     `copy.deepcopy` make trackers that go on bit for bit, as `save` and `load` do.
     """
 
-    def __init__(self, preset: str = "robust", seed: int | None = 0, **params: Any) -> None:
+    def __init__(
+        self,
+        preset: str = "robust",
+        seed: int | None = 0,
+        *,
+        model: NanoTrack | None = None,
+        **params: Any,
+    ) -> None:
         """`preset` is "robust", or "paper" for the equations as printed. The same seed and frames give the same boxes,
         bit for bit on one kind of machine; with None it is drawn from Python's `random`. `params` sets single
         parameters of the preset: `params` of a tracker lists them, docs.rs and the service's OpenAPI document describe
-        them.
+        them. `model` gives a second opinion, with "robust" alone.
         """
 
     def init(self, frame: npt.NDArray[np.uint8], box: BoxLike) -> None:
@@ -44,8 +67,10 @@ class Tracker:
         """The whole state."""
 
     @classmethod
-    def load(cls, snapshot: bytes) -> Tracker:
-        """A tracker that goes on from what `save` gave, bit for bit. `ValueError` for other or damaged bytes."""
+    def load(cls, snapshot: bytes, model: NanoTrack | None = None) -> Tracker:
+        """A tracker that goes on from what `save` gave, bit for bit. `ValueError` for other or damaged bytes, and where
+        the tracker began with a model and the same one is not given. One that began without goes on without.
+        """
 
     @property
     def box(self) -> Box:

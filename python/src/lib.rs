@@ -5,6 +5,7 @@
 
 mod frame;
 mod key_frames;
+mod model;
 mod params;
 mod target;
 mod tracker;
@@ -14,6 +15,8 @@ mod tracker;
 mod _native {
     #[pymodule_export]
     use super::key_frames::PyKeyFrames;
+    #[pymodule_export]
+    use super::model::PyNanoTrack;
     #[pymodule_export]
     use super::tracker::PyTracker;
 

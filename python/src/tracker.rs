@@ -1,18 +1,21 @@
 //! The class `bagtrack.Tracker`.
 
 use super::frame::frame;
+use super::model::PyNanoTrack;
 use super::params::{by_name, params};
 use super::target::{Numbers, numbers, rect};
-use bagtrack_tracker::{Estimate, Params, Search, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Estimate, Expert, Params, Search, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple, PyType};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Follows one object through frames, in this process.
 #[pyclass(name = "Tracker", module = "bagtrack", frozen)]
 pub struct PyTracker {
     params: Params,
+    /// The network of a second opinion, where there is one.
+    model: Option<Py<PyNanoTrack>>,
     /// None before `init`.
     tracker: Mutex<Option<Tracker>>,
 }
@@ -45,6 +48,10 @@ impl PyTracker {
     }
 }
 
+fn expert(model: Option<&Py<PyNanoTrack>>) -> Option<Arc<dyn Expert>> {
+    model.map(|model| model.get().expert())
+}
+
 fn before_init() -> PyErr {
     PyRuntimeError::new_err("the tracker has no target yet: call init(frame, box) first")
 }
@@ -52,15 +59,17 @@ fn before_init() -> PyErr {
 #[pymethods]
 impl PyTracker {
     #[new]
-    #[pyo3(signature = (preset = "robust", seed = Some(0), **params))]
+    #[pyo3(signature = (preset = "robust", seed = Some(0), *, model = None, **params))]
     fn new(
         py: Python<'_>,
         preset: &str,
         seed: Option<u64>,
+        model: Option<Py<PyNanoTrack>>,
         params: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         Ok(Self {
             params: self::params(preset, seed, params, py)?,
+            model,
             tracker: Mutex::new(None),
         })
     }
@@ -73,17 +82,20 @@ impl PyTracker {
         r#box: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         let (frame, target) = (self::frame(frame)?, rect(r#box)?);
+        let expert = expert(self.model.as_ref());
         py.detach(|| {
-            let tracker = Tracker::new(&frame, target, self.params.clone()).map_err(value_error)?;
+            let tracker = Tracker::beside(&frame, target, self.params.clone(), expert);
+            let tracker = tracker.map_err(value_error)?;
             *self.lock()? = Some(tracker);
             Ok(())
         })
     }
 
     /// A tracker without a target, for one of several that see the same frames, counted from 0.
-    fn of_target(&self, target: usize) -> Self {
+    fn of_target(&self, py: Python<'_>, target: usize) -> Self {
         Self {
             params: self.params.of_target(target),
+            model: self.model.as_ref().map(|model| model.clone_ref(py)),
             tracker: Mutex::new(None),
         }
     }
@@ -159,12 +171,20 @@ impl PyTracker {
 
     /// A tracker that goes on from what `save` gave, bit for bit.
     #[classmethod]
-    fn load(_: &Bound<'_, PyType>, py: Python<'_>, snapshot: &[u8]) -> PyResult<Self> {
+    #[pyo3(signature = (snapshot, model = None))]
+    fn load(
+        _: &Bound<'_, PyType>,
+        py: Python<'_>,
+        snapshot: &[u8],
+        model: Option<Py<PyNanoTrack>>,
+    ) -> PyResult<Self> {
+        let expert = expert(model.as_ref());
         let tracker = py
-            .detach(|| Tracker::restore(snapshot))
+            .detach(|| Tracker::restore_beside(snapshot, expert))
             .map_err(value_error)?;
         Ok(Self {
             params: tracker.params().clone(),
+            model,
             tracker: Mutex::new(Some(tracker)),
         })
     }
@@ -178,17 +198,18 @@ impl PyTracker {
             true => {
                 let snapshot = tracker.save(py)?;
                 let load = slf.get_type().getattr("load")?;
-                (load, (snapshot,)).into_pyobject(py)
+                (load, (snapshot, &tracker.model)).into_pyobject(py)
             }
             false => {
                 let partial = py.import("functools")?.getattr("partial")?;
-                let params = by_name(&tracker.params, py)?;
+                let keywords = by_name(&tracker.params, py)?;
+                keywords.bind(py).set_item("model", &tracker.model)?;
                 // The presets own what the parameters do not tell.
                 let preset = match tracker.params.search {
                     Search::Resampled => "paper",
                     Search::Answer => "robust",
                 };
-                let make = partial.call((slf.get_type(), preset), Some(params.bind(py)))?;
+                let make = partial.call((slf.get_type(), preset), Some(keywords.bind(py)))?;
                 (make, PyTuple::empty(py)).into_pyobject(py)
             }
         }

@@ -114,6 +114,14 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Clip:
     return tracked(folder, first_box(folder))
 
 
+@pytest.fixture(scope="session")
+def network(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The two files of a network without training, from an example that `cargo test` builds beside the program."""
+    folder = tmp_path_factory.mktemp("network")
+    subprocess.run([PROGRAM.parent / "examples/tiny_network", folder], check=True)
+    return folder / "backbone.onnx", folder / "head.onnx"
+
+
 @pytest.fixture(scope="session", params=REAL_CLIPS)
 def real_clip(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Clip:
     """A video of the paper, as PNG."""

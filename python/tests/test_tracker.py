@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import copy
+import json
+import pickle
 import queue
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bagtrack
-from conftest import SEED, Clip, clock
+from conftest import SEED, Clip, box_of, clock, run
 
 
 def follow(clip: Clip, tracker: bagtrack.Tracker) -> list[tuple]:
@@ -97,6 +101,49 @@ def test_a_saved_tracker_goes_on_bit_for_bit(clip: Clip) -> None:
     assert [other.update(frame)[1] for frame in frames[40:60]] == clip.boxes()[40:60]
     # The first one has not moved.
     assert tracker.frame == 39
+
+
+def test_a_network_gives_a_second_opinion_as_on_the_command_line(
+    clip: Clip, network: tuple[Path, Path], tmp_path: Path
+) -> None:
+    files = f"--model=nanotrack:{network[0]},{network[1]}"
+    alone = expected(clip)
+    sure = next((at for at, (_, _, score, _) in enumerate(alone) if score < 0.95), len(alone))
+    assert sure > 10
+    for in_doubt in [False, True]:
+        flags = ["--box", ",".join(map(repr, clip.box)), "--seed", SEED, "--format", "json", files]
+        said = run("track", clip.folder, *flags, *(["--model-in-doubt"] if in_doubt else []))
+        lines = [json.loads(line) for line in said.splitlines()]
+        model = bagtrack.NanoTrack(*network, in_doubt=in_doubt)
+        answers = follow(clip, bagtrack.Tracker(seed=SEED, model=model))
+        assert [box for _, box, _, _ in answers] == [box_of(line["box"]) for line in lines]
+        assert [score for _, _, score, _ in answers] == [line["score"] for line in lines]
+        # In doubt it has no part in what the filter is sure of.
+        assert (answers[:sure] == alone[:sure]) == in_doubt
+
+
+def test_a_tracker_with_a_network_goes_on_with_the_same_one_alone(clip: Clip, network: tuple[Path, Path]) -> None:
+    frames = clip.frames()
+    model = bagtrack.NanoTrack(str(network[0]), str(network[1]))
+    tracker = bagtrack.Tracker(seed=SEED, model=model)
+    copied = pickle.loads(pickle.dumps(tracker))
+    for one in [tracker, copied]:
+        one.init(frames[0], clip.box)
+        one.update(frames[1])
+    assert copied.save() == tracker.save()
+    others = [bagtrack.Tracker.load(tracker.save(), model), copy.deepcopy(tracker), pickle.loads(pickle.dumps(tracker))]
+    answer = tracker.update(frames[2])
+    assert [other.update(frames[2]) for other in others] == [answer] * 3
+    with pytest.raises(ValueError, match="--model"):
+        bagtrack.Tracker.load(tracker.save())
+    with pytest.raises(ValueError):
+        bagtrack.Tracker.load(tracker.save(), bagtrack.NanoTrack(*network, in_doubt=True))
+    with pytest.raises(OSError):
+        bagtrack.NanoTrack(network[0], "nowhere.onnx")
+    with pytest.raises(ValueError, match="no NanoTrack"):
+        bagtrack.NanoTrack(network[1], network[0])
+    with pytest.raises(ValueError, match="robust"):
+        bagtrack.Tracker("paper", model=model).init(frames[0], clip.box)
 
 
 def test_a_corrected_box_is_the_answer_to_its_frame(clip: Clip) -> None:

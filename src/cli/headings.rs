@@ -33,6 +33,7 @@ const HEADINGS: [(&str, &[&str]); 10] = [
             "session_first",
             "max_session_bytes",
             "model",
+            "model_in_doubt",
         ],
     ),
     (

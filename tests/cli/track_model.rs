@@ -1,6 +1,6 @@
 //! `bagtrack track --model`: a second opinion by a network that the user gives.
 
-use crate::command::{clip, fails, folder, succeeds, text};
+use crate::command::{bagtrack, clip, fails, folder, succeeds, text};
 use bagtrack_testing::tiny_network;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,35 @@ fn a_network_has_a_part_in_the_boxes_and_leaves_none_without_it() {
     assert_ne!(with, without);
     assert_eq!(succeeds(&["track", text(&dir), ONE, &model]), with);
     assert_eq!(with.lines().count(), without.lines().count());
+}
+
+#[test]
+fn a_network_for_doubt_leaves_the_sure_frames_as_they_are() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let [backbone, head] = network(parent.path());
+    let model = format!("--model=nanotrack:{},{}", text(&backbone), text(&head));
+    let track = ["track", text(&dir), ONE];
+    let in_doubt = succeeds(&[&track[..], &[&model, "--model-in-doubt"]].concat());
+    let always = succeeds(&[&track[..], &[&model]].concat());
+    let without = succeeds(&track);
+    let same = |one: &str, other: &str| {
+        one.lines()
+            .zip(other.lines())
+            .filter(|(a, b)| a == b)
+            .count()
+    };
+    let (as_without, as_always) = (same(&in_doubt, &without), same(&in_doubt, &always));
+    assert!(
+        as_without > as_always && as_without > 5,
+        "{as_without} {as_always}"
+    );
+    let alone = bagtrack(&[&track[..], &["--model-in-doubt"]].concat());
+    let errors = String::from_utf8_lossy(&alone.stderr);
+    assert!(
+        alone.status.code() == Some(2) && errors.contains("--model <"),
+        "{errors}"
+    );
 }
 
 #[test]

@@ -46,6 +46,7 @@ mod provoke;
 mod quotas;
 mod raw;
 mod replay;
+mod second_opinion;
 mod shares;
 mod short_flags;
 mod slow_line;

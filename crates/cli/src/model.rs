@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use bagtrack_siamese::NanoTrack;
-use bagtrack_tracker::Expert;
+use bagtrack_tracker::{Expert, InDoubt};
 
 /// The flag that gives a network.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -15,6 +15,9 @@ pub struct ModelFlag {
     /// files of its backbone and its head. docs/laboratory/ACCURACY.md says where they are and what they bring.
     #[arg(long, value_name = "nanotrack:BACKBONE,HEAD")]
     model: Option<ModelFiles>,
+    /// Asks the network only of frames of which the filter is not sure: with a score below 0.95.
+    #[arg(long, requires = "model")]
+    model_in_doubt: bool,
 }
 
 impl ModelFlag {
@@ -23,7 +26,8 @@ impl ModelFlag {
     /// # Errors
     /// A file that cannot be read, or is no such network, as a line of text that names the file.
     pub fn load(&self) -> Result<Option<Arc<dyn Expert>>, String> {
-        self.model.as_ref().map(ModelFiles::load).transpose()
+        let load = |files: &ModelFiles| files.load(self.model_in_doubt);
+        self.model.as_ref().map(load).transpose()
     }
 }
 
@@ -57,11 +61,11 @@ impl FromStr for ModelFiles {
 }
 
 impl ModelFiles {
-    /// The network in these files.
+    /// The network in these files, to be asked of every frame, or only of those of which the filter is not sure.
     ///
     /// # Errors
     /// A file that cannot be read, or is no such network, as a line of text that names the file.
-    pub fn load(&self) -> Result<Arc<dyn Expert>, String> {
+    pub fn load(&self, in_doubt: bool) -> Result<Arc<dyn Expert>, String> {
         let read = |path: &PathBuf| {
             fs::read(path).map_err(|error| format!("--model: {}: {error}", path.display()))
         };
@@ -70,6 +74,11 @@ impl ModelFiles {
             let (backbone, head) = (self.backbone.display(), self.head.display());
             format!("--model: {backbone} and {head} are no NanoTrack: {error}")
         })?;
-        Ok(Arc::new(network))
+        let network: Arc<dyn Expert> = Arc::new(network);
+        Ok(if in_doubt {
+            Arc::new(InDoubt(network))
+        } else {
+            network
+        })
     }
 }

@@ -58,6 +58,9 @@ settings! {
         /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its head.
         /// Sessions that were opened with one go on with the same one alone.
         model: Option<ModelFiles> = None, as "nanotrack:BACKBONE,HEAD";
+        /// The network is asked only of frames of which the filter is not sure: with a score below 0.95. All replicas must
+        /// have the same.
+        model_in_doubt: bool = false;
         /// The path of the service on a host that it shares with others, like `/tracker`.
         base_path: BasePath = BasePath::default();
         /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
@@ -93,6 +96,11 @@ impl Config {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.check_ranges()?;
         self.store.check_address()?;
+        let held = in_range(
+            self.model.is_some() || !self.model_in_doubt,
+            "left out without --model",
+        );
+        ConfigError::check("model_in_doubt", held)?;
         let uploads = self.max_body_bytes..=(4 << 40);
         let held = in_range(
             uploads.contains(&self.max_upload_bytes),

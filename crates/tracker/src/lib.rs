@@ -111,7 +111,7 @@ pub use confidence::score::{Evidence, PREDICTORS, ScoreModel};
 pub use diagnostics::Diagnostics;
 pub use error::TrackerError;
 pub use estimate::{Estimate, Status};
-pub use expert::opinion::{Expert, Sighting};
+pub use expert::opinion::{Expert, InDoubt, Sighting};
 pub use features::gray::patch;
 pub use grassmann::evaluation::Evaluation;
 pub use grassmann::subspace::{AffineSubspace, RANK_TOLERANCE};

@@ -27,10 +27,10 @@ const VERSION: u32 = 17;
 const EXPERT_VERSION: u32 = 0x1_0000 + VERSION;
 const HEADER: usize = 16;
 
-const NO_EXPERT: &str =
-    "the session has a second opinion by a network, which is not loaded here: give it with --model";
-const OTHER_EXPERT: &str = "the session has a second opinion by another network than the one that is loaded here: give the \
-    same files with --model";
+const NO_EXPERT: &str = "the session has a second opinion by a network, which is not loaded here: give it with --model, in \
+    Python as model";
+const OTHER_EXPERT: &str = "the session has another second opinion than the one that is loaded here: give the same files \
+    with --model, and --model-in-doubt if it was given there";
 
 /// No feature has a greater magnitude; gray values are in [0, 1].
 const MAX_FEATURE: f32 = 1e3;

@@ -83,7 +83,8 @@ impl Application {
         let listener = TcpListener::bind(address).await;
         let listener = listener.map_err(|source| BindError::Listen { address, source })?;
         let store = config.store.connect(clock.clone()).await?;
-        let expert = config.model.as_ref().map(ModelFiles::load);
+        let load = |files: &ModelFiles| files.load(config.model_in_doubt);
+        let expert = config.model.as_ref().map(load);
         let expert = expert.transpose().map_err(BindError::Model)?;
         let executor = Executor::threads(config.worker_count()).map_err(BindError::Workers)?;
         let parts = Parts {

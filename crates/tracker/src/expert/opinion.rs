@@ -1,6 +1,7 @@
 //! What an expert is.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::image::frame::Frame;
 use crate::image::rect::Rect;
@@ -22,6 +23,43 @@ pub trait Expert: fmt::Debug + Send + Sync {
 
     /// Where the target of `template` is in `frame`, if it is near `place`, the box that it had before.
     fn look(&self, frame: &Frame, template: &[f32], place: &Rect) -> Sighting;
+
+    /// The score of the filter from which on the expert is not asked. Infinite where it is asked in every frame.
+    fn unasked_from(&self) -> f32 {
+        f32::INFINITY
+    }
+}
+
+/// Below this score of the filter an expert is asked that is asked in doubt alone.
+const IN_DOUBT: f32 = 0.95;
+/// Tells an expert that is asked in doubt alone from the same one that is always asked.
+const IN_DOUBT_FINGERPRINT: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// An expert that is asked only of frames in which the filter's score is below 0.95. In the others the answer and the score
+/// are the filter's, and a frame costs no more than without an expert.
+#[derive(Debug, Clone)]
+pub struct InDoubt(pub Arc<dyn Expert>);
+
+impl Expert for InDoubt {
+    fn fingerprint(&self) -> u64 {
+        self.0.fingerprint() ^ IN_DOUBT_FINGERPRINT
+    }
+
+    fn template_len(&self) -> usize {
+        self.0.template_len()
+    }
+
+    fn start(&self, frame: &Frame, target: &Rect) -> Vec<f32> {
+        self.0.start(frame, target)
+    }
+
+    fn look(&self, frame: &Frame, template: &[f32], place: &Rect) -> Sighting {
+        self.0.look(frame, template, place)
+    }
+
+    fn unasked_from(&self) -> f32 {
+        IN_DOUBT
+    }
 }
 
 /// Where an expert sees the target.

@@ -99,6 +99,9 @@ impl SecondOpinion {
         filter: &Voice,
         filter_lost: bool,
     ) -> Consultation {
+        if filter.score >= expert.unasked_from() {
+            return self.follow(frame, filter, filter_lost);
+        }
         let sighting = expert.look(frame, &self.template, &self.place);
         let ((x, y), bias) = (sighting.target.center(), self.bias);
         let (width, height) = (
@@ -139,6 +142,18 @@ impl SecondOpinion {
             target,
             score,
             moved,
+        }
+    }
+
+    /// The filter's own answer, to which the expert's box is put.
+    fn follow(&mut self, frame: &Frame, filter: &Voice, filter_lost: bool) -> Consultation {
+        self.put(&filter.target, frame);
+        (self.frames_apart, self.frames_doubted) = (0, 0);
+        self.filter_lost = filter_lost;
+        Consultation {
+            target: filter.target,
+            score: filter.score,
+            moved: None,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use bagtrack_testing::scene::{flat, frame, panned, params, robust, target};
-use bagtrack_tracker::{Expert, Frame, Rect, Sighting, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Expert, Frame, InDoubt, Rect, Sighting, Status, Tracker, TrackerError};
 
 /// Says what it was told to say of the target's place, with the number of the frame in its template.
 #[derive(Debug)]
@@ -138,6 +138,52 @@ fn an_expert_that_went_elsewhere_is_put_back_where_the_filter_is_sure() {
     let working = f64::from(both.frame_format().size.0) / f64::from(both.source_size().0);
     let place = place.scaled(1.0 / working, 1.0 / working);
     assert!(place.center_distance(&target(4)) < 12.0, "{place:?}");
+}
+
+#[test]
+fn an_expert_for_doubt_is_asked_there_alone_and_looks_where_the_filter_was_last() {
+    let expert = Oracle::new(|t| Some((target(t), 0.9)));
+    let in_doubt: Arc<dyn Expert> = Arc::new(InDoubt(expert.clone()));
+    let shown = |t: usize| panned(t, (0, 0)).0;
+    let mut both =
+        Tracker::beside(&shown(0), target(0), robust(3), Some(in_doubt.clone())).unwrap();
+    let mut alone = Tracker::new(&shown(0), target(0), robust(3)).unwrap();
+    let looks = || expert.asked.lock().unwrap().1.len();
+    let at_first = looks();
+    let gone = flat(200, 160, 90);
+    let mut last = both.estimate().target;
+    let mut is_asked = false;
+    let mut unasked = 0;
+    for t in 1..60 {
+        expert.at(t);
+        let before = looks();
+        let picture = if t < 40 { shown(t) } else { gone.clone() };
+        let answer = both.step(&picture).unwrap();
+        if is_asked {
+            continue;
+        }
+        // Until it is first asked the two are the same.
+        let by_itself = alone.step(&picture).unwrap();
+        is_asked = by_itself.score < 0.95;
+        assert_eq!(looks() - before, usize::from(is_asked), "frame {t}");
+        if is_asked {
+            let working = f64::from(both.frame_format().size.0) / f64::from(both.source_size().0);
+            let place = expert.last_place().scaled(1.0 / working, 1.0 / working);
+            assert!(place.center_distance(&last) < 1.0, "{place:?} {last:?}");
+        } else {
+            unasked += 1;
+            assert_eq!(answer, by_itself, "frame {t}");
+        }
+        last = answer.target;
+    }
+    assert!(unasked > 5 && is_asked, "{unasked}");
+    assert!(looks() - at_first < 60 - unasked, "{}", looks());
+    // What was begun in doubt goes on in doubt: the boxes of the other are others.
+    let bytes = both.snapshot();
+    let always: Arc<dyn Expert> = expert.clone();
+    let refused = Tracker::restore_beside(&bytes, Some(always)).unwrap_err();
+    assert!(matches!(refused, TrackerError::Expert(_)), "{refused:?}");
+    assert!(Tracker::restore_beside(&bytes, Some(in_doubt)).is_ok());
 }
 
 #[test]
