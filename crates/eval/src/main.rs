@@ -42,6 +42,13 @@ struct Args {
     /// annotated frame after them.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     start_at: Option<f64>,
+    /// Plays one frame in so many, as from a client that sends fewer frames a second.
+    #[arg(long, value_name = "N")]
+    every: Option<NonZeroUsize>,
+    /// The first boxes are off by this share of their sides, 0 < SHARE < 0.5: moved in eight directions, or smaller or
+    /// larger, another way with each of twelve seeds.
+    #[arg(long, value_name = "SHARE", value_parser = first_box_error)]
+    first_box_error: Option<f64>,
     /// A table for people, JSON, or a table as markdown.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -62,7 +69,7 @@ struct Args {
     plots: Option<PathBuf>,
     /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
     /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at", "every", "first_box_error"])]
     results: Option<PathBuf>,
 }
 
@@ -78,6 +85,8 @@ impl Args {
         Playback {
             backwards: self.backwards,
             start_at: self.start_at,
+            every: self.every,
+            first_box_error: self.first_box_error,
         }
     }
 }
@@ -89,6 +98,14 @@ fn share(text: &str) -> Result<f64, String> {
         Ok(share)
     } else {
         Err("it must be at least 0 and less than 1".to_owned())
+    }
+}
+
+/// Reads by what share of its sides the first box is off.
+fn first_box_error(text: &str) -> Result<f64, String> {
+    match share(text)? {
+        share if share > 0.0 && share < 0.5 => Ok(share),
+        _ => Err("it must be more than 0 and less than 0.5".to_owned()),
     }
 }
 

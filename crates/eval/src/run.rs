@@ -3,7 +3,7 @@
 use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
 use bagtrack_cli::SequenceError;
-use bagtrack_tracker::{Evidence, Expert, Frame, Params, Rect, Status, Tracker, TrackerError};
+use bagtrack_tracker::{Evidence, Expert, Params, Rect, Status, Tracker, TrackerError};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -89,8 +89,8 @@ impl SequenceRuns {
 impl SeedRun {
     fn track(
         sequence: &Sequence,
-        frames: &[Frame],
-        params: Params,
+        seed: usize,
+        params: &Params,
         expert: Option<Arc<dyn Expert>>,
     ) -> Result<Self, EvalError> {
         let refuse = |frame: usize| {
@@ -101,7 +101,12 @@ impl SeedRun {
             }
         };
         let nothing = || EvalError::NothingToScore(sequence.name.clone());
-        let first = sequence.boxes[0].ok_or_else(nothing)?;
+        let first = sequence.first_box(seed).ok_or_else(nothing)?;
+        let params = Params {
+            seed: seed as u64,
+            ..params.clone()
+        };
+        let frames = sequence.frames(&params, &first)?;
         let tracker = Tracker::beside(&frames[0], first, params, expert);
         let mut tracker = tracker.map_err(refuse(0))?;
         let mut scored = Vec::new();
@@ -149,17 +154,7 @@ pub fn run(
     seeds: NonZeroUsize,
     jobs: NonZeroUsize,
 ) -> Result<SequenceRuns, EvalError> {
-    if sequence.boxes[0].is_none() {
-        return Err(EvalError::NothingToScore(sequence.name.clone()));
-    }
-    let frames = sequence.frames(params)?;
-    let one = |seed: usize| {
-        let params = Params {
-            seed: seed as u64,
-            ..params.clone()
-        };
-        SeedRun::track(sequence, &frames, params, expert.cloned())
-    };
+    let one = |seed: usize| SeedRun::track(sequence, seed, params, expert.cloned());
     let next = AtomicUsize::new(0);
     let work = || {
         let mut done = Vec::new();
@@ -195,7 +190,7 @@ pub fn run(
         .collect::<Result<Vec<SeedRun>, EvalError>>()?;
     Ok(SequenceRuns {
         name: sequence.name.clone(),
-        frames: frames.len(),
+        frames: sequence.boxes.len(),
         annotated: sequence.boxes.iter().flatten().count(),
         seeds,
     })

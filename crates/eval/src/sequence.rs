@@ -17,6 +17,7 @@ pub struct Sequence {
     dir: PathBuf,
     files: Vec<PathBuf>,
     limits: Limits,
+    playback: Playback,
     /// The frames in the format that was asked for last.
     decoded: Mutex<Option<Decoded>>,
     /// The box of each frame in 0-based pixels from the top-left corner; none where the frame is not annotated.
@@ -66,21 +67,26 @@ impl Sequence {
             dir: dir.to_owned(),
             files: order.iter().map(|&index| paths[index].clone()).collect(),
             limits: *limits,
+            playback,
             decoded: Mutex::default(),
             boxes: order.into_iter().map(|index| boxes[index]).collect(),
         })
     }
 
-    /// The frames as the service decodes them for a session with `params` that starts with the first box; decoded once
-    /// for parameters with the same format.
+    /// The box that a run with this seed begins with; none where there is no box to start with.
+    pub fn first_box(&self, seed: usize) -> Option<Rect> {
+        self.boxes[0].map(|annotated| self.playback.first_box(annotated, seed))
+    }
+
+    /// The frames as the service decodes them for a session with `params` that starts with the box `first`; decoded once
+    /// for sessions with the same format that follow each other.
     ///
     /// # Errors
-    /// A frame that is unreadable, or no first box.
-    pub fn frames(&self, params: &Params) -> Result<Arc<Vec<Frame>>, SequenceError> {
+    /// A frame that is unreadable.
+    pub fn frames(&self, params: &Params, first: &Rect) -> Result<Arc<Vec<Frame>>, SequenceError> {
         let refuse = |reason: String| SequenceError::new(&self.dir, reason);
-        let first = self.boxes[0].ok_or_else(|| refuse("its first frame has no box".to_owned()))?;
         let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
-        let wanted = |source| params.frame_format(source, &first);
+        let wanted = |source| params.frame_format(source, first);
         let read = |path: &PathBuf, format: &dyn Fn((u32, u32)) -> FrameFormat| {
             let file = path.file_name().unwrap_or_default().display();
             let bytes = fs::read(path).map_err(|error| refuse(format!("{file}: {error}")))?;

@@ -1,6 +1,7 @@
 //! `bagtrack-eval` on sequences that are played backwards, or from a share of their length on.
 
 use crate::command::{clip, eval, fails, folder, succeeds, text};
+use bagtrack_sample::{Clip, Format, Settings};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,21 +52,79 @@ fn same(flags: &[&str], frames: impl Iterator<Item = usize>, playback: &Value) {
     assert_eq!(usual.get("playback"), None);
 }
 
+fn playback(backwards: bool, start_at: Value, every: Value) -> Value {
+    json!({ "backwards": backwards, "start_at": start_at, "every": every, "first_box_error": null })
+}
+
+#[test]
+fn one_frame_in_three_is_the_clip_with_the_others_left_out() {
+    let playback = playback(false, Value::Null, json!(3));
+    same(&["--every", "3"], (1..=12).step_by(3), &playback);
+}
+
+#[test]
+fn first_boxes_that_are_off_are_told_and_each_seed_has_another() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", 0, 12);
+    let still = ["motion_std_x=0", "motion_std_y=0", "motion_std_scale=0"];
+    let mut flags = vec!["--preset", "paper", "--first-box-error", "0.2"];
+    flags.extend(still.iter().flat_map(|set| ["--set", set]));
+    let off = report(&dir, &flags);
+    assert_eq!(off["playback"]["first_box_error"], 0.2);
+    // The boxes stay where they began: a fifth of a side to the right with the first seed, to the left with the second.
+    let errors =
+        |report: &Value| [0, 1].map(|seed| report["seed_means"][seed]["center_error"].clone());
+    let [first, second] = errors(&off);
+    assert_ne!(first, second);
+    let exact = report(&dir, &[&flags[..2], &flags[4..]].concat());
+    let [first, second] = errors(&exact);
+    assert_eq!(first, second);
+    let output = eval(&["anywhere", "--first-box-error=0.5"]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+/// The size of the first box decides in which size the frames are decoded.
+#[test]
+fn a_first_box_of_another_size_has_frames_of_its_own() {
+    let parent = folder();
+    let settings = Settings {
+        frames: 3,
+        width: 640,
+        height: 480,
+        ..Settings::default()
+    };
+    let clip = Clip::new(settings).expect("the settings are in order");
+    let dir = parent.path().join("large");
+    let written = clip.write(&dir, Format::Jpeg, || ());
+    written.expect("the folder is writable");
+    let flags = [
+        "--first-box-error",
+        "0.2",
+        "--seeds",
+        "12",
+        "--format",
+        "json",
+    ];
+    let report: Value =
+        serde_json::from_str(&succeeds(&[&[text(&dir)], &flags[..]].concat())).unwrap();
+    assert_eq!(report["seed_means"].as_array().map(Vec::len), Some(12));
+}
+
 #[test]
 fn backwards_is_the_clip_with_its_frames_turned_round() {
-    let playback = json!({ "backwards": true, "start_at": null });
+    let playback = playback(true, Value::Null, Value::Null);
     same(&["--backwards"], (1..=12).rev(), &playback);
 }
 
 #[test]
 fn a_share_of_the_frames_is_passed_over() {
-    let playback = json!({ "backwards": false, "start_at": 0.25 });
+    let playback = playback(false, json!(0.25), Value::Null);
     same(&["--start-at", "0.25"], 4..=12, &playback);
 }
 
 #[test]
 fn backwards_the_share_is_counted_from_the_end() {
-    let playback = json!({ "backwards": true, "start_at": 0.3 });
+    let playback = playback(true, json!(0.3), Value::Null);
     let flags = ["--backwards", "--start-at", "0.3"];
     same(&flags, (1..=8).rev(), &playback);
 }
