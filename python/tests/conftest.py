@@ -1,6 +1,8 @@
 """Clips with the boxes that the library gives, and servers.
 
-The program `bagtrack` is that of $BAGTRACK, or target/debug/bagtrack. Real clips are taken from $BAGTRACK_SEQUENCES.
+The program `bagtrack` is that of $BAGTRACK, or target/debug/bagtrack, the example `tiny_network` that of
+$BAGTRACK_TINY_NETWORK, or target/debug/examples/tiny_network: `cargo test` builds both. Real clips are taken from
+$BAGTRACK_SEQUENCES.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("BAGTRACK", ROOT / "target/debug/bagtrack")).resolve()
+TINY_NETWORK = Path(os.environ.get("BAGTRACK_TINY_NETWORK", ROOT / "target/debug/examples/tiny_network")).resolve()
 SEED = 7
 FRAMES = 100
 REAL_CLIPS = ["Coke", "Surfer", "Girl"]
@@ -116,9 +119,9 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Clip:
 
 @pytest.fixture(scope="session")
 def network(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """The two files of a network without training, from an example that `cargo test` builds beside the program."""
+    """The two files of a network without training."""
     folder = tmp_path_factory.mktemp("network")
-    subprocess.run([PROGRAM.parent / "examples/tiny_network", folder], check=True)
+    subprocess.run([TINY_NETWORK, folder], check=True)
     return folder / "backbone.onnx", folder / "head.onnx"
 
 
