@@ -2,8 +2,8 @@
 //!
 //! The same frames played backwards, or from the middle on, serve as further videos: the first image and the changes
 //! differ. Fewer frames a second are what a client with a slow line sends, and a box drawn by hand is not exact. What can
-//! go wrong: a run needs a box to start from. So it starts at the first annotated frame at or after
-//! the chosen one, and a sequence without such a frame is refused.
+//! go wrong: a run needs a box to start from. So it starts at the first annotated frame at or after the chosen one, and a
+//! sequence without such a frame is refused.
 
 use bagtrack_tracker::Rect;
 use serde::Serialize;
