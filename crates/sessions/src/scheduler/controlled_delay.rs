@@ -4,7 +4,7 @@
 //! A burst fills a queue for a moment. A queue that stays helps nobody: no more gets done, and everything is late. So after
 //! an interval in which no wait was within the target, the newest request goes first, which is answered in time, and one
 //! that has waited twice the target is refused, where a newer one waits. A client that sends one at a time is never
-//! refused. This ends after an interval in which a request found none before it.
+//! refused. This ends after an interval in which none was refused and a request found none before it.
 
 use std::time::Duration;
 
@@ -18,6 +18,8 @@ pub(super) struct ControlledDelay {
     until: Duration,
     /// Whether the queue was long in it so far.
     is_long: bool,
+    /// Whether one was refused in it: a queue that is short for that would be long again in a moment.
+    has_refused: bool,
     is_overloaded: bool,
 }
 
@@ -47,13 +49,16 @@ impl ControlledDelay {
         } else {
             // Of an interval that ended long ago nothing is left.
             let is_recent = now < self.until + INTERVAL;
-            self.is_overloaded = is_recent && self.is_long;
+            self.is_overloaded = is_recent && (self.is_long || self.has_refused);
             (self.until, self.is_long) = (now + INTERVAL, !is_short);
+            self.has_refused = false;
         }
+        // Where it is alone no newer one would be answered in its place.
+        let is_refused = self.is_overloaded && waited > 2 * target && !is_alone;
+        self.has_refused |= is_refused;
         match self.is_overloaded {
             false => Order::Oldest,
-            // No newer one would be answered in its place.
-            true if waited > 2 * target && !is_alone => Order::Refuse,
+            true if is_refused => Order::Refuse,
             true => Order::Newest,
         }
     }
@@ -108,7 +113,13 @@ mod tests {
         assert_eq!(order(&mut delay, 500, 990, LATE), Order::Refuse);
         let mut after_a_pause = delay;
         assert_eq!(order(&mut after_a_pause, 5_000, 5_500, LATE), Order::Oldest);
+        // It was empty because others were refused.
         assert_eq!(order(&mut delay, 990, 1_000, Duration::ZERO), Order::Newest);
-        assert_eq!(order(&mut delay, 1_000, 1_500, LATE), Order::Oldest);
+        assert_eq!(order(&mut delay, 1_000, 1_490, TARGET), Order::Newest);
+        assert_eq!(
+            order(&mut delay, 1_490, 1_500, Duration::ZERO),
+            Order::Newest
+        );
+        assert_eq!(order(&mut delay, 1_500, 2_000, LATE), Order::Oldest);
     }
 }
