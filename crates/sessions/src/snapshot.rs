@@ -131,7 +131,9 @@ impl SessionSnapshot {
             }
         };
         for tracker in trackers.as_slice() {
-            content = extend(content, &&tracker.snapshot()[..]);
+            let snapshot = tracker.snapshot();
+            content = extend(content, &snapshot.len());
+            content.extend(snapshot);
         }
         content = extend(content, &recent.len());
         for Answered {

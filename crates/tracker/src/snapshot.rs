@@ -26,6 +26,8 @@ const VERSION: u32 = 17;
 /// Of a state with a second opinion.
 const EXPERT_VERSION: u32 = 0x1_0000 + VERSION;
 const HEADER: usize = 16;
+/// What most snapshots have room in, so that they are not moved while they grow.
+const USUAL_BYTES: usize = 80 << 10;
 
 const NO_EXPERT: &str = "the session has a second opinion by a network, which is not loaded here: give it with --model, in \
     Python as model";
@@ -40,17 +42,18 @@ const FRAMES: u64 = 1 << 53;
 /// The snapshot of `state`.
 pub(crate) fn write(state: &State) -> Vec<u8> {
     const PLAIN: &str = "the state has no type that postcard refuses";
-    let mut body = postcard::to_stdvec(state).expect(PLAIN);
+    let mut bytes = Vec::with_capacity(USUAL_BYTES);
+    bytes.resize(HEADER, 0);
+    bytes = postcard::to_extend(state, bytes).expect(PLAIN);
     let mut version = VERSION;
     if let Some(opinion) = &state.second_opinion {
         version = EXPERT_VERSION;
-        body = postcard::to_extend(opinion, body).expect(PLAIN);
+        bytes = postcard::to_extend(opinion, bytes).expect(PLAIN);
     }
-    let mut bytes = Vec::with_capacity(HEADER + body.len());
-    bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&version.to_le_bytes());
-    bytes.extend_from_slice(&crc32fast::hash(&body).to_le_bytes());
-    bytes.extend_from_slice(&body);
+    let checksum = crc32fast::hash(&bytes[HEADER..]);
+    bytes[..8].copy_from_slice(MAGIC);
+    bytes[8..12].copy_from_slice(&version.to_le_bytes());
+    bytes[12..HEADER].copy_from_slice(&checksum.to_le_bytes());
     bytes
 }
 

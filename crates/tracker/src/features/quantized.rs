@@ -37,9 +37,12 @@ impl Level for i8 {
     }
     /// Two in a byte.
     fn serialize_all<S: Serializer>(values: &[i8], serializer: S) -> Result<S::Ok, S::Error> {
-        let second = |pair: &[i8]| *pair.get(1).unwrap_or(&NONE);
-        let byte = |pair: &[i8]| (pair[0] & 15) as u8 | (second(pair) << 4) as u8;
-        serializer.collect_seq(values.chunks(2).map(byte))
+        let byte = |[first, second]: [i8; 2]| (first & 15) as u8 | (second << 4) as u8;
+        let (pairs, rest) = values.as_chunks();
+        let mut bytes: Vec<u8> = pairs.iter().map(|&pair| byte(pair)).collect();
+        bytes.extend(rest.iter().map(|&last| byte([last, NONE])));
+        // As a list of bytes, but not byte by byte.
+        serializer.serialize_bytes(&bytes)
     }
     fn deserialize_all<'de, D: Deserializer<'de>>(source: D) -> Result<Vec<i8>, D::Error> {
         let bytes = Vec::<i8>::deserialize(source)?;

@@ -1,0 +1,210 @@
+//! Writes DEFLATE (RFC 1951) with Huffman codes alone.
+//!
+//! A library that can do more takes four times as long, which is a tenth of the time of a frame whose session is stored.
+
+use super::prefix_code::{self, Code};
+
+/// The bytes of a block: each gets codes of its own.
+const BLOCK: usize = 8192;
+const END_OF_BLOCK: usize = 256;
+/// The bytes and the end of a block. The others in the format are for matches.
+const SYMBOLS: usize = END_OF_BLOCK + 1;
+/// So that [`BitWriter`] takes four. The format has 15.
+const MAX_BITS: usize = 14;
+
+/// Of the code of lengths.
+const LENGTH_SYMBOLS: usize = 19;
+const MAX_LENGTH_BITS: usize = 7;
+/// What a block's codes take at most: 258 lengths of so many bits, and theirs.
+const MAX_HEADER_BITS: usize = 3 + 14 + 3 * LENGTH_SYMBOLS + (SYMBOLS + 1) * MAX_LENGTH_BITS;
+/// In which order its own lengths are written.
+const ORDER: [usize; LENGTH_SYMBOLS] = [
+    16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15,
+];
+
+/// Appends `content` to `out`, compressed.
+pub(super) fn deflate(content: &[u8], out: &mut Vec<u8>) {
+    let mut bits = BitWriter::new(out);
+    let mut blocks = content.chunks(BLOCK).peekable();
+    if blocks.peek().is_none() {
+        bits.write_stored(&[], true);
+    }
+    while let Some(block) = blocks.next() {
+        write_block(block, blocks.peek().is_none(), &mut bits);
+    }
+    bits.align();
+}
+
+/// Writes a block with codes of its own, or as it is where these might make it longer.
+fn write_block(block: &[u8], is_last: bool, bits: &mut BitWriter<'_>) {
+    let counts = count(block);
+    let lengths = prefix_code::lengths(&counts, MAX_BITS);
+    if size(&counts, &lengths) + MAX_HEADER_BITS > 8 * block.len() {
+        return bits.write_stored(block, is_last);
+    }
+    bits.write(u16::from(is_last) | 0b10 << 1, 3);
+    write_lengths(&lengths, bits);
+    let codes = prefix_code::codes(&lengths);
+    let (fours, rest) = block.as_chunks::<4>();
+    for four in fours {
+        for &byte in four {
+            bits.push(codes[usize::from(byte)]);
+        }
+        bits.flush();
+    }
+    for &byte in rest {
+        bits.push(codes[usize::from(byte)]);
+        bits.flush();
+    }
+    bits.push(codes[END_OF_BLOCK]);
+    bits.flush();
+}
+
+fn count(block: &[u8]) -> [u32; SYMBOLS] {
+    // In four tables, so that equal bytes in a row do not wait for each other.
+    let mut tables = [[0; END_OF_BLOCK]; 4];
+    for four in block.chunks(4) {
+        for (table, &byte) in tables.iter_mut().zip(four) {
+            table[usize::from(byte)] += 1;
+        }
+    }
+    let mut counts = [1; SYMBOLS];
+    for (byte, count) in counts[..END_OF_BLOCK].iter_mut().enumerate() {
+        *count = tables.iter().map(|table| table[byte]).sum();
+    }
+    counts
+}
+
+/// The bits that the symbols take.
+fn size(counts: &[u32; SYMBOLS], lengths: &[u8; SYMBOLS]) -> usize {
+    let size_of = |(&count, &length): (&u32, &u8)| count as usize * usize::from(length);
+    counts.iter().zip(lengths).map(size_of).sum()
+}
+
+/// Writes the lengths of the codes, in a code of lengths and of runs of them.
+fn write_lengths(lengths: &[u8; SYMBOLS], bits: &mut BitWriter<'_>) {
+    let runs = runs(lengths);
+    let mut counts = [0; LENGTH_SYMBOLS];
+    for run in &runs {
+        counts[usize::from(run.symbol)] += 1;
+    }
+    let own_lengths = prefix_code::lengths(&counts, MAX_LENGTH_BITS);
+    let last = ORDER.iter().rposition(|&symbol| own_lengths[symbol] > 0);
+    let written = &ORDER[..=last.expect("there are lengths").max(3)];
+    // The numbers of literals above 257, of distances above 1, and of what is written above 4.
+    bits.write((written.len() as u16 - 4) << 10, 14);
+    for &symbol in written {
+        bits.write(own_lengths[symbol].into(), 3);
+    }
+    let codes = prefix_code::codes(&own_lengths);
+    for Run {
+        symbol,
+        rest,
+        bits_of_rest,
+    } in runs
+    {
+        bits.push(codes[usize::from(symbol)]);
+        bits.write(rest, bits_of_rest);
+    }
+}
+
+/// A length, or a run of them whose own length is `rest` above the shortest.
+struct Run {
+    symbol: u8,
+    rest: u16,
+    bits_of_rest: u32,
+}
+
+/// The lengths of the symbols, and of one distance that does not occur.
+fn runs(lengths: &[u8; SYMBOLS]) -> Vec<Run> {
+    let once = |symbol| Run {
+        symbol,
+        rest: 0,
+        bits_of_rest: 0,
+    };
+    let mut runs = Vec::with_capacity(SYMBOLS + 1);
+    let mut with_distance = [0; SYMBOLS + 1];
+    with_distance[..SYMBOLS].copy_from_slice(lengths);
+    for equal in with_distance.chunk_by(PartialEq::eq) {
+        let length = equal[0];
+        let mut left = equal.len();
+        if length > 0 {
+            runs.push(once(length));
+            left -= 1;
+        }
+        while left >= 3 {
+            let (symbol, shortest, longest, bits_of_rest) = match length {
+                0 if left > 10 => (18, 11, 138, 7),
+                0 => (17, 3, 10, 3),
+                _ => (16, 3, 6, 2),
+            };
+            let taken = left.min(longest);
+            let rest = (taken - shortest) as u16;
+            runs.push(Run {
+                symbol,
+                rest,
+                bits_of_rest,
+            });
+            left -= taken;
+        }
+        runs.extend((0..left).map(|_| once(length)));
+    }
+    runs
+}
+
+/// Bits on their way to bytes: the first one is a byte's lowest.
+struct BitWriter<'a> {
+    bytes: &'a mut Vec<u8>,
+    bits: u64,
+    count: u32,
+}
+
+impl<'a> BitWriter<'a> {
+    fn new(bytes: &'a mut Vec<u8>) -> Self {
+        Self {
+            bytes,
+            bits: 0,
+            count: 0,
+        }
+    }
+
+    /// Adds a code: at most four of [`MAX_BITS`] between two calls of [`flush`](Self::flush).
+    #[inline(always)]
+    fn push(&mut self, code: Code) {
+        self.bits |= u64::from(code.bits) << self.count;
+        self.count += u32::from(code.length);
+    }
+
+    /// Writes the whole bytes; at most seven bits stay.
+    #[inline(always)]
+    fn flush(&mut self) {
+        let whole = self.count / 8;
+        let end = self.bytes.len() + whole as usize;
+        self.bytes.extend_from_slice(&self.bits.to_le_bytes());
+        self.bytes.truncate(end);
+        self.bits >>= 8 * whole;
+        self.count %= 8;
+    }
+
+    fn write(&mut self, bits: u16, count: u32) {
+        self.bits |= u64::from(bits) << self.count;
+        self.count += count;
+        self.flush();
+    }
+
+    /// Fills the last byte up.
+    fn align(&mut self) {
+        self.count = self.count.next_multiple_of(8);
+        self.flush();
+    }
+
+    /// Writes a block as it is.
+    fn write_stored(&mut self, block: &[u8], is_last: bool) {
+        self.write(is_last.into(), 3);
+        self.align();
+        let length = block.len() as u16;
+        self.bytes.extend(length.to_le_bytes());
+        self.bytes.extend((!length).to_le_bytes());
+        self.bytes.extend(block);
+    }
+}
