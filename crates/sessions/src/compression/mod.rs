@@ -1,7 +1,7 @@
 //! The compression of stored sessions and snapshots: DEFLATE with Huffman codes alone.
 //!
-//! A state is quantised numbers, in which few runs of bytes come twice. So none is searched for, which saves time. zlib-rs
-//! would write the same format in four times the time; it reads it.
+//! A state is quantised numbers, in which few runs of bytes come twice. So none is searched for, which saves time.
+//! zlib-rs would write the same format in four times the time; it reads it.
 
 mod deflate;
 mod prefix_code;
