@@ -206,11 +206,14 @@ impl SessionState {
     ) -> Result<Vec<Estimates>, StepError<E>> {
         let mut answered = Vec::with_capacity(fingerprints.len());
         for (index, fingerprint) in fingerprints.iter().enumerate() {
-            let frame = frame(index, meter).map_err(StepError::Frame)?;
+            let frame = Arc::new(frame(index, meter).map_err(StepError::Frame)?);
             let correction = correction.filter(|_| index == 0);
             let seen = seen.as_deref_mut();
             let advanced = self.targets.advance(&frame, correction, meter, seen);
-            bagtrack_ingest::recycle(frame);
+            // Where another worker is still about to let go of it, its memory is not used again.
+            if let Some(frame) = Arc::into_inner(frame) {
+                bagtrack_ingest::recycle(frame);
+            }
             advanced.map_err(|error| match error {
                 TargetsError::Refused(error) => StepError::Refused { index, error },
                 TargetsError::Stopped(stopped) => StepError::Stopped(stopped),

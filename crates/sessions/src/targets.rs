@@ -139,41 +139,63 @@ impl Targets {
     }
 
     /// Tracks through a frame, in which the user may correct one target. Between targets `meter` says whether to go on.
+    /// Where workers are idle, they are tracked side by side.
     /// `seen` becomes what each tracker saw.
     ///
     /// # Errors
     /// See [`TargetsError`]. With more than one target, some may have taken the frame then.
     pub(super) fn advance(
         &mut self,
-        frame: &Frame,
+        frame: &Arc<Frame>,
         correction: Option<Correction>,
         meter: &mut WorkMeter,
         seen: Option<&mut Vec<Diagnostics>>,
     ) -> Result<(), TargetsError> {
-        let trackers = self.0.as_mut_slice();
-        let mut all_saw = Vec::new();
         if let Some(Correction { target, to }) = correction {
-            let corrected = trackers[target].retarget(frame, to);
+            let corrected = self.0.as_mut_slice()[target].retarget(frame, to);
             corrected.map_err(TargetsError::Refused)?;
         }
-        for (target, tracker) in trackers.iter_mut().enumerate() {
-            if correction.is_some_and(|correction| correction.target == target) {
-                continue;
+        let corrected = correction.map(|correction| correction.target);
+        let wants_seen = seen.is_some();
+        let all_saw = match &mut self.0 {
+            PerTarget::One(_) if corrected.is_some() => Vec::new(),
+            PerTarget::One(tracker) => {
+                meter.check().map_err(TargetsError::Stopped)?;
+                vec![meter.step(|| step(tracker, frame, wants_seen))]
             }
-            meter.check().map_err(TargetsError::Stopped)?;
-            if seen.is_some() {
-                let stepped = meter.step(|| tracker.step_with_diagnostics(frame));
-                let (_, saw) = stepped.map_err(TargetsError::Refused)?;
-                all_saw.push(saw);
-            } else {
-                let stepped = meter.step(|| tracker.step(frame).map(drop));
-                stepped.map_err(TargetsError::Refused)?;
+            PerTarget::List(trackers) => {
+                let mut others = std::mem::take(trackers);
+                let kept = corrected.map(|target| (target, others.remove(target)));
+                let frame = frame.clone();
+                let step = move |tracker: &mut Tracker| step(tracker, &frame, wants_seen);
+                let outcome;
+                (*trackers, outcome) = meter.side_by_side(others, step);
+                if let Some((target, tracker)) = kept {
+                    trackers.insert(target, tracker);
+                }
+                outcome.map_err(TargetsError::Stopped)?
             }
-        }
+        };
+        let all_saw = all_saw.into_iter().collect::<Result<Vec<_>, _>>();
+        let all_saw = all_saw.map_err(TargetsError::Refused)?;
         if let Some(seen) = seen {
-            *seen = all_saw;
+            *seen = all_saw.into_iter().flatten().collect();
         }
         Ok(())
+    }
+}
+
+/// Tracks through a frame, and tells what the tracker saw where that is wanted.
+fn step(
+    tracker: &mut Tracker,
+    frame: &Frame,
+    wants_seen: bool,
+) -> Result<Option<Diagnostics>, TrackerError> {
+    match wants_seen {
+        true => tracker
+            .step_with_diagnostics(frame)
+            .map(|(_, seen)| Some(seen)),
+        false => tracker.step(frame).map(|_| None),
     }
 }
 

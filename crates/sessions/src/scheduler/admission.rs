@@ -90,7 +90,7 @@ impl Admission {
     pub fn on(executor: Executor, queue: usize, workers: usize, delay: Duration) -> Self {
         Self {
             queue: Places::new(queue),
-            workers: FairQueue::new(workers, delay).measured_by(executor.cpu_clock()),
+            workers: FairQueue::new(workers, delay).before(executor.clone()),
             executor,
         }
     }
@@ -192,7 +192,9 @@ impl Admission {
 #[cfg(test)]
 mod tests {
     use super::super::flows::Job;
+    use super::super::work_limit::{CpuSpent, Stopped, WorkLimit};
     use super::*;
+    use crate::clock;
     use std::sync::mpsc;
 
     fn enter(admission: &Admission) -> Result<QueuePermit, QueueFull> {
@@ -321,5 +323,68 @@ mod tests {
         let told = WorkPanicked("a test panics".to_owned());
         assert_eq!(panicked, Err(NoOutcome::Panicked(told)));
         assert_eq!((admission.queue_places(), admission.busy_workers()), (1, 0));
+    }
+
+    fn limit() -> WorkLimit {
+        let long = Duration::from_secs(600);
+        WorkLimit::new(clock::now() + long, long, CpuSpent::default())
+    }
+
+    #[tokio::test]
+    async fn parts_of_a_request_are_done_side_by_side_where_a_worker_is_idle() {
+        let admission = Admission::new(9, 2, Duration::ZERO).unwrap();
+        let queue = enter(&admission).unwrap();
+        let (first, of_first) = mpsc::channel();
+        let (second, of_second) = mpsc::channel();
+        let parts = vec![(first, of_second, 1), (second, of_first, 2)];
+        let done = admission.run(queue, move |turn| {
+            let limit = limit();
+            let (parts, met) = limit
+                .start(turn)
+                .side_by_side(parts, |(here, other, number)| {
+                    here.send(()).unwrap();
+                    *number *= 10;
+                    other.recv_timeout(Duration::from_secs(60)).is_ok()
+                });
+            let numbers: Vec<i32> = parts.iter().map(|(.., number)| *number).collect();
+            (numbers, met)
+        });
+        let expected = (vec![10, 20], Ok(vec![true, true]));
+        assert_eq!(done.await.unwrap(), expected);
+        while admission.busy_workers() > 0 {
+            tokio::task::yield_now().await;
+        }
+    }
+
+    #[tokio::test]
+    async fn parts_stay_on_their_thread_where_no_worker_is_idle_and_come_back_when_work_stops() {
+        let admission = Admission::new(9, 1, Duration::ZERO).unwrap();
+        let queue = enter(&admission).unwrap();
+        let done = admission.run(queue, move |turn| {
+            let limit = limit();
+            let here = std::thread::current().id();
+            let is_here = move |_: &mut i32| std::thread::current().id() == here;
+            let (_, all) = limit.start(turn).side_by_side(vec![1, 2, 3], is_here);
+            assert_eq!(all, Ok(vec![true; 3]));
+            drop(limit.abandon_on_drop());
+            limit.start(turn).side_by_side(vec![1, 2, 3], is_here)
+        });
+        let stopped = (vec![1, 2, 3], Err(Stopped::Abandoned));
+        assert_eq!(done.await.unwrap(), stopped);
+    }
+
+    #[tokio::test]
+    async fn a_panic_in_a_part_is_one_of_the_work() {
+        let admission = Admission::new(9, 2, Duration::ZERO).unwrap();
+        let queue = enter(&admission).unwrap();
+        let result = admission.run(queue, |turn| {
+            let limit = limit();
+            let step = |part: &mut i32| assert_ne!(*part, 2, "a test panics");
+            drop(limit.start(turn).side_by_side(vec![1, 2, 3], step));
+        });
+        assert!(matches!(result.await, Err(NoOutcome::Panicked(_))));
+        while admission.busy_workers() > 0 {
+            tokio::task::yield_now().await;
+        }
     }
 }

@@ -13,7 +13,9 @@
 //! waits meanwhile, so there are more threads than workers, and a flow begins no second one of these while others do.
 
 use super::cpu_time::CpuClock;
+use super::executor::Executor;
 use super::flows::{Flow, Flows, Held, Job, Next, Request, SizeClass};
+use super::workers::AfterWork;
 use crate::sync::{self, Mutex, MutexGuard, PoisonError};
 use std::fmt;
 use std::sync::Arc;
@@ -28,6 +30,8 @@ type Give = Box<dyn FnOnce(WorkerSlot) -> Result<(), WorkerSlot> + Send>;
 pub(super) struct FairQueue {
     flows: Arc<Mutex<Flows<Give>>>,
     cpu: CpuClock,
+    /// What runs the work; none where a test does.
+    executor: Option<Executor>,
 }
 
 /// What a request asks of the queue.
@@ -64,12 +68,17 @@ impl FairQueue {
         Self {
             flows: Arc::new(Mutex::new(Flows::new(workers, delay))),
             cpu: CpuClock::Thread,
+            executor: None,
         }
     }
 
-    /// The queue before workers whose time this clock measures.
-    pub(super) fn measured_by(self, cpu: CpuClock) -> Self {
-        Self { cpu, ..self }
+    /// The queue before the workers of `executor`.
+    pub(super) fn before(self, executor: Executor) -> Self {
+        Self {
+            cpu: executor.cpu_clock(),
+            executor: Some(executor),
+            ..self
+        }
     }
 
     /// Calls `give` once there is a worker: now, or on the thread that gives its worker up. It is dropped where the
@@ -141,6 +150,17 @@ impl FairQueue {
         };
         self.hand_on(flow, class, held);
         Some(given)
+    }
+
+    /// Another worker for `flow`, where one is idle.
+    fn borrow_idle(&self, flow: Flow) -> Option<WorkerSlot> {
+        let class = {
+            let mut state = self.lock();
+            let class = state.worker_for(state.flows.get(&flow)?, Job::Single)?;
+            state.serve(flow, Job::Single, class);
+            class
+        };
+        Some(self.turn(flow, Job::Single, class))
     }
 
     fn turn(&self, flow: Flow, length: Job, class: SizeClass) -> WorkerSlot {
@@ -234,6 +254,38 @@ impl WorkerSlot {
             longest: self.longest,
             ends,
         }
+    }
+
+    /// Has an idle worker do `work` for the same request, over and over while it says that there is more and nobody else
+    /// wants a worker. False where none is idle, or all work has one thread.
+    pub(super) fn share(&self, work: impl Fn() -> bool + Send + 'static) -> bool {
+        let (Some(queue), CpuClock::Thread) = (&self.queue, self.cpu) else {
+            return false;
+        };
+        let Some(executor) = &queue.executor else {
+            return false;
+        };
+        let Some(mut borrowed) = queue.borrow_idle(self.flow) else {
+            return false;
+        };
+        let work = move || -> AfterWork {
+            borrowed.begin();
+            while work() && !borrowed.is_wanted() {}
+            drop(work);
+            Box::new(move || drop(borrowed))
+        };
+        // Of the request's own priority, for it waits for this.
+        executor.start(self.class, Box::new(work));
+        true
+    }
+
+    /// Whether another flow has a better claim to the worker, or there is more work than workers.
+    fn is_wanted(&mut self) -> bool {
+        let time = self.held(false).time;
+        self.queue.as_ref().is_some_and(|queue| {
+            let mut state = queue.lock();
+            state.is_crowded() || state.has_better(self.flow, self.class, time)
+        })
     }
 
     /// Lets a request of another flow go first, where that has the better claim. Blocks this thread until there is a

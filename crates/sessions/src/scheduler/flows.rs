@@ -264,6 +264,11 @@ impl<G> Flows<G> {
         Some((worker != waiting.class, waiting.running, waiting.used))
     }
 
+    /// Whether work of both classes has more threads than there are workers of one.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.running() > self.workers
+    }
+
     /// Whether a waiting flow has a better claim than this one to the worker that it has had for this time.
     pub(super) fn has_better(&mut self, flow: Flow, class: SizeClass, time: Duration) -> bool {
         let Some(own) = self.flows.get(&flow) else {

@@ -19,5 +19,6 @@ pub(crate) mod flows;
 mod interleavings;
 mod places;
 pub(crate) mod queue_permit;
+mod side_by_side;
 pub(crate) mod work_limit;
 pub(crate) mod workers;

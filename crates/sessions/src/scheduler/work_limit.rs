@@ -5,6 +5,7 @@
 
 use super::cpu_time::CpuClock;
 use super::fair_queue::WorkerSlot;
+use super::side_by_side::Parts;
 use crate::clock::{self, Instant};
 use crate::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::Arc;
@@ -75,6 +76,7 @@ impl WorkLimit {
             turn,
             cpu,
             started: cpu.now(),
+            elsewhere: Duration::ZERO,
             steps: Vec::new(),
         }
     }
@@ -97,6 +99,8 @@ pub struct WorkMeter<'a> {
     turn: &'a mut WorkerSlot,
     cpu: CpuClock,
     started: Duration,
+    /// What other threads have taken.
+    elsewhere: Duration,
     steps: Vec<Duration>,
 }
 
@@ -109,14 +113,53 @@ impl WorkMeter<'_> {
         result
     }
 
+    /// Does `step` to each of `parts`, here and on workers that are idle, and notes its processor time. Before each part
+    /// that is done here it [asks](Self::check) whether to go on. The parts come back in their order, and the results of
+    /// those that were done.
+    ///
+    /// # Panics
+    /// A step did.
+    pub fn side_by_side<T, R>(
+        &mut self,
+        parts: Vec<T>,
+        step: impl Fn(&mut T) -> R + Send + Sync + 'static,
+    ) -> (Vec<T>, Result<Vec<R>, Stopped>)
+    where
+        T: Send + 'static,
+        R: Send + 'static,
+    {
+        let others = parts.len().saturating_sub(1);
+        let parts = Arc::new(Parts::new(parts, step, self.cpu));
+        for _ in 0..others {
+            let shared = parts.clone();
+            if !self.turn.share(move || shared.work().is_some()) {
+                break;
+            }
+        }
+        let mut here = Duration::ZERO;
+        let stopped = loop {
+            let may_go_on = self.check();
+            match may_go_on.is_ok().then(|| parts.work()).flatten() {
+                Some(time) => here += time,
+                None => break may_go_on,
+            }
+        };
+        let (parts, done): (Vec<T>, Vec<_>) = parts.end().into_iter().unzip();
+        let (results, times): (Vec<R>, Vec<_>) = done.into_iter().flatten().unzip();
+        let all: Duration = times.iter().sum();
+        self.elsewhere += all.saturating_sub(here);
+        self.steps.extend(times);
+        (parts, stopped.map(|()| results))
+    }
+
     /// The processor time of each step since this was asked last.
     pub fn take_steps(&mut self) -> Vec<Duration> {
         std::mem::take(&mut self.steps)
     }
 
-    /// Processor time that the work has taken.
+    /// Processor time that the work has taken, on all threads.
     pub fn cpu_time(&self) -> Duration {
-        self.cpu.now().saturating_sub(self.started)
+        self.cpu.now().saturating_sub(self.started) + self.elsewhere
     }
 
     /// Whether the work may go on. Waits while requests of clients with a better claim have its worker.

@@ -1,0 +1,104 @@
+//! The parts of one request's work, side by side: on the thread that has it, and on workers that are idle.
+//!
+//! Each thread takes the next part until none is left. So a worker that comes late, or has to go, delays no part but the
+//! one that it is at.
+
+use super::cpu_time::CpuClock;
+use crate::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::any::Any;
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::time::Duration;
+
+/// What a part has become, and where it was done the result and the processor time.
+pub(super) type Outcome<T, R> = (T, Option<(R, Duration)>);
+
+/// The parts, for all threads that work on them.
+pub(super) struct Parts<T, R, F> {
+    step: F,
+    cpu: CpuClock,
+    state: Mutex<State<T, R>>,
+    /// A thread has ended its part.
+    ended: Condvar,
+}
+
+struct State<T, R> {
+    waiting: VecDeque<(usize, T)>,
+    /// How many parts threads are at.
+    begun: usize,
+    done: Vec<(usize, Outcome<T, R>)>,
+    panic: Option<Box<dyn Any + Send>>,
+}
+
+impl<T, R, F: Fn(&mut T) -> R> Parts<T, R, F> {
+    /// To each of `parts` `step` is to be done; `cpu` measures it.
+    pub(super) fn new(parts: Vec<T>, step: F, cpu: CpuClock) -> Self {
+        let state = State {
+            done: Vec::with_capacity(parts.len()),
+            waiting: parts.into_iter().enumerate().collect(),
+            begun: 0,
+            panic: None,
+        };
+        Self {
+            step,
+            cpu,
+            state: Mutex::new(state),
+            ended: Condvar::new(),
+        }
+    }
+
+    /// Works on the next part, and tells its processor time; none where no part is left.
+    pub(super) fn work(&self) -> Option<Duration> {
+        let (number, mut part) = {
+            let mut state = self.lock();
+            let next = state.waiting.pop_front()?;
+            state.begun += 1;
+            next
+        };
+        let before = self.cpu.now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| (self.step)(&mut part)));
+        let time = self.cpu.now().saturating_sub(before);
+        let mut state = self.lock();
+        state.begun -= 1;
+        match outcome {
+            Ok(result) => state.done.push((number, (part, Some((result, time))))),
+            Err(panic) => {
+                state.waiting.clear();
+                state.panic = Some(panic);
+            }
+        }
+        self.ended.notify_all();
+        Some(time)
+    }
+
+    /// Takes all parts back in their order, once none is worked on. Those that wait are not begun.
+    ///
+    /// # Panics
+    /// As a step did.
+    pub(super) fn end(&self) -> Vec<Outcome<T, R>> {
+        let mut state = self.lock();
+        let left = std::mem::take(&mut state.waiting);
+        while state.begun > 0 {
+            state = self
+                .ended
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+        if let Some(panic) = state.panic.take() {
+            drop(state);
+            resume_unwind(panic);
+        }
+        let mut all = std::mem::take(&mut state.done);
+        all.extend(
+            left.into_iter()
+                .map(|(number, part)| (number, (part, None))),
+        );
+        all.sort_unstable_by_key(|(number, _)| *number);
+        all.into_iter().map(|(_, outcome)| outcome).collect()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<T, R>> {
+        // Nothing panics while it is held.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
