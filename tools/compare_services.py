@@ -3,12 +3,12 @@
 
     cargo build --release
     pip install opencv-contrib-python-headless fastapi uvicorn psutil
-    tools/compare_services.py CLIP... --trackers CSRT,KCF [--clients 1,8,64] [--nano BACKBONE HEAD]
+    tools/compare_services.py CLIP... --trackers CSRT,KCF [--clients 1,8,64] [--nano BACKBONE HEAD] [--targets 16]
 
 A clip is a folder in the layout of OTB. All services get the same frames of each clip in turns. A client sends each
 frame when the one before is answered; the clients are one process on the same cores, so times and frames a second are
 those of a busy machine. The processor time is the service's alone, and memory is its resident set at the end. Ratios
-to bagtrack come first.
+to bagtrack come first. With --targets there is a line for bagtrack with so many boxes all over the frame, too.
 """
 
 import argparse
@@ -23,6 +23,8 @@ import sys
 import threading
 import time
 
+import cv2
+import numpy
 import psutil
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -40,7 +42,7 @@ class Service:
     def __init__(self, name, options):
         self.name, self.port = name, free_port()
         environment = dict(os.environ)
-        if name == "bagtrack":
+        if name.startswith("bagtrack"):
             command = [options.bagtrack, "serve", "--listen", f"127.0.0.1:{self.port}", "--log", "warn"]
             # All clients of this measurement have one address.
             command += ["--client-sessions", "1000", "--client-requests", "1000", "--client-connections", "1000"]
@@ -69,13 +71,17 @@ class Service:
 
 
 class Clip:
-    def __init__(self, folder, frames):
+    def __init__(self, folder, frames, targets=1):
         paths = sorted(path for path in (folder / "img").iterdir() if path.suffix in {".jpg", ".png"})
         self.name = folder.name
         self.files = [path.read_bytes() for path in paths[: frames + 1]]
         line = (folder / "groundtruth_rect.txt").read_text().split("\n", 1)[0]
         x, y, width, height = (float(number) for number in re.findall(r"[\d.-]+", line))
-        self.box = f"{x - 1},{y - 1},{width},{height}"
+        self.boxes = [(x - 1, y - 1, width, height)]
+        rows, columns = cv2.imdecode(numpy.frombuffer(self.files[0], numpy.uint8), cv2.IMREAD_GRAYSCALE).shape
+        for number in range(1, targets):
+            left, top = columns * (number % 4 + 0.5) / 4 - width / 2, rows * (number // 4 + 0.5) / 4 - height / 2
+            self.boxes.append((left, top, width, height))
         self.type = "image/png" if paths[0].suffix == ".png" else "image/jpeg"
 
 
@@ -100,7 +106,9 @@ class Client(threading.Thread):
         try:
             self.connection.connect()
             self.connection.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            name = self.send(f"/sessions?box={self.clip.box}", self.clip.files[0])["id"]
+            boxes = ";".join(",".join(map(str, box)) for box in self.clip.boxes)
+            setting = "box" if len(self.clip.boxes) == 1 else "boxes"
+            name = self.send(f"/sessions?{setting}={boxes}", self.clip.files[0])["id"]
             self.start_together.wait()
             for number in range(self.frames):
                 begun = time.perf_counter()
@@ -149,6 +157,7 @@ def main():
     parser.add_argument("--trackers", default="CSRT,KCF", help="trackers of OpenCV")
     parser.add_argument("--nano", nargs=2, metavar=("BACKBONE", "HEAD"), help="also NanoTrack, with these ONNX files")
     parser.add_argument("--clients", default="1,8,64")
+    parser.add_argument("--targets", type=int, default=1, help="also bagtrack with so many targets of one client")
     parser.add_argument("--frames", type=int, default=100, help="frames of all clients together, and at least ten each")
     parser.add_argument("--bagtrack", default=str(ROOT / "target/release/bagtrack"))
     options = parser.parse_args()
@@ -158,9 +167,12 @@ def main():
     for folder in options.clips:
         for clients in map(int, options.clients.split(",")):
             frames = max(10, options.frames // clients)
-            clip = Clip(folder, frames)
+            runs = [(name, 1) for name in names]
+            if options.targets > 1 and clients == 1:
+                runs.insert(1, (f"bagtrack, {options.targets} targets", options.targets))
             base = None
-            for name in names:
+            for name, targets in runs:
+                clip = Clip(folder, frames, targets)
                 seen = measure(name, clip, clients, frames, options)
                 base = base or seen["cpu"]
                 print(
