@@ -3,7 +3,7 @@
 use super::prefix_code::{self, Code};
 
 /// The bytes of a block: each gets codes of its own.
-const BLOCK: usize = 8192;
+const BLOCK: usize = 4096;
 const END_OF_BLOCK: usize = 256;
 /// The bytes and the end of a block. The others in the format are for matches.
 const SYMBOLS: usize = END_OF_BLOCK + 1;
@@ -61,10 +61,14 @@ fn write_block(block: &[u8], is_last: bool, bits: &mut BitWriter<'_>) {
 fn count(block: &[u8]) -> [u32; SYMBOLS] {
     // In four tables, so that equal bytes in a row do not wait for each other.
     let mut tables = [[0; END_OF_BLOCK]; 4];
-    for four in block.chunks(4) {
+    let (fours, rest) = block.as_chunks::<4>();
+    for four in fours {
         for (table, &byte) in tables.iter_mut().zip(four) {
             table[usize::from(byte)] += 1;
         }
+    }
+    for &byte in rest {
+        tables[0][usize::from(byte)] += 1;
     }
     let mut counts = [1; SYMBOLS];
     for (byte, count) in counts[..END_OF_BLOCK].iter_mut().enumerate() {
