@@ -46,6 +46,7 @@ class Service:
             command = [options.bagtrack, "serve", "--listen", f"127.0.0.1:{self.port}", "--log", "warn"]
             # All clients of this measurement have one address.
             command += ["--client-sessions", "1000", "--client-requests", "1000", "--client-connections", "1000"]
+            command += ["--queue-delay", "0s"]
         else:
             environment["TRACKER"] = name
             if name == "Nano":
