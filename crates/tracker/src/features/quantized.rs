@@ -3,8 +3,10 @@
 //! A session keeps more than a hundred feature vectors. Each has a scale of its own, so in 4 bits a value is off by at
 //! most 1/14 of the vector's largest. Running means have 10 bits: a small step must change them.
 
+use std::fmt;
+
 use pulp::{Arch, Simd};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Added to a number below 2^22, it leaves the nearest whole number in the last bits.
@@ -45,9 +47,25 @@ impl Level for i8 {
         serializer.serialize_bytes(&bytes)
     }
     fn deserialize_all<'de, D: Deserializer<'de>>(source: D) -> Result<Vec<i8>, D::Error> {
-        let bytes = Vec::<i8>::deserialize(source)?;
-        let mut values = Vec::with_capacity(2 * bytes.len());
-        values.extend(bytes.iter().flat_map(|byte| [byte << 4 >> 4, byte >> 4]));
+        source.deserialize_bytes(Pairs)
+    }
+}
+
+/// Takes bytes of two values each.
+struct Pairs;
+
+impl Visitor<'_> for Pairs {
+    type Value = Vec<i8>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("bytes of two values each")
+    }
+
+    fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<i8>, E> {
+        let mut values = vec![0; 2 * bytes.len()];
+        for (pair, &byte) in values.as_chunks_mut().0.iter_mut().zip(bytes) {
+            *pair = [(byte << 4) as i8 >> 4, byte as i8 >> 4];
+        }
         values.pop_if(|last| *last == NONE);
         Ok(values)
     }
