@@ -6,6 +6,9 @@
 
 use pulp::{Arch, Simd};
 
+/// Added to a number below 2^51, it leaves the nearest whole number in the last bits.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
 /// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
 /// `1 / T`.
 struct Cell {
@@ -45,25 +48,30 @@ pub fn area_average_simd<S: Simd>(
 ) {
     let is_whole = source.0.is_multiple_of(target.0);
     let boundaries = boundaries(source.0, target.0);
-    let mut integrals = Integrals::default();
+    let mut integral = Vec::new();
     let width = source.0 as usize;
     out.reserve_exact(target.0 as usize * target.1 as usize);
     // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
     // source height; 255 times that stays far below 2^32 for any image that fits into memory.
-    let mut sums = vec![0_u32; width];
+    let mut sums = vec![0_u32; width + 1];
     for cell in cells(source.1, target.1) {
         sums.fill(0);
         let first = cell.begin - usize::from(cell.before > 0);
         let end = cell.end + usize::from(cell.after > 0);
-        let rows = luma.chunks_exact(width).enumerate();
-        for (index, row) in rows.take(end).skip(first) {
-            let share = match index {
-                _ if index < cell.begin => cell.before,
-                _ if index >= cell.end => cell.after,
-                _ => target.1,
-            };
-            for (sum, &value) in sums.iter_mut().zip(row) {
-                *sum += u32::from(value) * share;
+        let row = |index: usize| &luma[index * width..][..width];
+        let share = |index: usize| match index {
+            _ if index >= end => 0,
+            _ if index < cell.begin => cell.before,
+            _ if index >= cell.end => cell.after,
+            _ => target.1,
+        };
+        // Two at a time, so that sums are loaded and stored half as often.
+        for index in (first..end).step_by(2) {
+            let next = index + 1;
+            let rows = row(index).iter().zip(row(next.min(end - 1)));
+            let shares = [share(index), share(next)];
+            for (sum, (&one, &other)) in sums.iter_mut().zip(rows) {
+                *sum += u32::from(one) * shares[0] + u32::from(other) * shares[1];
             }
         }
         match source.0 / target.0 {
@@ -71,7 +79,7 @@ pub fn area_average_simd<S: Simd>(
             3 if is_whole => average_whole::<3>(&sums, source.1, out),
             4 if is_whole => average_whole::<4>(&sums, source.1, out),
             6 if is_whole => average_whole::<6>(&sums, source.1, out),
-            _ => integrals.average_row(&sums, &boundaries, source, out),
+            _ => average_row(&sums, &boundaries, source, &mut integral, out),
         }
     }
 }
@@ -86,49 +94,37 @@ fn boundaries(source: u32, target: u32) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Sums of a row from its beginning.
-#[derive(Default)]
-struct Integrals {
-    /// Up to each source column, and of that column.
-    of_columns: Vec<[u64; 2]>,
-    /// Up to each boundary of a target pixel, in units of `1 / T`.
-    of_boundaries: Vec<u64>,
-}
-
-impl Integrals {
-    /// Appends the averages of one row of target pixels, from the sums of its source columns. The loops have no
-    /// branches: how many columns a target pixel covers changes from one to the next.
-    #[inline(always)]
-    fn average_row(
-        &mut self,
-        sums: &[u32],
-        boundaries: &[(u32, u32)],
-        source: (u32, u32),
-        out: &mut Vec<u8>,
-    ) {
-        let target = boundaries.len() as u64 - 1;
-        let mut integral = 0;
-        self.of_columns.clear();
-        self.of_columns.extend(sums.iter().map(|&sum| {
-            let before = integral;
-            integral += u64::from(sum);
-            [before, u64::from(sum)]
-        }));
-        self.of_columns.push([integral, 0]);
-        self.of_boundaries.clear();
-        self.of_boundaries
-            .extend(boundaries.iter().map(|&(column, part)| {
-                let [before, sum] = self.of_columns[column as usize];
-                before * target + sum * u64::from(part)
-            }));
-        let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
-        let begins = self.of_boundaries.iter();
-        let cells = begins.zip(&self.of_boundaries[1..]);
-        out.extend(cells.map(|(begin, end)| divisor.rounded(end - begin)));
+/// Appends the averages of one row of target pixels, from the sums of its source columns and a zero. The loops have no
+/// branches: how many columns a target pixel covers changes from one to the next. `integral` is a buffer.
+#[inline(always)]
+fn average_row(
+    sums: &[u32],
+    boundaries: &[(u32, u32)],
+    source: (u32, u32),
+    integral: &mut Vec<i64>,
+    out: &mut Vec<u8>,
+) {
+    let target = boundaries.len() - 1;
+    let mut total = 0;
+    integral.resize(sums.len(), 0);
+    for (before, &sum) in integral.iter_mut().zip(sums) {
+        *before = total;
+        total += i64::from(sum);
+    }
+    let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
+    let first = out.len();
+    out.resize(first + target, 0);
+    let mut begin = 0;
+    for (average, &(column, part)) in out[first..].iter_mut().zip(&boundaries[1..]) {
+        let before = integral[column as usize] * target as i64;
+        // In units of `1 / T`. A signed number becomes a floating-point one in one instruction.
+        let end = before + i64::from(sums[column as usize]) * i64::from(part);
+        *average = divisor.rounded((end - begin) as f64);
+        begin = end;
     }
 }
 
-/// As [`Integrals::average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
+/// As [`average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
 #[inline(always)]
 fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
     let divisor = Divisor::new(WIDTH as u64 * u64::from(height));
@@ -136,34 +132,29 @@ fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8
     out.extend(
         cells
             .iter()
-            .map(|cell| divisor.rounded(u64::from(cell.iter().sum::<u32>()))),
+            .map(|cell| divisor.rounded(f64::from(cell.iter().sum::<u32>()))),
     );
 }
 
-/// A divisor of many values that are at most 255 times as large. An integer division would take longer than everything
-/// else that is done for a target pixel, and one in floating point is not vectorised.
+/// A divisor of many values that are at most 255 times as large. A division would take longer than everything else that
+/// is done for a target pixel.
 struct Divisor {
-    divisor: u64,
-    /// 2^48 / `divisor`, rounded down: the product with a value stays below 2^56.
-    inverse: u64,
+    inverse: f64,
 }
 
 impl Divisor {
     #[inline(always)]
     fn new(divisor: u64) -> Self {
         Self {
-            divisor,
-            inverse: (1 << 48) / divisor,
+            inverse: 1.0 / divisor as f64,
         }
     }
 
-    /// The nearest whole number to the quotient, the larger of two.
+    /// The nearest whole number to the quotient, the larger of two; `value` is a whole number. As long as the divisor is
+    /// below 2^40, what is added to the value outweighs the rounding, and does not reach the next quotient.
     #[inline(always)]
-    fn rounded(&self, value: u64) -> u8 {
-        let value = value + self.divisor / 2;
-        // Off by less than one, as long as the divisor is below 2^40.
-        let near = (value * self.inverse) >> 48;
-        (near + u64::from((near + 1) * self.divisor <= value)) as u8
+    fn rounded(&self, value: f64) -> u8 {
+        ((value + 0.25) * self.inverse + ROUND).to_bits() as u8
     }
 }
 
