@@ -12,8 +12,8 @@ use pulp::Simd;
 
 use super::element::Element;
 
-/// Tiles of the second set that stay in the cache: eight vectors at most, of 640 single-precision values 20 KB.
-const BLOCK: usize = 2;
+/// Vectors of the second set, at most, that stay in the cache: of 768 single-precision values 24 KB.
+const BLOCK: usize = 8;
 
 /// The inner products of each of the vectors `a` with each of the vectors `b`, all of length `len`: those of the
 /// `i`-th of `a` from `out[i * stride]` on.
@@ -31,7 +31,10 @@ pub(crate) fn multiply<S: Simd, T: Element>(
     out: &mut [T],
 ) {
     assert!(stride >= b.len() / len, "a row of `out` holds all products");
-    if S::REGISTER_COUNT >= 32 {
+    if cfg!(target_family = "wasm") {
+        // Engines keep two of a processor's 16 registers for themselves, and need one for a product.
+        multiply_tiles::<S, T, 4, 2>(simd, a, b, len, stride, out);
+    } else if S::REGISTER_COUNT >= 32 {
         multiply_tiles::<S, T, 6, 4>(simd, a, b, len, stride, out);
     } else {
         multiply_tiles::<S, T, 4, 3>(simd, a, b, len, stride, out);
@@ -48,8 +51,9 @@ fn multiply_tiles<S: Simd, T: Element, const A: usize, const B: usize>(
     out: &mut [T],
 ) {
     let (count_a, count_b) = (a.len() / len, b.len() / len);
-    for block in (0..count_b).step_by(BLOCK * B) {
-        let end = (block + BLOCK * B).min(count_b);
+    let block_len = BLOCK / B * B;
+    for block in (0..count_b).step_by(block_len) {
+        let end = (block + block_len).min(count_b);
         for i in (0..count_a).step_by(A) {
             let mut rows_a = [&a[..0]; A];
             for (p, row) in rows_a.iter_mut().enumerate() {

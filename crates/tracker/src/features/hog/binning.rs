@@ -43,17 +43,17 @@ pub(crate) fn sum_row<S: Simd, const SPACING: usize, const IS_FIRST: bool>(
     let zero = simd.splat_f32s(0.0);
     let mut total = [zero; LANES];
     let (bins, _) = row.bins.as_chunks::<SPACING>();
-    let (strengths, _) = row.strengths.as_chunks::<SPACING>();
+    let (half_strengths, _) = row.half_strengths.as_chunks::<SPACING>();
     let (grays, _) = row.gray[1..].as_chunks::<SPACING>();
     let (cbs, _) = row.chroma[0].as_chunks::<SPACING>();
     let (crs, _) = row.chroma[1].as_chunks::<SPACING>();
     let pixels = bins
         .iter()
-        .zip(strengths)
+        .zip(half_strengths)
         .zip(grays)
         .zip(cbs.iter().zip(crs));
     let corners = above[1..].iter().zip(&mut below[1..]);
-    for ((((bins, strengths), grays), (cbs, crs)), (above, below)) in pixels.zip(corners) {
+    for ((((bins, half_strengths), grays), (cbs, crs)), (above, below)) in pixels.zip(corners) {
         let (above, below) = (above.load::<S>(), below.load_mut::<S>());
         for register in 0..registers::<S>() {
             // Not added to `total` one by one, since each addition would wait for the one before.
@@ -62,12 +62,18 @@ pub(crate) fn sum_row<S: Simd, const SPACING: usize, const IS_FIRST: bool>(
                 let bin = simd.splat_f32s(bins[i]);
                 let distance = simd.abs_f32s(simd.sub_f32s(bin, centers[register]));
                 let share = simd.mul_add_e_f32s(slopes[register], distance, tops[register]);
-                let (strength, gray) = (simd.splat_f32s(strengths[i]), simd.splat_f32s(grays[i]));
-                let (cb, cr) = (simd.splat_f32s(cbs[i]), simd.splat_f32s(crs[i]));
-                sum = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
-                sum = simd.mul_add_e_f32s(cb_shares[register], cb, sum);
-                sum = simd.mul_add_e_f32s(cr_shares[register], cr, sum);
-                sum = simd.mul_add_e_f32s(simd.max_f32s(share, zero), strength, sum);
+                // Registers of directions alone have no part in the other channels.
+                if (register + 1) * S::F32_LANES > DIRECTIONS {
+                    let gray = simd.splat_f32s(grays[i]);
+                    let (cb, cr) = (simd.splat_f32s(cbs[i]), simd.splat_f32s(crs[i]));
+                    sum = simd.mul_add_e_f32s(gray_shares[register], gray, sum);
+                    sum = simd.mul_add_e_f32s(cb_shares[register], cb, sum);
+                    sum = simd.mul_add_e_f32s(cr_shares[register], cr, sum);
+                }
+                // Twice the maximum of the share and 0: WebAssembly has no quick maximum. Both factors are exact.
+                let share = simd.add_f32s(share, simd.abs_f32s(share));
+                let half_strength = simd.splat_f32s(half_strengths[i]);
+                sum = simd.mul_add_e_f32s(share, half_strength, sum);
             }
             total[register] = simd.add_f32s(total[register], sum);
             let before = if IS_FIRST {

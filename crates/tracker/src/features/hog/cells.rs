@@ -195,7 +195,8 @@ impl HogCells {
             for (cell, &factor) in cells.iter().zip(factors) {
                 let (direction_factor, cell) = (simd.splat_f32s(factor), cell.load::<S>());
                 let mut values = Lanes::ZERO;
-                for (register, value) in values.load_mut::<S>().iter_mut().enumerate() {
+                let registers = values.load_mut::<S>().iter_mut().take(registers::<S>());
+                for (register, value) in registers.enumerate() {
                     let factor = simd.mul_add_e_f32s(
                         directions[register],
                         direction_factor,

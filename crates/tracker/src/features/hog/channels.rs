@@ -35,10 +35,10 @@ pub(crate) struct Lanes(pub [f32; LANES]);
 /// The channels in vector registers; the first [`registers`] of the array are used.
 pub(crate) type Registers<S> = [<S as Simd>::f32s; LANES];
 
-/// How many registers the channels fill.
+/// How many registers hold the channels.
 #[inline(always)]
 pub(crate) fn registers<S: Simd>() -> usize {
-    LANES / S::F32_LANES
+    CHANNELS.div_ceil(S::F32_LANES)
 }
 
 impl Lanes {

@@ -12,8 +12,8 @@ use crate::image::ycbcr::NEUTRAL;
 pub(crate) struct GradientRow {
     /// The unsigned direction of each pixel's gradient, in bins: 0 to [`DIRECTIONS`] for 0 to 180 degrees.
     pub bins: Vec<f32>,
-    /// Their lengths, in gray levels: 0 to 255 √2.
-    pub strengths: Vec<f32>,
+    /// Half of their lengths, in gray levels: 0 to 255 / √2.
+    pub half_strengths: Vec<f32>,
     /// The gray values minus an offset, after that of the pixel before the row.
     pub gray: Vec<f32>,
     /// Cb and Cr minus that of gray, compressed: in units of [`HALF_CHROMA`], -1 to 1.
@@ -50,44 +50,50 @@ impl GradientRow {
         }
         let count = pixels.len();
         self.bins.resize(count, 0.0);
-        self.strengths.resize(count, 0.0);
+        self.half_strengths.resize(count, 0.0);
         let above = &row(y.saturating_sub(1))[pixels.clone()];
         let below = &row((y + 1).min(height - 1))[pixels];
-        let out = self.bins.iter_mut().zip(&mut self.strengths);
+        let out = self.bins.iter_mut().zip(&mut self.half_strengths);
         let across = self.gray[2..].iter().zip(&self.gray);
         let down = below.iter().zip(above);
-        for (((right, left), (&below, &above)), (bin, strength)) in across.zip(down).zip(out) {
+        for (((right, left), (&below, &above)), (bin, half_strength)) in across.zip(down).zip(out) {
             let across = right - left;
             let down = f32::from(below) - f32::from(above);
             *bin = angle(across, down) * (DIRECTIONS as f32 / std::f32::consts::PI);
-            *strength = (across * across + down * down).sqrt();
+            *half_strength = 0.5 * (across * across + down * down).sqrt();
         }
         self.bins.resize(padded, 0.0);
-        self.strengths.resize(padded, 0.0);
+        self.half_strengths.resize(padded, 0.0);
         self.gray.truncate(count + 1);
         self.gray.resize(padded + 1, 0.0);
     }
 }
+
+/// The compressed chroma of each value of a pixel.
+const COMPRESSED: [f32; 256] = {
+    let mut compressed = [0.0; 256];
+    let mut value = 0;
+    while value < 256 {
+        let chroma = value as f32 - NEUTRAL as f32;
+        compressed[value] = chroma / (HALF_CHROMA + chroma.abs());
+        value += 1;
+    }
+    compressed
+};
 
 /// Appends the compressed chroma of `pixels` in row `y` of the luma, whose pixels are half as large as those of `plane`.
 #[inline(always)]
 fn compress_chroma(plane: &Plane, pixels: Range<usize>, y: usize, out: &mut Vec<f32>) {
     let row = plane.row(y / 2);
     let last = row.len() - 1;
-    let compress = |value: u8| {
-        let value = f32::from(value) - NEUTRAL as f32;
-        value / (HALF_CHROMA + value.abs())
-    };
-    let (first, end) = (pixels.start / 2, (pixels.end - 1) / 2);
+    let (first, end) = (pixels.start / 2, (pixels.end - 1) / 2 + 1);
     // Of the first and the last pair only one may be wanted.
-    out.reserve(pixels.len() + 2);
-    for column in first..=end {
-        let value = compress(row[column.min(last)]);
-        out.extend([value, value]);
+    let skipped = pixels.start % 2;
+    out.resize(2 * (end - first), 0.0);
+    for (pair, column) in out.as_chunks_mut().0.iter_mut().zip(first..end) {
+        *pair = [COMPRESSED[usize::from(row[column.min(last)])]; 2];
     }
-    if pixels.start % 2 == 1 {
-        out.remove(0);
-    }
+    out.copy_within(skipped.., 0);
     out.truncate(pixels.len());
 }
 

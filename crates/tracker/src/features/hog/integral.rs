@@ -201,11 +201,11 @@ mod tests {
                 for y in top..top + down {
                     let mut row = GradientRow::default();
                     row.compute(&frame, left..left + across, y, across, 0.0);
-                    for (x, (bin, strength)) in row.bins.iter().zip(&row.strengths).enumerate() {
+                    for (x, (bin, half)) in row.bins.iter().zip(&row.half_strengths).enumerate() {
                         // A direction of 180 degrees is one of 0.
                         let (lower, share) = (*bin as usize % DIRECTIONS, bin.fract());
-                        expected[lower] += strength * (1.0 - share);
-                        expected[(lower + 1) % DIRECTIONS] += strength * share;
+                        expected[lower] += 2.0 * half * (1.0 - share);
+                        expected[(lower + 1) % DIRECTIONS] += 2.0 * half * share;
                         let gray = frame.pixels()[y * 60 + left + x];
                         expected[GRAY] += f32::from(gray) - sums.mean_gray;
                     }
