@@ -48,6 +48,8 @@ pub(crate) struct HogCells {
     /// The edges of the cells in the integral image.
     x_edges: SampleCoords,
     y_edges: SampleCoords,
+    /// For an area that reaches out of the window: how many of its pixels each column of cells spans.
+    widths_inside: Vec<f32>,
 }
 
 impl HogCells {
@@ -68,6 +70,7 @@ impl HogCells {
         self.norm.resize(columns, rows);
         self.x_edges.resize(columns + 1);
         self.y_edges.resize(rows + 1);
+        self.widths_inside.resize(columns, 0.0);
     }
 
     /// Sums the cells of `area`, and their energies.
@@ -102,15 +105,19 @@ impl HogCells {
     #[cold]
     fn blacken_outside(&mut self, integral: &IntegralChannels) {
         (self.gray_sum, self.gray_squares) = (0.0, 0.0);
-        for (index, cell) in self.cells.iter_mut().enumerate() {
-            let (column, row) = (index % self.columns, index / self.columns);
-            let x = |edge: usize| integral.x.pixels_before(self.x_edges.get(edge));
-            let y = |edge: usize| integral.y.pixels_before(self.y_edges.get(edge));
-            let inside = (x(column + 1) - x(column)) * (y(row + 1) - y(row));
-            let gray = &mut cell.0[GRAY];
-            *gray -= integral.mean_gray * (self.cell_area - inside);
-            self.gray_sum += *gray;
-            self.gray_squares += *gray * *gray;
+        let x = |edge: usize| integral.x.pixels_before(self.x_edges.get(edge));
+        let y = |edge: usize| integral.y.pixels_before(self.y_edges.get(edge));
+        for (column, width) in self.widths_inside.iter_mut().enumerate() {
+            *width = x(column + 1) - x(column);
+        }
+        for (row, cells) in self.cells.chunks_exact_mut(self.columns).enumerate() {
+            let height = y(row + 1) - y(row);
+            for (cell, width) in cells.iter_mut().zip(&self.widths_inside) {
+                let gray = &mut cell.0[GRAY];
+                *gray -= integral.mean_gray * (self.cell_area - width * height);
+                self.gray_sum += *gray;
+                self.gray_squares += *gray * *gray;
+            }
         }
     }
 
