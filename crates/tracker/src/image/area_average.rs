@@ -4,10 +4,16 @@
 //! target size `T`. In units of `1 / T` source pixel every interval has the length `S`, and its shares of source pixels
 //! are whole numbers too. So the average is exact up to the final rounding.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd};
 
 /// Added to a number below 2^51, it leaves the nearest whole number in the last bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// Target rows that are averaged together: they fill a vector register, while which columns a target pixel covers
+/// changes from one to the next.
+const ROWS: usize = 4;
 
 /// The source pixels of one target pixel: `begin..end` wholly, the one before and the one after in part, in units of
 /// `1 / T`.
@@ -46,94 +52,135 @@ pub fn area_average_simd<S: Simd>(
     target: (u32, u32),
     out: &mut Vec<u8>,
 ) {
-    let is_whole = source.0.is_multiple_of(target.0);
+    let first = out.len();
+    out.resize(first + target.0 as usize * target.1 as usize, 0);
+    let averages = &mut out[first..];
+    let (width, columns) = (source.0 as usize, target.0 as usize);
+    let factor = source.0 / target.0;
+    match factor {
+        _ if source != (factor * target.0, factor * target.1) => {
+            average(luma, source, target, averages);
+        }
+        2 => square_means::<2>(luma, width, 0..columns, averages),
+        4 => square_means::<4>(luma, width, 0..columns, averages),
+        _ => average(luma, source, target, averages),
+    }
+}
+
+/// The means of whole squares of `FACTOR` pixels a side, rounded, of these columns of squares. `pixels` begins with the
+/// first row of squares, and `out` says how many rows there are.
+#[inline(always)]
+pub(crate) fn square_means<const FACTOR: usize>(
+    pixels: &[u8],
+    width: usize,
+    columns: Range<usize>,
+    out: &mut [u8],
+) {
+    let bands = pixels.chunks_exact(FACTOR * width);
+    for (out, band) in out.chunks_exact_mut(columns.len()).zip(bands) {
+        let lines: [&[[u8; FACTOR]]; FACTOR] =
+            std::array::from_fn(|row| &band[row * width..][..width].as_chunks().0[columns.clone()]);
+        for (i, out) in out.iter_mut().enumerate() {
+            let mut sum = 0;
+            // Two plain loops become vector instructions; an iterator over the square does not.
+            for line in lines {
+                for value in line[i] {
+                    sum += u16::from(value);
+                }
+            }
+            let count = (FACTOR * FACTOR) as u16;
+            *out = ((sum + count / 2) / count) as u8;
+        }
+    }
+}
+
+/// [`area_average`] for any sizes.
+#[inline(always)]
+fn average(luma: &[u8], source: (u32, u32), target: (u32, u32), out: &mut [u8]) {
+    let (width, columns) = (source.0 as usize, target.0 as usize);
     let boundaries = boundaries(source.0, target.0);
-    let mut integral = Vec::new();
-    let width = source.0 as usize;
-    out.reserve_exact(target.0 as usize * target.1 as usize);
-    // Rows first: that loop runs over every source pixel, and this way it is contiguous. A column's weights sum to the
-    // source height; 255 times that stays far below 2^32 for any image that fits into memory.
-    let mut sums = vec![0_u32; width + 1];
-    for cell in cells(source.1, target.1) {
-        sums.fill(0);
-        let first = cell.begin - usize::from(cell.before > 0);
-        let end = cell.end + usize::from(cell.after > 0);
-        let row = |index: usize| &luma[index * width..][..width];
-        let share = |index: usize| match index {
-            _ if index >= end => 0,
-            _ if index < cell.begin => cell.before,
-            _ if index >= cell.end => cell.after,
-            _ => target.1,
-        };
-        // Two at a time, so that sums are loaded and stored half as often.
-        for index in (first..end).step_by(2) {
-            let next = index + 1;
-            let rows = row(index).iter().zip(row(next.min(end - 1)));
-            let shares = [share(index), share(next)];
-            for (sum, (&one, &other)) in sums.iter_mut().zip(rows) {
-                *sum += u32::from(one) * shares[0] + u32::from(other) * shares[1];
+    let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
+    let mut sums: [Vec<u32>; ROWS] = std::array::from_fn(|_| vec![0; width]);
+    // The last target pixel ends at the last column's end, and of what follows it takes nothing.
+    let mut integral = vec![[0.0; ROWS]; width + 2];
+    let mut totals = vec![[0.0; ROWS]; columns];
+    let mut averages = vec![[0_u8; ROWS]; columns];
+    let cells = cells(source.1, target.1);
+    for (cells, out) in cells.chunks(ROWS).zip(out.chunks_mut(ROWS * columns)) {
+        // Rows first: that loop runs over every source pixel, and this way it is contiguous.
+        for (cell, sums) in cells.iter().zip(&mut sums) {
+            sum_rows(luma, cell, target.1, sums);
+        }
+        integrate(&sums, &mut integral);
+        let mut begin = [0.0; ROWS];
+        for (total, &(boundary, part)) in totals.iter_mut().zip(&boundaries[1..]) {
+            let [before, after] = &integral[boundary as usize..].as_chunks::<2>().0[0];
+            let mut end = [0.0; ROWS];
+            for row in 0..ROWS {
+                // In units of `1 / T`.
+                end[row] = before[row] * f64::from(target.0) + (after[row] - before[row]) * part;
+            }
+            for row in 0..ROWS {
+                total[row] = end[row] - begin[row];
+            }
+            begin = end;
+        }
+        let quotients = averages.as_flattened_mut().iter_mut();
+        for (average, &total) in quotients.zip(totals.as_flattened()) {
+            *average = divisor.rounded(total);
+        }
+        for (row, out) in out.chunks_exact_mut(columns).enumerate() {
+            for (out, averages) in out.iter_mut().zip(&averages) {
+                *out = averages[row];
             }
         }
-        match source.0 / target.0 {
-            2 if is_whole => average_whole::<2>(&sums, source.1, out),
-            3 if is_whole => average_whole::<3>(&sums, source.1, out),
-            4 if is_whole => average_whole::<4>(&sums, source.1, out),
-            6 if is_whole => average_whole::<6>(&sums, source.1, out),
-            _ => average_row(&sums, &boundaries, source, &mut integral, out),
+    }
+}
+
+/// Replaces `sums` by the sum of a target row's source rows, in units of `1 / height`.
+#[inline(always)]
+fn sum_rows(luma: &[u8], cell: &Cell, height: u32, sums: &mut [u32]) {
+    let width = sums.len();
+    sums.fill(0);
+    let mut add = |row: usize, share: u32| {
+        for (sum, &value) in sums.iter_mut().zip(&luma[row * width..][..width]) {
+            *sum += u32::from(value) * share;
         }
+    };
+    if cell.before > 0 {
+        add(cell.begin - 1, cell.before);
+    }
+    for row in cell.begin..cell.end {
+        add(row, height);
+    }
+    if cell.after > 0 {
+        add(cell.end, cell.after);
+    }
+}
+
+/// Sets each of `integral` but the first to the sums over the columns before it. They are whole numbers, and far below
+/// 2^53.
+#[inline(always)]
+fn integrate(sums: &[Vec<u32>; ROWS], integral: &mut [[f64; ROWS]]) {
+    let mut total = [0.0; ROWS];
+    let width = sums[0].len();
+    let sums = sums.each_ref().map(|sums| &sums[..width]);
+    for (column, integral) in integral[1..=width].iter_mut().enumerate() {
+        for row in 0..ROWS {
+            total[row] += f64::from(sums[row][column]);
+        }
+        *integral = total;
     }
 }
 
 /// Where each target pixel begins, and where the last one ends: a source column, and how much of it lies before, in
 /// units of `1 / T`.
-fn boundaries(source: u32, target: u32) -> Vec<(u32, u32)> {
+fn boundaries(source: u32, target: u32) -> Vec<(u32, f64)> {
     let (source, target) = (u64::from(source), u64::from(target));
     (0..=target)
         .map(|index| index * source)
-        .map(|at| ((at / target) as u32, (at % target) as u32))
+        .map(|at| ((at / target) as u32, (at % target) as f64))
         .collect()
-}
-
-/// Appends the averages of one row of target pixels, from the sums of its source columns and a zero. The loops have no
-/// branches: how many columns a target pixel covers changes from one to the next. `integral` is a buffer.
-#[inline(always)]
-fn average_row(
-    sums: &[u32],
-    boundaries: &[(u32, u32)],
-    source: (u32, u32),
-    integral: &mut Vec<i64>,
-    out: &mut Vec<u8>,
-) {
-    let target = boundaries.len() - 1;
-    let mut total = 0;
-    integral.resize(sums.len(), 0);
-    for (before, &sum) in integral.iter_mut().zip(sums) {
-        *before = total;
-        total += i64::from(sum);
-    }
-    let divisor = Divisor::new(u64::from(source.0) * u64::from(source.1));
-    let first = out.len();
-    out.resize(first + target, 0);
-    let mut begin = 0;
-    for (average, &(column, part)) in out[first..].iter_mut().zip(&boundaries[1..]) {
-        let before = integral[column as usize] * target as i64;
-        // In units of `1 / T`. A signed number becomes a floating-point one in one instruction.
-        let end = before + i64::from(sums[column as usize]) * i64::from(part);
-        *average = divisor.rounded((end - begin) as f64);
-        begin = end;
-    }
-}
-
-/// As [`average_row`], where a target pixel is `WIDTH` whole columns, as for the usual sizes of video.
-#[inline(always)]
-fn average_whole<const WIDTH: usize>(sums: &[u32], height: u32, out: &mut Vec<u8>) {
-    let divisor = Divisor::new(WIDTH as u64 * u64::from(height));
-    let cells = sums.as_chunks::<WIDTH>().0;
-    out.extend(
-        cells
-            .iter()
-            .map(|cell| divisor.rounded(f64::from(cell.iter().sum::<u32>()))),
-    );
 }
 
 /// A divisor of many values that are at most 255 times as large. A division would take longer than everything else that
@@ -196,6 +243,8 @@ mod tests {
             ((5, 1), (2, 1)),
             ((1, 9), (1, 4)),
             ((6, 6), (6, 6)),
+            ((12, 8), (3, 2)),
+            ((9, 15), (3, 5)),
         ] {
             let luma: Vec<u8> = (0..source.0 * source.1)
                 .map(|i| (i * 89 % 256) as u8)
@@ -218,6 +267,8 @@ mod tests {
             ((321, 1), (320, 1)),
             ((1, 5000), (1, 320)),
             ((640, 480), (320, 240)),
+            // 255 times its pixels are more than 2^32.
+            ((8192, 2100), (319, 82)),
         ] {
             let luma = vec![255; source.0 as usize * source.1 as usize];
             let mut averages = Vec::new();

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use pulp::{Arch, Simd};
 
+use crate::image::area_average::square_means;
 use crate::image::frame::Frame;
 use crate::image::plane::Plane;
 
@@ -75,37 +76,13 @@ pub(crate) fn downsample_part_simd<S: Simd>(
 ) {
     out.clear();
     out.resize(columns.len() * rows.len(), 0);
+    let width = plane.width as usize;
+    let pixels = &plane.pixels[rows.start * factor * width..];
     match factor {
         _ if out.is_empty() => {}
-        2 => square_means::<2>(plane, columns, rows.start, out),
-        4 => square_means::<4>(plane, columns, rows.start, out),
+        2 => square_means::<2>(pixels, width, columns, out),
+        4 => square_means::<4>(pixels, width, columns, out),
         _ => unreachable!("the factor is 2 or 4"),
-    }
-}
-
-#[inline(always)]
-fn square_means<const FACTOR: usize>(
-    plane: &Plane,
-    columns: Range<usize>,
-    first_row: usize,
-    out: &mut [u8],
-) {
-    let width = plane.width as usize;
-    let bands = plane.pixels.chunks_exact(FACTOR * width).skip(first_row);
-    for (out, band) in out.chunks_exact_mut(columns.len()).zip(bands) {
-        let lines: [&[[u8; FACTOR]]; FACTOR] =
-            std::array::from_fn(|row| &band[row * width..][..width].as_chunks().0[columns.clone()]);
-        for (i, out) in out.iter_mut().enumerate() {
-            let mut sum = 0;
-            // Two plain loops become vector instructions; an iterator over the square does not.
-            for line in lines {
-                for value in line[i] {
-                    sum += u16::from(value);
-                }
-            }
-            let count = (FACTOR * FACTOR) as u16;
-            *out = ((sum + count / 2) / count) as u8;
-        }
     }
 }
 
