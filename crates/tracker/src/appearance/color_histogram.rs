@@ -12,7 +12,6 @@ use crate::appearance::sparse_bins;
 use crate::image::frame::Frame;
 use crate::image::plane::Plane;
 use crate::image::ycbcr::NEUTRAL;
-use crate::linalg::scratch::clear_and_reserve;
 use crate::linalg::vector_ops;
 use crate::motion::particles::{Particle, StateBounds};
 
@@ -20,7 +19,7 @@ use crate::motion::particles::{Particle, StateBounds};
 const LUMA_BINS: usize = 16;
 const CHROMA_BINS: usize = 16;
 /// Chroma outside of 64 to 191 is rare, and counts to the outermost bins.
-const CHROMA_START: i32 = 64;
+const CHROMA_START: u8 = 64;
 
 /// The sides of the target's area, as a multiple of the box: at its rim a box shows surroundings.
 const INNER: f64 = 0.8;
@@ -126,36 +125,62 @@ impl<'a> ColorPixels<'a> {
     /// Writes the bins of the pixels of row `y` of `part` to `out`.
     #[inline(always)]
     pub fn bins(&self, part: &Part, y: usize, out: &mut Vec<u16>) {
-        let (upper, lower) = (self.luma.row(2 * y), self.luma.row(2 * y + 1));
-        let last = upper.len() - 1;
-        clear_and_reserve(out, self.columns());
-        let luma = |x: usize| {
-            let (left, right) = (2 * x, (2 * x + 1).min(last));
-            let sum = [upper[left], upper[right], lower[left], lower[right]];
-            sum.into_iter().map(u16::from).sum::<u16>() / 4
-        };
-        let luma_bin = |x: usize| luma(x) / (256 / LUMA_BINS) as u16;
-        let columns = part.left..part.right;
+        let rows = [2 * y, 2 * y + 1].map(|y| self.luma.row(y));
+        let width = rows[0].len();
+        out.clear();
+        out.reserve(self.columns());
+        // The last column of an odd width has one column of luma.
+        let end = part.right.min(width / 2);
+        let whole = part.left.min(end)..end;
+        let [upper, lower] = rows.map(|row| &row.as_chunks().0[whole.clone()]);
+        out.extend(
+            upper
+                .iter()
+                .zip(lower)
+                .map(|(&upper, &lower)| luma_bin(upper, lower)),
+        );
+        if end.max(part.left) < part.right {
+            let [upper, lower] = rows.map(|row| [row[width - 1]; 2]);
+            out.push(luma_bin(upper, lower));
+        }
         if !self.has_color {
-            out.extend(columns.map(luma_bin));
             return;
         }
-        let rows = self
-            .chroma
-            .map(|planes| planes.each_ref().map(|plane| plane.row(y)));
-        out.extend(columns.map(|x| {
-            let at_x = |row: &[u8]| row[x.min(row.len() - 1)];
-            let chroma = rows.map_or([NEUTRAL as u8; 2], |rows| rows.map(at_x));
-            let [cb, cr] = chroma.map(chroma_bin);
-            (luma_bin(x) * CHROMA_BINS as u16 + cb) * CHROMA_BINS as u16 + cr
-        }));
+        for channel in 0..2 {
+            let row = self.chroma.map(|planes| planes[channel].row(y));
+            let row = row.unwrap_or(&[NEUTRAL as u8]);
+            // In larger pixels the luma may have a column more. There the edge's value counts.
+            let values = row
+                .get(part.left..row.len().min(part.right))
+                .unwrap_or_default();
+            let (inside, beyond) = out.split_at_mut(values.len());
+            for (bin, &value) in inside.iter_mut().zip(values) {
+                *bin = *bin * CHROMA_BINS as u16 + chroma_bin(value);
+            }
+            let edge = chroma_bin(row[row.len() - 1]);
+            for bin in beyond {
+                *bin = *bin * CHROMA_BINS as u16 + edge;
+            }
+        }
     }
+}
+
+/// The bin of the mean of 2 x 2 values of luma.
+#[inline(always)]
+fn luma_bin(upper: [u8; 2], lower: [u8; 2]) -> u16 {
+    let [upper, lower] = [upper, lower].map(|pair| {
+        // A pair in one number becomes vector instructions.
+        let pair = u16::from_le_bytes(pair);
+        (pair & 0xff) + (pair >> 8)
+    });
+    (upper + lower) / (4 * 256 / LUMA_BINS) as u16
 }
 
 #[inline(always)]
 fn chroma_bin(value: u8) -> u16 {
-    let width = (256 - 2 * CHROMA_START) / CHROMA_BINS as i32;
-    ((i32::from(value) - CHROMA_START) / width).clamp(0, CHROMA_BINS as i32 - 1) as u16
+    let bin = value.saturating_sub(CHROMA_START)
+        / ((256 - 2 * CHROMA_START as usize) / CHROMA_BINS) as u8;
+    u16::from(bin.min(CHROMA_BINS as u8 - 1))
 }
 
 impl ColorHistogram {
