@@ -83,22 +83,38 @@ fn fixed(value: f64) -> i32 {
 /// The value at the fixed-point coordinates (`x`, `y`); 0 is the centre of the first pixel.
 #[inline(always)]
 fn interpolated(plane: &Plane, x: i32, y: i32) -> u8 {
-    let split = |at: i32, count: u32| {
-        let last = count as i32 - 1;
-        let at = at.clamp(0, last << COORDINATE_BITS);
-        let (pixel, fraction) = (at >> COORDINATE_BITS, at & ((1 << COORDINATE_BITS) - 1));
-        let next = (pixel + 1).min(last);
-        let weight = fraction as u32 >> (COORDINATE_BITS - WEIGHT_BITS);
-        (pixel as usize, next as usize, weight)
+    let (width, height) = (plane.width as usize, plane.height as usize);
+    let inside = |at: i32, count: usize| at.clamp(0, (count as i32 - 1) << COORDINATE_BITS);
+    let whole = |at: i32| (at >> COORDINATE_BITS) as usize;
+    // A negative coordinate is larger than any other here.
+    let (column, row) = (whole(x), whole(y));
+    let (x, y, square) = if column < width - 1 && row < height - 1 {
+        let pixels = &plane.pixels[row * width + column..][..width + 2];
+        (
+            x,
+            y,
+            [pixels[0], pixels[1], pixels[width], pixels[width + 1]],
+        )
+    } else {
+        let (x, y) = (inside(x, width), inside(y, height));
+        let (column, row) = (whole(x), whole(y));
+        let (upper, lower) = (plane.row(row), plane.row(row + 1));
+        let next = (column + 1).min(width - 1);
+        (
+            x,
+            y,
+            [upper[column], upper[next], lower[column], lower[next]],
+        )
     };
-    let ((left, right, share_x), (above, below, share_y)) =
-        (split(x, plane.width), split(y, plane.height));
+    let [right, down] = [x, y].map(|at| {
+        let fraction = at as u32 & ((1 << COORDINATE_BITS) - 1);
+        fraction >> (COORDINATE_BITS - WEIGHT_BITS)
+    });
     let between = |from: u32, to: u32, share: u32| from * ((1 << WEIGHT_BITS) - share) + to * share;
-    let line = |row: usize| {
-        let row = &plane.pixels[row * plane.width as usize..];
-        between(row[left].into(), row[right].into(), share_x)
-    };
-    let sum = between(line(above), line(below), share_y);
+    let square = square.map(u32::from);
+    let upper = between(square[0], square[1], right);
+    let lower = between(square[2], square[3], right);
+    let sum = between(upper, lower, down);
     ((sum + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as u8
 }
 

@@ -21,6 +21,18 @@ pub(crate) struct GradientRow {
 }
 
 impl GradientRow {
+    /// Takes the chroma of `pixels` in row `y`, which is that of two rows of luma; then zeros up to `padded` pixels.
+    #[inline(always)]
+    pub fn take_chroma(&mut self, frame: &Frame, pixels: Range<usize>, y: usize, padded: usize) {
+        for (channel, out) in self.chroma.iter_mut().enumerate() {
+            out.clear();
+            if let Some(planes) = &frame.chroma {
+                compress_chroma(&planes[channel], pixels.clone(), y, out);
+            }
+            out.resize(padded, 0.0);
+        }
+    }
+
     /// Computes the gradients of `pixels` in row `y` by central differences, not halved. Zeros follow up to `padded`
     /// pixels. Beyond the frame's edge the edge's pixel counts. `offset` is subtracted from the gray values.
     #[inline(always)]
@@ -40,14 +52,6 @@ impl GradientRow {
         self.gray.push(gray(&line[pixels.start.saturating_sub(1)]));
         self.gray.extend(line[pixels.clone()].iter().map(gray));
         self.gray.push(gray(&line[pixels.end.min(width - 1)]));
-
-        for (channel, out) in self.chroma.iter_mut().enumerate() {
-            out.clear();
-            if let Some(planes) = &frame.chroma {
-                compress_chroma(&planes[channel], pixels.clone(), y, out);
-            }
-            out.resize(padded, 0.0);
-        }
         let count = pixels.len();
         self.bins.resize(count, 0.0);
         self.half_strengths.resize(count, 0.0);

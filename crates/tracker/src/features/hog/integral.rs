@@ -138,6 +138,9 @@ fn sum_window_simd<S: Simd>(simd: S, integral: &mut IntegralChannels, frame: &Fr
         let first = lines.start + row * spacing;
         for y in first..lines.end.min(first + spacing) {
             let (gradients, padded) = (&mut integral.gradients, columns * spacing);
+            if y % 2 == 0 || y == lines.start {
+                gradients.take_chroma(frame, window.clone(), y, padded);
+            }
             gradients.compute(frame, window.clone(), y, padded, integral.mean_gray);
             match (spacing, y - first) {
                 (1, _) => sum_row::<S, 1, true>(simd, gradients, above, below),
