@@ -30,7 +30,7 @@ fn comes_back(record: &Record) {
         record.ttl,
     );
     assert_eq!(again.map(|again| again.head()), Ok(head));
-    let read = |bytes: &[u8]| SessionState::from_stored(bytes, MAX_RECENT, None);
+    let read = |bytes: &[u8]| SessionState::from_stored(bytes, MAX_RECENT, None, None);
     if let Ok(state) = read(&record.state) {
         let stored = state.stored();
         let again = read(&stored).expect("a state that was written is read");

@@ -94,7 +94,7 @@ impl SessionSnapshot {
         if !keys.verify(content, code) {
             return Err(SnapshotError::NotAuthentic);
         }
-        Self::read(content, max_recent, expert)
+        Self::read(content, max_recent, expert, None)
     }
 
     /// The session of a tracker that was elsewhere until now. Which bytes its last frame had is not known.
@@ -149,11 +149,12 @@ impl SessionSnapshot {
         bytes
     }
 
-    /// The session of bytes without a code.
+    /// The session of bytes without a code; `known` are its targets at another frame.
     pub(super) fn read(
         bytes: &[u8],
         max_recent: usize,
         expert: Option<&Arc<dyn Expert>>,
+        known: Option<&Targets>,
     ) -> Result<Self, SnapshotError> {
         let (version, compressed) = check_version(bytes)?;
         let content = compression::decompress(compressed).ok_or(SnapshotError::Damaged)?;
@@ -167,10 +168,16 @@ impl SessionSnapshot {
             }
             count = Some(number);
         }
+        let mut known = known
+            .map_or(&[][..], |known| known.trackers().as_slice())
+            .iter();
         let trackers = per_target(count, || {
             let tracker;
             (tracker, rest) = take::<&[u8]>(rest)?;
-            Ok(Tracker::restore_beside(tracker, expert.cloned())?)
+            Ok(match known.next() {
+                Some(known) => known.restore_near(tracker, expert.cloned())?,
+                None => Tracker::restore_beside(tracker, expert.cloned())?,
+            })
         })?;
         let targets = Targets::restored(trackers).ok_or(SnapshotError::Damaged)?;
         let recent = recent(rest, count, max_recent)?;

@@ -84,7 +84,8 @@ impl SessionState {
         SessionSnapshot::encode(&self.targets, &self.recent, keys)
     }
 
-    /// The session that [`Self::stored`] wrote.
+    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is not
+    /// computed again.
     ///
     /// # Errors
     /// See [`SnapshotError`].
@@ -92,8 +93,11 @@ impl SessionState {
         bytes: &[u8],
         max_recent: usize,
         expert: Option<&Arc<dyn Expert>>,
+        known: Option<&Self>,
     ) -> Result<Self, SnapshotError> {
-        let SessionSnapshot { targets, recent } = SessionSnapshot::read(bytes, max_recent, expert)?;
+        let known = known.map(|known| &known.targets);
+        let SessionSnapshot { targets, recent } =
+            SessionSnapshot::read(bytes, max_recent, expert, known)?;
         Ok(Self { targets, recent })
     }
 

@@ -109,7 +109,8 @@ impl Targets {
 
     /// These trackers, if they see frames of one size and keep no more than they may.
     pub(super) fn restored(trackers: PerTarget<Tracker>) -> Option<Self> {
-        let (all, targets) = (trackers.as_slice(), Self(trackers.clone()));
+        let targets = Self(trackers);
+        let all = targets.0.as_slice();
         let same = |tracker: &Tracker| tracker.source_size() == all[0].source_size();
         let fits = all.len() == 1 || targets.session_bytes() <= MAX_LIST_BYTES;
         (all.iter().all(same) && fits).then_some(targets)

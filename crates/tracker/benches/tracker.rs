@@ -5,6 +5,8 @@
 //! - `textbook`: the same part as the equations are printed, a decomposition for each candidate.
 //! - `product`: one bare double-precision product of N x D by D x 48, which every evaluation needs.
 //! - `downscale`: the working image of a 1920 x 1080 upload.
+//! - `snapshot`, `restore`, `restore near`: the state of preset `robust` as bytes and back, alone and beside the state of
+//!   three frames before.
 
 use std::hint::black_box;
 
@@ -88,9 +90,33 @@ fn downscale(criterion: &mut Criterion) {
     });
 }
 
+fn snapshot(criterion: &mut Criterion) {
+    let params = Preset::Robust.params();
+    let mut tracker = Tracker::new(&frame(0), target(0), params).expect("a box inside the frame");
+    let mut behind = tracker.clone();
+    for t in 1..64 {
+        tracker.step(&frame(t)).expect("frames of one size");
+        if t == 60 {
+            behind = tracker.clone();
+        }
+    }
+    let bytes = tracker.snapshot();
+    criterion.bench_function("snapshot", |bencher| bencher.iter(|| tracker.snapshot()));
+    criterion.bench_function("restore", |bencher| {
+        bencher.iter(|| Tracker::restore(black_box(&bytes)).expect("its own snapshot"))
+    });
+    criterion.bench_function("restore near", |bencher| {
+        bencher.iter(|| {
+            behind
+                .restore_near(black_box(&bytes), None)
+                .expect("its own snapshot")
+        })
+    });
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(30).measurement_time(std::time::Duration::from_secs(3));
-    targets = step, evaluation, product, downscale
+    targets = step, evaluation, product, downscale, snapshot
 }
 criterion_main!(benches);

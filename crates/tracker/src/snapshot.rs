@@ -57,8 +57,13 @@ pub(crate) fn write(state: &State) -> Vec<u8> {
     bytes
 }
 
-/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`.
-pub(crate) fn read(bytes: &[u8], expert: Option<&dyn Expert>) -> Result<State, TrackerError> {
+/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`. What it shares with `known`, which
+/// may be any state, is not computed again.
+pub(crate) fn read(
+    bytes: &[u8],
+    expert: Option<&dyn Expert>,
+    known: Option<&State>,
+) -> Result<State, TrackerError> {
     let damaged = TrackerError::Snapshot("is damaged");
     let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
         return Err(TrackerError::Snapshot("is too short"));
@@ -85,7 +90,7 @@ pub(crate) fn read(bytes: &[u8], expert: Option<&dyn Expert>) -> Result<State, T
         return Err(damaged);
     }
     check(&state)?;
-    restore(&mut state);
+    restore(&mut state, known);
     Ok(state)
 }
 
@@ -110,10 +115,13 @@ fn read_opinion(
 }
 
 /// Computes what a snapshot does not carry.
-fn restore(state: &mut State) {
+fn restore(state: &mut State, known: Option<&State>) {
+    let params = &state.params;
+    let known = known.filter(|known| known.params == *params);
     workspace::with(|workspace| {
         let scratch = &mut workspace.scratch.learning.appearance;
-        state.appearance.model_mut().restore(&state.params, scratch);
+        let known = known.map(|known| &known.appearance);
+        state.appearance.model_mut().restore(known, params, scratch);
     });
 }
 

@@ -203,7 +203,28 @@ impl Tracker {
         snapshot: &[u8],
         expert: Option<Arc<dyn Expert>>,
     ) -> Result<Self, TrackerError> {
-        let state = snapshot::read(snapshot, expert.as_deref())?;
+        Self::restored(snapshot, expert, None)
+    }
+
+    /// As [`restore_beside`](Self::restore_beside), beside an earlier or later state of the same session: what both have in
+    /// common is not computed again, which takes most of the time. The tracker is the same, bit for bit.
+    ///
+    /// # Errors
+    /// As for [`restore_beside`](Self::restore_beside).
+    pub fn restore_near(
+        &self,
+        snapshot: &[u8],
+        expert: Option<Arc<dyn Expert>>,
+    ) -> Result<Self, TrackerError> {
+        Self::restored(snapshot, expert, Some(&self.state))
+    }
+
+    fn restored(
+        snapshot: &[u8],
+        expert: Option<Arc<dyn Expert>>,
+        known: Option<&State>,
+    ) -> Result<Self, TrackerError> {
+        let state = snapshot::read(snapshot, expert.as_deref(), known)?;
         let expert = expert.filter(|_| state.second_opinion.is_some());
         Ok(Self {
             state,

@@ -73,7 +73,7 @@ impl SessionService {
 
     /// The session of a record, which is then in memory.
     async fn insert(&self, id: Uuid, record: Record, flow: Flow) -> Result<Arc<Session>, ActError> {
-        let (state, record) = self.decode(record, flow).await?;
+        let (state, record) = self.decode(record, None, flow).await?;
         if let Some(session) = self.registry.live(id)
             && session.name().incarnation != record.opening.incarnation
         {
@@ -98,13 +98,19 @@ impl SessionService {
         }
     }
 
-    /// Reads a record's state on a worker.
-    async fn decode(&self, record: Record, flow: Flow) -> Result<(SessionState, Record), ActError> {
+    /// Reads a record's state on a worker, beside that of the same session at another frame.
+    async fn decode(
+        &self,
+        record: Record,
+        known: Option<SessionState>,
+        flow: Flow,
+    ) -> Result<(SessionState, Record), ActError> {
         let queue = self.admission.enter(flow, Box::new(()))?;
         let max_recent = self.settings.max_frames;
         let expert = self.expert.clone();
         self.run(queue, move |_| {
-            let state = SessionState::from_stored(&record.state, max_recent, expert.as_ref());
+            let (bytes, expert) = (&record.state, expert.as_ref());
+            let state = SessionState::from_stored(bytes, max_recent, expert, known.as_ref());
             let state = state.map_err(ActError::StoredState)?;
             // From another frame on, the record's numbers would not be the session's.
             match state.latest_frame() == record.version.checkpoint {
@@ -122,7 +128,8 @@ impl SessionService {
         record: Record,
         flow: Flow,
     ) -> Result<(), ActError> {
-        let (newest, record) = self.decode(record, flow).await?;
+        let known = Some(locked.state().clone());
+        let (newest, record) = self.decode(record, known, flow).await?;
         match PlantedFault::GoesOnWithOldState.is_here() {
             true => locked.session().set_version(Some(record.version)),
             false => locked.replace(newest, Some(record.version)),

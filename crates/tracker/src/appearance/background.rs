@@ -74,6 +74,15 @@ impl Background {
         learn(self, params, scratch);
     }
 
+    /// Takes what follows from the samples from `known`, if that has the same ones.
+    pub fn take_known(&mut self, known: &Self) -> bool {
+        let is_known = self.samples == known.samples;
+        if is_known {
+            self.clone_from(known);
+        }
+        is_known
+    }
+
     /// Makes `out` the samples, with the mean subtracted: none where there is no metric.
     #[inline(always)]
     pub fn samples_into(&self, out: &mut Vec<f32>) {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::appearance::background::{self, Background};
 use crate::appearance::bag::{Bag, History};
-use crate::appearance::model::{AppearanceModel, Comparison, Scratch, Vectors};
+use crate::appearance::model::{Appearance, AppearanceModel, Comparison, Scratch, Vectors};
 use crate::appearance::span::{self, Span};
 use crate::appearance::{bag_matrix, point_distance};
 use crate::features::quantized::QuantizedVector;
@@ -122,8 +122,23 @@ impl AppearanceModel for SingleVector {
         &self.background.mean
     }
 
-    fn restore(&mut self, params: &Params, scratch: &mut Scratch) {
-        background::learn(&mut self.background, params, &mut scratch.background);
-        self.rebuild(params, &mut scratch.span);
+    fn restore(&mut self, known: Option<&Appearance>, params: &Params, scratch: &mut Scratch) {
+        let known = match known {
+            Some(Appearance::SingleVector(known)) => known,
+            _ => &Self::default(),
+        };
+        if !self.background.take_known(&known.background) {
+            background::learn(&mut self.background, params, &mut scratch.background);
+            self.rebuild(params, &mut scratch.span);
+            return;
+        }
+        span::load(&mut scratch.span, &self.background);
+        for entry in &mut self.bag.entries {
+            let mut known = known.bag.entries.iter();
+            match known.find(|known| known.templates == entry.templates) {
+                Some(known) => entry.clone_from(known),
+                None => entry.refit(&self.background, params, &mut scratch.span),
+            }
+        }
     }
 }

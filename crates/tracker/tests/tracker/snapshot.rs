@@ -68,6 +68,33 @@ fn goes_on_bit_for_bit(tracker: &mut Tracker, from: usize) {
     assert!(restored.snapshot() == tracker.snapshot());
 }
 
+/// Over new samples of the background, which come every tenth frame, and new entries of the bag.
+#[test]
+fn a_tracker_restored_near_another_goes_on_bit_for_bit() {
+    for params in [params(9), robust(9)] {
+        let mut tracker =
+            Tracker::new(&frame(0), target(0), params).expect("a box inside the frame");
+        let mut behind = tracker.clone();
+        for t in 1..25 {
+            tracker.step(&frame(t)).expect("a frame of its size");
+            let bytes = tracker.snapshot();
+            let mut restored = behind.restore_near(&bytes, None).expect("an own snapshot");
+            let mut expected = Tracker::restore(&bytes).expect("an own snapshot");
+            if t % 3 == 0 {
+                behind = restored.clone();
+            }
+            for t in t + 1..t + 4 {
+                assert_eq!(restored.step(&frame(t)), expected.step(&frame(t)), "{t}");
+            }
+            assert!(restored.snapshot() == expected.snapshot(), "{t}");
+        }
+        // One of other parameters shares nothing.
+        let other = extended(3).restore_near(&tracker.snapshot(), None);
+        let mut other = other.expect("an own snapshot");
+        assert_eq!(other.step(&frame(25)), tracker.step(&frame(25)));
+    }
+}
+
 #[test]
 fn a_restored_tracker_goes_on_bit_for_bit() {
     for params in [params(9), robust(9)] {
