@@ -80,6 +80,7 @@ impl SessionService {
         permit: Option<&SessionPermit>,
         flow: Flow,
     ) -> Result<(), ActError> {
+        let before = session.version();
         match self.ask(session, false).await {
             Step::Commit(ttl) => {
                 if self.store.is_some() {
@@ -87,13 +88,18 @@ impl SessionService {
                 }
                 Ok(())
             }
-            // It may be this replica that is about to note the newer frame.
-            Step::GoOn(_) | Step::Conflict(_) => {
+            step @ (Step::GoOn(_) | Step::Conflict(_)) => {
                 let permit = match permit {
                     Some(permit) => permit.share(),
                     None => session.read_permit()?,
                 };
-                self.lock_newest(permit, flow, false).await.map(drop)
+                let mut locked = permit.lock().await?;
+                // It may be this replica that has noted the newer frame meanwhile.
+                let step = match session.version() == before {
+                    true => step,
+                    false => self.ask(session, false).await,
+                };
+                self.follow(&mut locked, step, flow).await
             }
             step => Err(self.refusal(session, step)),
         }
