@@ -84,8 +84,8 @@ impl SessionState {
         SessionSnapshot::encode(&self.targets, &self.recent, keys)
     }
 
-    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is not
-    /// computed again.
+    /// The session that [`Self::stored`] wrote. What it has in common with `known`, the session at another frame, is
+    /// not computed again.
     ///
     /// # Errors
     /// See [`SnapshotError`].

@@ -5,8 +5,8 @@
 //! - `textbook`: the same part as the equations are printed, a decomposition for each candidate.
 //! - `product`: one bare double-precision product of N x D by D x 48, which every evaluation needs.
 //! - `downscale`: the working image of a 1920 x 1080 upload.
-//! - `snapshot`, `restore`, `restore near`: the state of preset `robust` as bytes and back, alone and beside the state of
-//!   three frames before.
+//! - `snapshot`, `restore`, `restore near`: the state of preset `robust` as bytes and back, alone and beside the state
+//!   of three frames before.
 
 use std::hint::black_box;
 

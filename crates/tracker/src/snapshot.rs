@@ -57,8 +57,8 @@ pub(crate) fn write(state: &State) -> Vec<u8> {
     bytes
 }
 
-/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`. What it shares with `known`, which
-/// may be any state, is not computed again.
+/// The state in `bytes`, fully checked. One with a second opinion is that of `expert`. What it shares with `known`,
+/// which may be any state, is not computed again.
 pub(crate) fn read(
     bytes: &[u8],
     expert: Option<&dyn Expert>,

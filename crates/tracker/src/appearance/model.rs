@@ -91,8 +91,8 @@ pub(crate) trait AppearanceModel {
         &[]
     }
 
-    /// Computes what a snapshot does not carry. What follows from templates and samples that `known` has too is taken from
-    /// there.
+    /// Computes what a snapshot does not carry. What follows from templates and samples that `known` has too is taken
+    /// from there.
     fn restore(&mut self, _known: Option<&Appearance>, _params: &Params, _scratch: &mut Scratch) {}
 }
 
