@@ -206,8 +206,8 @@ impl Tracker {
         Self::restored(snapshot, expert, None)
     }
 
-    /// As [`restore_beside`](Self::restore_beside), beside an earlier or later state of the same session. What both have
-    /// in common is not computed again, which takes most of the time. The tracker is the same, bit for bit.
+    /// As [`restore_beside`](Self::restore_beside), beside an earlier or later state of the same session. What both
+    /// have in common is not computed again, which takes most of the time. The tracker is the same, bit for bit.
     ///
     /// # Errors
     /// As for [`restore_beside`](Self::restore_beside).

@@ -1,4 +1,4 @@
-//! Exact area averaging, in integers.
+//! Exact area averaging, in whole numbers.
 //!
 //! Along each axis, target pixel `o` covers the source interval `[o * S / T, (o + 1) * S / T)` for source size `S` and
 //! target size `T`. In units of `1 / T` source pixel every interval has the length `S`, and its shares of source pixels
