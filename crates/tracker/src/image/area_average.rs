@@ -62,7 +62,9 @@ pub fn area_average_simd<S: Simd>(
             average(luma, source, target, averages);
         }
         2 => square_means::<2>(luma, width, 0..columns, averages),
+        3 => square_means::<3>(luma, width, 0..columns, averages),
         4 => square_means::<4>(luma, width, 0..columns, averages),
+        6 => square_means::<6>(luma, width, 0..columns, averages),
         _ => average(luma, source, target, averages),
     }
 }
@@ -244,6 +246,7 @@ mod tests {
             ((1, 9), (1, 4)),
             ((6, 6), (6, 6)),
             ((12, 8), (3, 2)),
+            ((18, 12), (3, 2)),
             ((9, 15), (3, 5)),
         ] {
             let luma: Vec<u8> = (0..source.0 * source.1)
