@@ -39,7 +39,11 @@ impl Level for i8 {
     }
     /// Two in a byte.
     fn serialize_all<S: Serializer>(values: &[i8], serializer: S) -> Result<S::Ok, S::Error> {
-        let byte = |[first, second]: [i8; 2]| (first & 15) as u8 | (second << 4) as u8;
+        // A pair as one number of 16 bits: so the compiler takes many at once.
+        let byte = |pair: [i8; 2]| {
+            let pair = u16::from_le_bytes(pair.map(|value| value as u8));
+            (pair & 0xF | pair >> 4 & 0xF0) as u8
+        };
         let (pairs, rest) = values.as_chunks();
         let mut bytes: Vec<u8> = pairs.iter().map(|&pair| byte(pair)).collect();
         bytes.extend(rest.iter().map(|&last| byte([last, NONE])));

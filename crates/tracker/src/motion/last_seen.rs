@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::image::downsample::{downsample_part, squares};
 use crate::image::frame::Frame;
@@ -25,11 +25,17 @@ const KEPT_BITS: u8 = !3;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct SmallImage {
     /// Row by row.
+    #[serde(serialize_with = "as_bytes")]
     pub pixels: Vec<u8>,
     width: u32,
     /// The first column and row, in pixels of this size.
     left: u32,
     top: u32,
+}
+
+/// As a list of bytes, but not byte by byte.
+fn as_bytes<S: Serializer>(pixels: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bytes(pixels)
 }
 
 impl SmallImage {
