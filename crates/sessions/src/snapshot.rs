@@ -121,29 +121,27 @@ impl SessionSnapshot {
 
     /// The bytes of a session, without a code.
     pub(super) fn write(targets: &Targets, recent: &[Answered]) -> Vec<u8> {
-        let mut content = Vec::new();
         let trackers = targets.trackers();
-        let version = match trackers {
-            PerTarget::One(_) => VERSION,
-            PerTarget::List(list) => {
-                content = extend(content, &list.len());
-                LIST_VERSION
-            }
+        let (version, count) = match trackers {
+            PerTarget::One(_) => (VERSION, Vec::new()),
+            PerTarget::List(list) => (LIST_VERSION, extend(Vec::new(), &list.len())),
         };
-        for tracker in trackers.as_slice() {
-            let snapshot = tracker.snapshot();
-            content = extend(content, &snapshot.len());
-            content.extend(snapshot);
-        }
-        content = extend(content, &recent.len());
+        let mut answers = extend(Vec::new(), &recent.len());
         for Answered {
             fingerprint,
             targets,
         } in recent
         {
-            content = extend(content, fingerprint);
-            content = targets.as_slice().iter().fold(content, extend);
+            answers = extend(answers, fingerprint);
+            answers = targets.as_slice().iter().fold(answers, extend);
         }
+        let mut parts = vec![count];
+        for tracker in trackers.as_slice() {
+            let snapshot = tracker.snapshot();
+            parts.extend([extend(Vec::new(), &snapshot.len()), snapshot]);
+        }
+        parts.push(answers);
+        let content = parts.concat();
         let mut bytes = [MAGIC, &[version]].concat();
         compression::compress(&content, &mut bytes);
         bytes

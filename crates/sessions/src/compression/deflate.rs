@@ -2,8 +2,13 @@
 
 use super::prefix_code::{self, Code};
 
-/// The bytes of a block: each gets codes of its own.
-const BLOCK: usize = 4096;
+/// A block is some of these: neighbours whose bytes are alike.
+const CHUNK: usize = 4096;
+/// A block that is stored as it is has fewer than 2^16 bytes.
+const MAX_BLOCK: usize = 15 * CHUNK;
+/// What a block of its own must save. Its codes take 600 to 800 bits, the rest is for the time that they take: with half
+/// of this a state has 1.4 % fewer bytes, and takes a seventh longer to write.
+const MIN_SAVED_BITS: f32 = 3000.0;
 const END_OF_BLOCK: usize = 256;
 /// The bytes and the end of a block. The others in the format are for matches.
 const SYMBOLS: usize = END_OF_BLOCK + 1;
@@ -22,59 +27,108 @@ const ORDER: [usize; LENGTH_SYMBOLS] = [
 
 /// Appends `content` to `out`, compressed.
 pub(super) fn deflate(content: &[u8], out: &mut Vec<u8>) {
+    out.reserve(content.len());
     let mut bits = BitWriter::new(out);
-    let mut blocks = content.chunks(BLOCK).peekable();
-    if blocks.peek().is_none() {
-        bits.write_stored(&[], true);
+    let mut chunks = content.chunks(CHUNK);
+    let mut block = Block::of(chunks.next().unwrap_or_default());
+    let mut rest = content;
+    for chunk in chunks {
+        let next = Block::of(chunk);
+        let joined = block.joined(&next);
+        let saved = joined.entropy - block.entropy - next.entropy;
+        if saved < MIN_SAVED_BITS && joined.len <= MAX_BLOCK {
+            block = joined;
+        } else {
+            let bytes;
+            (bytes, rest) = rest.split_at(block.len);
+            block.write(bytes, false, &mut bits);
+            block = next;
+        }
     }
-    while let Some(block) = blocks.next() {
-        write_block(block, blocks.peek().is_none(), &mut bits);
-    }
+    block.write(rest, true, &mut bits);
     bits.align();
 }
 
-/// Writes a block with codes of its own, or as it is where these might make it longer.
-fn write_block(block: &[u8], is_last: bool, bits: &mut BitWriter<'_>) {
-    let counts = count(block);
-    let lengths = prefix_code::lengths(&counts, MAX_BITS);
-    if size(&counts, &lengths) + MAX_HEADER_BITS > 8 * block.len() {
-        return bits.write_stored(block, is_last);
-    }
-    bits.write(u16::from(is_last) | 0b10 << 1, 3);
-    write_lengths(&lengths, bits);
-    let codes = prefix_code::codes(&lengths);
-    let (fours, rest) = block.as_chunks::<4>();
-    for four in fours {
-        for &byte in four {
-            bits.push(codes[usize::from(byte)]);
-        }
-        bits.flush();
-    }
-    for &byte in rest {
-        bits.push(codes[usize::from(byte)]);
-        bits.flush();
-    }
-    bits.push(codes[END_OF_BLOCK]);
-    bits.flush();
+/// Bytes that share a code.
+struct Block {
+    counts: [u32; END_OF_BLOCK],
+    len: usize,
+    /// The bits that the bytes take at least, each for itself.
+    entropy: f32,
 }
 
-fn count(block: &[u8]) -> [u32; SYMBOLS] {
-    // In four tables, so that equal bytes in a row do not wait for each other.
-    let mut tables = [[0; END_OF_BLOCK]; 4];
-    let (fours, rest) = block.as_chunks::<4>();
-    for four in fours {
-        for (table, &byte) in tables.iter_mut().zip(four) {
-            table[usize::from(byte)] += 1;
+impl Block {
+    fn of(bytes: &[u8]) -> Self {
+        // In four tables, so that equal bytes in a row do not wait for each other.
+        let mut tables = [[0_u32; END_OF_BLOCK]; 4];
+        let (fours, rest) = bytes.as_chunks::<4>();
+        for four in fours {
+            for (table, &byte) in tables.iter_mut().zip(four) {
+                table[usize::from(byte)] += 1;
+            }
+        }
+        for &byte in rest {
+            tables[0][usize::from(byte)] += 1;
+        }
+        let count = |byte| tables.iter().map(|table| table[byte]).sum();
+        Self::counted(std::array::from_fn(count), bytes.len())
+    }
+
+    fn joined(&self, next: &Self) -> Self {
+        let count = |byte| self.counts[byte] + next.counts[byte];
+        Self::counted(std::array::from_fn(count), self.len + next.len)
+    }
+
+    fn counted(counts: [u32; END_OF_BLOCK], len: usize) -> Self {
+        // Several sums, which the compiler makes vectors of.
+        let mut sums = [0.0; 16];
+        for counts in counts.as_chunks::<16>().0 {
+            for (sum, &count) in sums.iter_mut().zip(counts) {
+                *sum += times_log2(count);
+            }
+        }
+        Self {
+            counts,
+            len,
+            entropy: times_log2(len as u32) - sums.iter().sum::<f32>(),
         }
     }
-    for &byte in rest {
-        tables[0][usize::from(byte)] += 1;
+
+    /// Writes the block with codes of its own, or as it is where these might make it longer.
+    fn write(&self, bytes: &[u8], is_last: bool, bits: &mut BitWriter<'_>) {
+        let mut counts = [1; SYMBOLS];
+        counts[..END_OF_BLOCK].copy_from_slice(&self.counts);
+        let lengths = prefix_code::lengths(&counts, MAX_BITS);
+        if size(&counts, &lengths) + MAX_HEADER_BITS > 8 * bytes.len() {
+            return bits.write_stored(bytes, is_last);
+        }
+        bits.write(u16::from(is_last) | 0b10 << 1, 3);
+        write_lengths(&lengths, bits);
+        let codes = prefix_code::codes(&lengths);
+        let (fours, rest) = bytes.as_chunks::<4>();
+        for four in fours {
+            for &byte in four {
+                bits.push(codes[usize::from(byte)]);
+            }
+            bits.flush();
+        }
+        for &byte in rest {
+            bits.push(codes[usize::from(byte)]);
+            bits.flush();
+        }
+        bits.push(codes[END_OF_BLOCK]);
+        bits.flush();
     }
-    let mut counts = [1; SYMBOLS];
-    for (byte, count) in counts[..END_OF_BLOCK].iter_mut().enumerate() {
-        *count = tables.iter().map(|table| table[byte]).sum();
-    }
-    counts
+}
+
+/// n log₂ n, to 0.01 n.
+#[inline(always)]
+fn times_log2(n: u32) -> f32 {
+    let n = n.max(1) as f32;
+    let exponent = (n.to_bits() >> 23) as i32 - 127;
+    // A parabola of the mantissa, in [1, 2), exact at both ends.
+    let mantissa = f32::from_bits(n.to_bits() & 0x7F_FFFF | 0x3F80_0000);
+    n * (exponent as f32 + (2.0 - mantissa / 3.0) * mantissa - 5.0 / 3.0)
 }
 
 /// The bits that the symbols take.
