@@ -26,6 +26,9 @@ impl State {
         clear_and_reserve(&mut scratch.in_frame, search::max_count(params));
         let extractor = &mut scratch.extractor;
         let particles = &mut scratch.candidates.particles;
+        let foreground = &mut scratch.foreground;
+        let pixels = ColorPixels::of(image, self.format.has_color);
+        foreground.compute(pixels, &self.color, &self.answer, radius, bounds);
         match &self.cloud {
             Some(cloud) => {
                 cloud.resample(params, bounds, draws, &mut scratch.sums, particles);
@@ -34,9 +37,6 @@ impl State {
             None => {
                 extractor.compute_channels(image, &[self.answer], radius, bounds, params);
                 let dense_search = &mut scratch.dense_search;
-                let foreground = &mut scratch.foreground;
-                let pixels = ColorPixels::of(image, self.format.has_color);
-                foreground.compute(pixels, &self.color, &self.answer, radius, bounds);
                 dense_search.run(extractor, search, &self.discriminant, foreground);
                 let cell = Extractor::cell_size(&self.answer, bounds, params);
                 search.propose(&dense_search.maxima, cell, draws, particles);

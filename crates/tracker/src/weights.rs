@@ -7,6 +7,9 @@
 
 use pulp::{Arch, Simd};
 
+/// Larger exponents are taken relative to the largest: from e^710 on there is no number, and a sum of many must be one.
+const MAX_EXPONENT: f64 = 600.0;
+
 /// The likelihoods of a frame's particles; keeps its buffers.
 #[derive(Debug, Clone, Default)]
 pub struct Likelihoods {
@@ -34,6 +37,10 @@ pub fn sum_rule_weights_simd<S: Simd>(
 ) {
     let entries = distances.len() / weights.len();
     likelihoods.normalize(distances, entries, sigma);
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    if largest > MAX_EXPONENT {
+        weights.iter_mut().for_each(|weight| *weight -= largest);
+    }
     exponentials(weights);
     likelihoods.sum_rule(entries, pinned, weights);
 }
@@ -177,6 +184,20 @@ mod tests {
     #[test]
     fn exponents_that_all_underflow_give_equal_weights() {
         assert_eq!(weigh(&[0.1, 0.2], (0, 1.0), &[-900.0; 2]), [0.5; 2]);
+    }
+
+    /// The foreground of areas much larger than the last answer gave these: all weights were NaN.
+    #[test]
+    fn exponents_that_overflow_count_by_their_differences() {
+        let weights = weigh(&[0.1; 3], (0, 1.0), &[3000.0, 2999.0, -9.0]);
+        assert!(
+            (weights[0] / weights[1] - f64::exp(1.0)).abs() < 1e-9,
+            "{weights:?}"
+        );
+        assert!(
+            (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15,
+            "{weights:?}"
+        );
     }
 
     #[test]

@@ -127,6 +127,36 @@ proptest! {
     }
 }
 
+/// Particles that are drawn from the last ones were weighed by the colours around another session's target.
+#[test]
+fn a_session_gives_the_same_answers_after_any_other_on_its_thread() {
+    let resampled = Params {
+        search: Search::Resampled,
+        motion_std_scale: 0.3,
+        ..Preset::Robust.params()
+    };
+    let answers = move || {
+        let scene = bagtrack_testing::scene::frame;
+        let target = bagtrack_testing::scene::target(0);
+        let mut tracker = Tracker::new(&scene(0), target, resampled.clone()).unwrap();
+        (1..9)
+            .map(|t| tracker.step(&scene(t)).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let alone = std::thread::spawn(answers.clone()).join().unwrap();
+    // One that looks for its answer in a frame of noise.
+    let noise: Vec<u8> = (0..64 * 64_u32)
+        .map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
+        .collect();
+    let frame = |t| moving(t, 64, 64, &noise);
+    let box_of_other = Rect::new(9.0, 7.0, 30.0, 20.0);
+    let mut other = Tracker::new(&frame(0), box_of_other, Preset::Robust.params()).unwrap();
+    for t in 1..4 {
+        other.step(&frame(t)).unwrap();
+    }
+    assert_eq!(answers(), alone);
+}
+
 #[test]
 fn parameters_are_read_and_set_by_name() {
     let mut params = Preset::Robust.params();
