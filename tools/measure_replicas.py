@@ -44,10 +44,17 @@ class Redis:
         self.file = self.socket.makefile("rb")
 
     def call(self, *words):
-        words = [word if isinstance(word, bytes) else str(word).encode() for word in words]
-        request = b"*%d\r\n" % len(words)
-        self.socket.sendall(request + b"".join(b"$%d\r\n%s\r\n" % (len(word), word) for word in words))
-        return self.answer()
+        return self.calls(words)[0]
+
+    def calls(self, *commands):
+        """The answers to commands that are sent together."""
+        request = b""
+        for words in commands:
+            words = [word if isinstance(word, bytes) else str(word).encode() for word in words]
+            request += b"*%d\r\n" % len(words)
+            request += b"".join(b"$%d\r\n%s\r\n" % (len(word), word) for word in words)
+        self.socket.sendall(request)
+        return [self.answer() for _ in commands]
 
     def answer(self):
         line = self.file.readline()

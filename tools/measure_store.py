@@ -35,11 +35,16 @@ def processor_time(redis):
 def commit_frames(port, name, scripts, state, frames):
     """What a replica asks for a session of this name, whose frames are stored with `state`, or without one."""
     redis, (create, commit) = Redis(port), scripts
-    keys = [2, name, f"{name}:ended"]
-    redis.call("EVALSHA", create, *keys, 1, 0, "token", "incarnation", "head", state or "state", 60_000)
+    keys, new = [name, f"{name}:ended"], f"{name}:new"
+    redis.call("EVALSHA", create, 2, *keys, 1, 0, "token", "incarnation", "head", state or "state", 60_000)
     for frame in range(frames):
-        written = [state] if state else []
-        answer = redis.call("EVALSHA", commit, *keys, 1, frame, frame + 1, f"token {frame}", 60_000, "", *written)
+        arguments = [1, frame, frame + 1, f"token {frame}", 60_000, ""]
+        if state:
+            *_, (*_, answer) = redis.calls(
+                ["MULTI"], ["HSET", new, "state", state], ["PEXPIRE", new, 10_000],
+                ["EVALSHA", commit, 3, *keys, new, *arguments], ["EXEC"])
+        else:
+            answer = redis.call("EVALSHA", commit, 2, *keys, *arguments)
         assert answer[0] == b"1", answer
 
 

@@ -2,7 +2,7 @@
 
 use crate::service::{content_of_stored, stored_of};
 use bagtrack_sessions::{
-    record_of_row, row_and_state, Clock, Commit, Outcome, Owner, Record, RedisStore, ScriptServer,
+    record_of_row, row_and_state, Clock, Commit, NewHash, Outcome, Owner, Record, RedisStore, ScriptServer,
     SessionName, SessionState, SessionStore, StoreFuture, StoreUnavailable, Version,
 };
 use redis::{RedisFuture, Value};
@@ -118,6 +118,7 @@ impl ScriptServer for Server {
     /// Whatever the script: the record has another version.
     fn run<'a>(
         &'a self,
+        _new: Option<&'a NewHash>,
         _script: &'a str,
         _keys: &'a [String],
         _args: &'a [Vec<u8>],

@@ -91,7 +91,7 @@ pub use store::{
 };
 pub use store::{Counted, StoreShare};
 #[cfg(feature = "redis")]
-pub use store::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
+pub use store::{NewHash, RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 #[cfg(fuzzing)]
 pub use store::{record_of_row, row_and_state};
 pub use streams::{OpenStreams, StreamPlace};

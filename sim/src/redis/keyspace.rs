@@ -1,5 +1,6 @@
 //! The keys, and the commands that the scripts of the store use.
 
+use bagtrack_sessions::NewHash;
 use std::collections::BTreeMap;
 
 type Bytes = Vec<u8>;
@@ -52,6 +53,7 @@ impl Keyspace {
         match (&name[..], args) {
             (b"EXISTS", [key]) => Ok(Reply::Integer(i64::from(self.entry(key).is_some()))),
             (b"DEL", [key]) => Ok(Reply::Integer(i64::from(self.delete(key)))),
+            (b"RENAME", [from, to]) => self.rename(from, to),
             (b"GET", [key]) => self.get(key),
             (b"SET", [key, value, px, ttl]) if px == b"PX" => self.set(key, value, number(ttl)?),
             (b"HGET", [key, field]) => Ok(self.fields(key, std::slice::from_ref(field))?.remove(0)),
@@ -76,6 +78,17 @@ impl Keyspace {
             }
             _ => Err(format!("ERR not simulated: {words:?}")),
         }
+    }
+
+    /// Makes a hash with one field.
+    ///
+    /// # Errors
+    /// What a Redis says to that.
+    pub fn make_hash(&mut self, new: &NewHash) -> Result<(), String> {
+        let key = new.key.as_bytes();
+        self.set_fields(key, &[new.field.as_bytes().to_vec(), new.value.clone()])?;
+        let ttl = i64::try_from(new.ttl.as_millis()).unwrap_or(i64::MAX);
+        self.expire(key, ttl).map(|_| ())
     }
 
     /// The text of a field of a hash.
@@ -107,6 +120,13 @@ impl Keyspace {
 
     fn delete(&mut self, key: &[u8]) -> bool {
         self.entry(key).is_some() && self.entries.remove(key).is_some()
+    }
+
+    fn rename(&mut self, from: &[u8], to: &[u8]) -> Result<Reply, String> {
+        self.entry(from).ok_or("ERR no such key")?;
+        let entry = self.entries.remove(from).expect("it is there");
+        self.entries.insert(to.to_vec(), entry);
+        Ok(Reply::Bulk(b"OK".to_vec()))
     }
 
     fn get(&mut self, key: &[u8]) -> Result<Reply, String> {
@@ -275,9 +295,13 @@ mod tests {
         keys.now = 9;
         assert_eq!(call(&mut keys, "PTTL a"), Reply::Integer(1));
         assert_eq!(call(&mut keys, "HINCRBY a f 2"), Reply::Integer(3));
-        keys.now = 10;
+        call(&mut keys, "HSET b f 9");
+        call(&mut keys, "RENAME a b");
+        assert_eq!(call(&mut keys, "HGET b f"), Reply::Bulk(b"3".to_vec()));
         assert_eq!(call(&mut keys, "EXISTS a"), Reply::Integer(0));
-        assert_eq!(call(&mut keys, "HGET a f"), Reply::Nil);
+        keys.now = 10;
+        assert_eq!(call(&mut keys, "EXISTS b"), Reply::Integer(0));
+        assert_eq!(call(&mut keys, "HGET b f"), Reply::Nil);
         assert!(keys.live_keys().is_empty());
     }
 

@@ -5,8 +5,8 @@ use crate::chance::Chance;
 use crate::faults::Rates;
 use crate::life::Life;
 use crate::trace::Trace;
-use bagtrack_sessions::ScriptServer;
 use bagtrack_sessions::clock::sleep;
+use bagtrack_sessions::{NewHash, ScriptServer};
 use redis::{RedisFuture, RedisResult, Value};
 use std::future::pending;
 use std::time::Duration;
@@ -46,12 +46,12 @@ impl Line {
         }
     }
 
-    async fn deliver(&self, script: &str, keys: &[String], args: &[Vec<u8>]) -> RedisResult<Value> {
+    async fn deliver(&self, message: Message<'_>) -> RedisResult<Value> {
         let (_, _, epoch) = self.server.state();
         sleep(self.latency()).await;
         if self.rates.happens(&self.chance, self.rates.store_lost) {
             if self.rates.happens(&self.chance, self.rates.store_doubled) {
-                self.repeat_later(script, keys, args);
+                self.repeat_later(&message);
             }
             return self.lose("request").await;
         }
@@ -62,14 +62,15 @@ impl Line {
         if !is_there || now_epoch != epoch {
             return Err(broken());
         }
-        let answer = self.server.run(script, keys, args);
+        let answer = message.reach(&self.server);
         let told = answer
             .as_ref()
             .map_or_else(|_| "refused".to_owned(), summary);
+        let key = &message.keys[0];
         self.trace
-            .note(format_args!("{} store: {} {told}", self.name, keys[0]));
+            .note(format_args!("{} store: {key} {told}", self.name));
         if self.rates.happens(&self.chance, self.rates.store_doubled) {
-            self.repeat_later(script, keys, args);
+            self.repeat_later(&message);
         }
         sleep(self.latency() + slow_by).await;
         if self
@@ -85,12 +86,20 @@ impl Line {
     }
 
     /// The message was in a buffer of a line that was given up, and comes once more.
-    fn repeat_later(&self, script: &str, keys: &[String], args: &[Vec<u8>]) {
+    fn repeat_later(&self, message: &Message<'_>) {
         let (line, delay) = (self.clone(), self.chance.millis(1..2500));
-        let (script, keys, args) = (script.to_owned(), keys.to_vec(), args.to_vec());
+        let new = message.new.cloned();
+        let (script, keys) = (message.script.to_owned(), message.keys.to_vec());
+        let args = message.args.to_vec();
         tokio::spawn(async move {
             sleep(delay).await;
-            let answer = line.server.run(&script, &keys, &args);
+            let again = Message {
+                new: new.as_ref(),
+                script: &script,
+                keys: &keys,
+                args: &args,
+            };
+            let answer = again.reach(&line.server);
             let told = answer
                 .as_ref()
                 .map_or_else(|_| "refused".to_owned(), summary);
@@ -102,14 +111,34 @@ impl Line {
     }
 }
 
+/// What the line carries to the server.
+struct Message<'a> {
+    new: Option<&'a NewHash>,
+    script: &'a str,
+    keys: &'a [String],
+    args: &'a [Vec<u8>],
+}
+
+impl Message<'_> {
+    fn reach(&self, server: &Server) -> RedisResult<Value> {
+        server.run(self.new, self.script, self.keys, self.args)
+    }
+}
+
 impl ScriptServer for Line {
     fn run<'a>(
         &'a self,
+        new: Option<&'a NewHash>,
         script: &'a str,
         keys: &'a [String],
         args: &'a [Vec<u8>],
     ) -> RedisFuture<'a, Value> {
-        Box::pin(self.deliver(script, keys, args))
+        Box::pin(self.deliver(Message {
+            new,
+            script,
+            keys,
+            args,
+        }))
     }
 
     fn ping(&self) -> RedisFuture<'_, Value> {

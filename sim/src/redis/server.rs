@@ -3,6 +3,7 @@
 use super::keyspace::Keyspace;
 use super::lua;
 use crate::journal::Journal;
+use bagtrack_sessions::NewHash;
 use bagtrack_sessions::clock::{Instant, now};
 use redis::{ErrorKind, RedisError, RedisResult, Value};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -35,16 +36,25 @@ impl Server {
         }
     }
 
-    /// Runs a script, and journals what its session has then.
+    /// Makes a hash and runs a script, and journals what its session has then.
     ///
     /// # Errors
     /// The server is away, or refuses the script.
-    pub fn run(&self, script: &str, keys: &[String], args: &[Vec<u8>]) -> RedisResult<Value> {
+    pub fn run(
+        &self,
+        new: Option<&NewHash>,
+        script: &str,
+        keys: &[String],
+        args: &[Vec<u8>],
+    ) -> RedisResult<Value> {
         let mut shared = self.lock();
         if shared.is_away {
             return Err(broken());
         }
         shared.keyspace.now = self.milliseconds();
+        if let Some(new) = new {
+            shared.keyspace.make_hash(new).map_err(refusal)?;
+        }
         let answer = lua::run(&mut shared.keyspace, script, keys, args);
         if let Some(id) = keys.first().and_then(|key| session_of(key)) {
             let mut field = |name: &str| {
@@ -55,7 +65,7 @@ impl Server {
                 self.journal.stored(id, frame, checkpoint);
             }
         }
-        answer.map_err(|error| RedisError::from((ErrorKind::Extension, "a script failed", error)))
+        answer.map_err(refusal)
     }
 
     /// Whether it answers now, and how slowly; and how often it was restarted.
@@ -95,6 +105,10 @@ impl Server {
     fn lock(&self) -> MutexGuard<'_, Shared> {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn refusal(error: String) -> RedisError {
+    RedisError::from((ErrorKind::Extension, "a script failed", error))
 }
 
 /// The session whose record has this key.

@@ -31,7 +31,7 @@ mod redis;
 mod session_store;
 
 #[cfg(feature = "redis")]
-pub use self::redis::{RedisAddress, RedisAddressError, RedisStore, ScriptServer};
+pub use self::redis::{NewHash, RedisAddress, RedisAddressError, RedisStore, ScriptServer};
 pub use address::{AddressError, StoreAddress};
 pub use file::{Durability, DurabilityError, FileStore, FileStoreError};
 #[cfg(fuzzing)]

@@ -84,7 +84,7 @@ impl Known {
         self.state = state;
     }
 
-    fn is(&self, record: &Record) -> bool {
+    pub fn is(&self, record: &Record) -> bool {
         record.version == self.version && record.state == self.state
     }
 }

@@ -1,9 +1,10 @@
 //! The store in a Redis: what it counts, how long it keeps what it has, and what it does without a Redis.
 
 use crate::folder::Known;
-use crate::suite::{TTL, holds_for, is_committed, record};
+use crate::suite::{TTL, holds_for, is_committed, record, told};
 use bagtrack_sessions::{
-    Counted, Outcome, Owner, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
+    Commit, Counted, Outcome, Owner, RedisAddress, RedisStore, SessionName, SessionStore,
+    StoreShare,
 };
 use redis::FromRedisValue;
 use std::io::{Read, Write};
@@ -214,6 +215,46 @@ async fn all_that_is_in_redis_goes_by_itself() {
     kinds.retain(|kind| kind != "probe");
     kinds.sort();
     assert_eq!(kinds, ["client", "ended", "key", "session"]);
+}
+
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn a_commit_leaves_only_the_record_whatever_redis_says_to_its_transaction() {
+    let redis = Redis::start();
+    let store = redis.store(LONG).await;
+    let mut session = Known::create(&store, 1, TTL).await;
+    let all_is_well = || {
+        let keys: Vec<String> = redis.ask(&["KEYS", "*"]);
+        let others = keys.iter().filter(|key| !key.starts_with("suite:probe"));
+        assert!(others.count() == 1, "{keys:?}");
+    };
+    // The script is not known yet, known, and forgotten.
+    session.advance(&store).await;
+    all_is_well();
+    session.advance(&store).await;
+    all_is_well();
+    let _: String = redis.ask(&["SCRIPT", "FLUSH"]);
+    let before_last = session.version;
+    session.advance(&store).await;
+    all_is_well();
+    // Another replica was there first.
+    let late = Commit {
+        name: session.name,
+        before: before_last,
+        frame: session.version.frame,
+        state: Some(b"late"),
+        takes_over: false,
+        ttl: TTL,
+    };
+    let refused = store.commit(late).await.unwrap();
+    assert!(session.is(&told(refused)));
+    all_is_well();
+    // Transactions are not allowed.
+    let _: String = redis.ask(&["ACL", "SETUSER", "default", "-multi"]);
+    session.advance(&store).await;
+    all_is_well();
+    assert!(session.is(&store.load(session.name.id).await.unwrap().unwrap()));
+    assert_eq!(store.failures(), 0);
 }
 
 #[tokio::test]

@@ -6,7 +6,7 @@ use super::super::session_store::{
 };
 use super::address::{Kind, RedisAddress};
 use super::connection::{Call, Connection};
-use super::script::{Script, ScriptCall, ScriptServer};
+use super::script::{NewHash, Script, ScriptCall, ScriptServer};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
 use crate::owner::Owner;
@@ -17,6 +17,8 @@ use std::sync::{Arc, Weak};
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
 
+/// How long a state stays whose script the server did not run.
+const UNCOMMITTED: Duration = Duration::from_secs(10);
 /// How long an idempotency key names its session.
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);
 /// How long a client's sessions are counted after it opened the last one.
@@ -266,13 +268,20 @@ impl SessionStore for RedisStore {
     fn commit<'a>(&'a self, commit: Commit<'a>) -> StoreFuture<'a, Outcome> {
         let before = commit.before;
         let mut script = self.on(&self.0.scripts.commit, commit.name);
+        let token = token();
+        if let Some(state) = commit.state {
+            let (prefix, id) = (&self.0.prefix, commit.name.id);
+            script.on_new(NewHash {
+                key: format!("{prefix}:new:{{{id}}}:{token}"),
+                field: "state",
+                value: state.to_vec(),
+                ttl: UNCOMMITTED,
+            });
+        }
         script.arg(before.generation).arg(before.frame);
-        script.arg(commit.frame).arg(token());
+        script.arg(commit.frame).arg(token);
         script.arg(milliseconds(commit.ttl));
         script.arg(if commit.takes_over { "1" } else { "" });
-        if let Some(state) = commit.state {
-            script.arg(state);
-        }
         Box::pin(self.about_record(script))
     }
 

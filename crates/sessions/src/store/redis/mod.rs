@@ -1,7 +1,8 @@
 //! A store in Redis or Valkey.
 //!
 //! In: the calls of [`SessionStore`](super::session_store::SessionStore). Out: their outcomes. A record is a hash with
-//! the session's id in its key, and each call is one [script](scripts), which Redis runs as a whole.
+//! the session's id in its key, and each call is one [script](scripts), which Redis runs as a whole. A state goes there
+//! in a transaction with the script that commits it.
 //!
 //! What can go wrong, and what is done about it:
 //! - A script was done, and its answer was lost. Each write has a random token, which the record keeps. A script that
@@ -20,4 +21,4 @@ mod scripts;
 
 pub use address::{RedisAddress, RedisAddressError};
 pub use calls::RedisStore;
-pub use script::ScriptServer;
+pub use script::{NewHash, ScriptServer};

@@ -1,17 +1,32 @@
 //! A script with its keys and arguments, and what runs it.
 
 use redis::aio::ConnectionLike;
-use redis::{RedisFuture, RedisResult, ToRedisArgs, Value};
+use redis::{Pipeline, RedisError, RedisFuture, RedisResult, ScriptInvocation, ToRedisArgs, Value};
 use std::fmt;
+use std::time::Duration;
+
+/// A hash of one field, which lives so long.
+#[derive(Debug, Clone)]
+pub struct NewHash {
+    /// Its key.
+    pub key: String,
+    /// The name of the field.
+    pub field: &'static str,
+    /// What the field has.
+    pub value: Vec<u8>,
+    /// How long the hash lives.
+    pub ttl: Duration,
+}
 
 /// What runs the scripts of a store in place of a Redis: the server of a simulation.
 pub trait ScriptServer: fmt::Debug + Send + Sync {
-    /// Runs this script, all of it or nothing.
+    /// Makes the hash, where there is one, and runs this script, all of it or nothing.
     ///
     /// # Errors
     /// It is not known whether it ran; or the server refuses it.
     fn run<'a>(
         &'a self,
+        new: Option<&'a NewHash>,
         script: &'a str,
         keys: &'a [String],
         args: &'a [Vec<u8>],
@@ -35,6 +50,7 @@ pub(super) struct ScriptCall<'a> {
     script: &'a Script,
     keys: Vec<String>,
     args: Vec<Vec<u8>>,
+    new: Option<NewHash>,
 }
 
 impl Script {
@@ -51,6 +67,7 @@ impl Script {
             script: self,
             keys: vec![key.into()],
             args: Vec::new(),
+            new: None,
         }
     }
 }
@@ -68,6 +85,14 @@ impl ScriptCall<'_> {
         self
     }
 
+    /// On this hash too, which is made in one transaction with the script. A server that refuses the transaction gets the
+    /// value as the last argument.
+    pub(super) fn on_new(&mut self, new: NewHash) -> &mut Self {
+        self.key(new.key.clone());
+        self.new = Some(new);
+        self
+    }
+
     /// Lets a Redis run it.
     pub(super) async fn invoke(&self, link: &mut impl ConnectionLike) -> RedisResult<Value> {
         let mut invocation = self.script.hashed.prepare_invoke();
@@ -77,11 +102,37 @@ impl ScriptCall<'_> {
         for arg in &self.args {
             invocation.arg(&arg[..]);
         }
+        if let Some(new) = &self.new {
+            let done = transaction(new, &invocation).query_async(link).await;
+            let is_refused = |error: &RedisError| error.clone().into_server_errors().is_some();
+            match done {
+                // It does not know the script, or is not the node of this session any more, or has no room. What it says
+                // to the script alone is acted upon.
+                Err(error) if is_refused(&error) => invocation.arg(&new.value[..]),
+                done => return done.map(|(answer,)| answer),
+            };
+        }
         invocation.invoke_async(link).await
     }
 
     /// Lets this server run it.
     pub(super) async fn run_at(&self, server: &dyn ScriptServer) -> RedisResult<Value> {
-        server.run(&self.script.text, &self.keys, &self.args).await
+        let new = self.new.as_ref();
+        server
+            .run(new, &self.script.text, &self.keys, &self.args)
+            .await
     }
+}
+
+/// The hash is made, then the script runs: nothing comes between.
+fn transaction(new: &NewHash, script: &ScriptInvocation<'_>) -> Pipeline {
+    let ttl = i64::try_from(new.ttl.as_millis()).unwrap_or(i64::MAX);
+    let mut transaction = redis::pipe();
+    transaction.atomic();
+    transaction
+        .hset(&new.key, new.field, &new.value[..])
+        .ignore();
+    transaction.pexpire(&new.key, ttl).ignore();
+    transaction.invoke_script(script);
+    transaction
 }

@@ -1,6 +1,7 @@
 //! The scripts that Redis runs, each as a whole.
 //!
-//! KEYS: the record's, and the one that is there after its session was ended. In a cluster both are at one node.
+//! KEYS: the record's, and the one that is there after its session was ended. In a cluster all keys of a session are at
+//! one node.
 //!
 //! They answer `{0}` where there is no record, `{1, ttl}` where what was asked for was done, `{2, ttl, record}` where
 //! the record has another version, and `{3}` where the session was ended.
@@ -65,15 +66,30 @@ return is_here and 1 or 0
 ";
 
 /// ARGV: generation, frame before, frame after, token, milliseconds to live, whether the replica goes on from the record
-/// where it has another version ('1' or ''), and the state where it is written.
+/// where it has another version ('1' or ''), and the state where it is written. KEYS has a third then, of a hash with the
+/// state alone. Without the state among ARGV, as Lua would copy and hash each of its bytes, this hash becomes the record.
 const COMMIT: &str = r"
-local key = KEYS[1]
-local generation, frame, token = unpack(redis.call('HMGET', key, 'generation', 'frame', 'token'))
-if not generation then return absent() end
-if token == ARGV[4] then return {1, 0} end
-if generation ~= ARGV[1] or frame ~= ARGV[2] then return tell(key, ARGV[6] == '1') end
+local key, new = KEYS[1], KEYS[3]
+if new and ARGV[7] then
+  redis.call('DEL', new)
+  new = nil
+end
+local generation, frame, token, incarnation, head =
+  unpack(redis.call('HMGET', key, 'generation', 'frame', 'token', 'incarnation', 'head'))
+local function without_new(answer)
+  if new then redis.call('DEL', new) end
+  return answer
+end
+if not generation then return without_new(absent()) end
+if token == ARGV[4] then return without_new({1, 0}) end
+if generation ~= ARGV[1] or frame ~= ARGV[2] then return without_new(tell(key, ARGV[6] == '1')) end
+if new then
+  redis.call('RENAME', new, key)
+  redis.call('HSET', key, 'generation', generation, 'incarnation', incarnation, 'head', head, 'checkpoint', ARGV[3])
+elseif ARGV[7] then
+  redis.call('HSET', key, 'checkpoint', ARGV[3], 'state', ARGV[7])
+end
 redis.call('HSET', key, 'frame', ARGV[3], 'token', ARGV[4])
-if ARGV[7] then redis.call('HSET', key, 'checkpoint', ARGV[3], 'state', ARGV[7]) end
 redis.call('PEXPIRE', key, ARGV[5])
 return {1, ARGV[5]}
 ";
@@ -187,7 +203,7 @@ fn planted() -> (String, String) {
     }
     if PlantedFault::LivesForEver.is_here() {
         create = create.replace("redis.call('PEXPIRE', key, ARGV[7])", "");
-        commit = commit.replace("redis.call('PEXPIRE', key, ARGV[5])", "");
+        commit = commit.replace("'PEXPIRE', key, ARGV[5]", "'PEXPIRE', key, '9999999999999'");
     }
     (create, commit)
 }
