@@ -2,8 +2,8 @@
 
 use crate::service::{content_of_stored, stored_of};
 use bagtrack_sessions::{
-    record_of_row, row_and_state, Clock, Commit, NewHash, Outcome, Owner, Record, RedisStore, ScriptServer,
-    SessionName, SessionState, SessionStore, StoreFuture, StoreUnavailable, Version,
+    record_of_row, row_and_state, Clock, Commit, NewHash, Outcome, Owner, Record, RedisStore,
+    ScriptServer, SessionName, SessionState, SessionStore, StoreFuture, StoreUnavailable, Version,
 };
 use redis::{RedisFuture, Value};
 use std::io;
