@@ -71,7 +71,8 @@ return is_here and 1 or 0
 const COMMIT: &str = r"
 local key, new = KEYS[1], KEYS[3]
 if new and ARGV[7] then
-  redis.call('DEL', new)
+  -- Redis refuses a script's writes for want of memory unless it has written before.
+  if redis.call('EXISTS', new) == 1 then redis.call('DEL', new) end
   new = nil
 end
 local generation, frame, token, incarnation, head =
