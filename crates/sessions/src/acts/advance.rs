@@ -85,10 +85,10 @@ impl SessionService {
                 Step::GoOn(record) => {
                     was_late |= matches!(attempt, Attempt::Tracked(..));
                     is_told = true;
-                    self.take_over(&mut locked, *record, flow).await?;
+                    locked = self.take_over(locked, *record, flow).await?;
                 }
                 Step::Conflict(record) => {
-                    self.take_over(&mut locked, *record, flow).await?;
+                    self.take_over(locked, *record, flow).await?;
                     return Err(FramesError::NotInOrder);
                 }
                 step => {

@@ -7,8 +7,33 @@ use crate::store::{Intent, Local, Record, Step, StoreUnavailable, reconcile};
 use crate::{
     Flow, LockedSession, NewSession, NoSession, Owner, Session, SessionState, SnapshotError,
 };
+use bagtrack_tracker::Expert;
 use std::sync::Arc;
 use uuid::Uuid;
+
+/// What the states of records are read with.
+struct StateReader {
+    max_recent: usize,
+    expert: Option<Arc<dyn Expert>>,
+}
+
+impl StateReader {
+    /// The state of a record, read beside that of the same session at another frame.
+    fn read(
+        &self,
+        record: &Record,
+        known: Option<&SessionState>,
+    ) -> Result<SessionState, ActError> {
+        let expert = self.expert.as_ref();
+        let state = SessionState::from_stored(&record.state, self.max_recent, expert, known);
+        let state = state.map_err(ActError::StoredState)?;
+        // From another frame on, the record's numbers would not be the session's.
+        match state.latest_frame() == record.version.checkpoint {
+            true => Ok(state),
+            false => Err(ActError::StoredState(SnapshotError::Damaged)),
+        }
+    }
+}
 
 impl SessionService {
     /// The live session of this id and owner, from memory or from the store.
@@ -73,7 +98,11 @@ impl SessionService {
 
     /// The session of a record, which is then in memory.
     async fn insert(&self, id: Uuid, record: Record, flow: Flow) -> Result<Arc<Session>, ActError> {
-        let (state, record) = self.decode(record, None, flow).await?;
+        let reading = self.reading(flow, move |reader| {
+            let state = reader.read(&record, None)?;
+            Ok((state, record))
+        });
+        let (state, record) = reading.await?;
         if let Some(session) = self.registry.live(id)
             && session.name().incarnation != record.opening.incarnation
         {
@@ -98,44 +127,37 @@ impl SessionService {
         }
     }
 
-    /// Reads a record's state on a worker, beside that of the same session at another frame.
-    async fn decode(
-        &self,
-        record: Record,
-        known: Option<SessionState>,
-        flow: Flow,
-    ) -> Result<(SessionState, Record), ActError> {
+    /// Runs `work` on a worker, with what reads the states of records.
+    async fn reading<T, F>(&self, flow: Flow, work: F) -> Result<T, ActError>
+    where
+        T: Send + 'static,
+        F: FnOnce(&StateReader) -> Result<T, ActError> + Send + 'static,
+    {
         let queue = self.admission.enter(flow, Box::new(()))?;
-        let max_recent = self.settings.max_frames;
-        let expert = self.expert.clone();
-        self.run(queue, move |_| {
-            let (bytes, expert) = (&record.state, expert.as_ref());
-            let state = SessionState::from_stored(bytes, max_recent, expert, known.as_ref());
-            let state = state.map_err(ActError::StoredState)?;
-            // From another frame on, the record's numbers would not be the session's.
-            match state.latest_frame() == record.version.checkpoint {
-                true => Ok((state, record)),
-                false => Err(ActError::StoredState(SnapshotError::Damaged)),
-            }
-        })
-        .await
+        let reader = StateReader {
+            max_recent: self.settings.max_frames,
+            expert: self.expert.clone(),
+        };
+        self.run(queue, move |_| work(&reader)).await
     }
 
     /// Goes on from a record of the store, which is of this session.
     pub(super) async fn take_over(
         &self,
-        locked: &mut LockedSession,
+        mut locked: LockedSession,
         record: Record,
         flow: Flow,
-    ) -> Result<(), ActError> {
-        let known = Some(locked.state().clone());
-        let (newest, record) = self.decode(record, known, flow).await?;
-        match PlantedFault::GoesOnWithOldState.is_here() {
-            true => locked.session().set_version(Some(record.version)),
-            false => locked.replace(newest, Some(record.version)),
-        }
-        locked.session().set_ttl(record.ttl);
-        Ok(())
+    ) -> Result<LockedSession, ActError> {
+        self.reading(flow, move |reader| {
+            let newest = reader.read(&record, Some(locked.state()))?;
+            match PlantedFault::GoesOnWithOldState.is_here() {
+                true => locked.session().set_version(Some(record.version)),
+                false => locked.replace(newest, Some(record.version)),
+            }
+            locked.session().set_ttl(record.ttl);
+            Ok(locked)
+        })
+        .await
     }
 
     /// Ends the session of this id and owner everywhere. Work that has begun still gets its answer.

@@ -27,10 +27,9 @@ impl SessionService {
         flow: Flow,
         takes_over: bool,
     ) -> Result<LockedSession, ActError> {
-        let mut locked = permit.lock().await?;
+        let locked = permit.lock().await?;
         let step = self.ask(locked.session(), takes_over).await;
-        self.follow(&mut locked, step, flow).await?;
-        Ok(locked)
+        self.follow(locked, step, flow).await
     }
 
     /// Waits for the session, brings its state up to the store's, and runs `read` with it on a worker.
@@ -93,13 +92,13 @@ impl SessionService {
                     Some(permit) => permit.share(),
                     None => session.read_permit()?,
                 };
-                let mut locked = permit.lock().await?;
+                let locked = permit.lock().await?;
                 // It may be this replica that has noted the newer frame meanwhile.
                 let step = match session.version() == before {
                     true => step,
                     false => self.ask(session, false).await,
                 };
-                self.follow(&mut locked, step, flow).await
+                self.follow(locked, step, flow).await.map(drop)
             }
             step => Err(self.refusal(session, step)),
         }
@@ -139,7 +138,7 @@ impl SessionService {
             };
             let step = reconcile(local(&session), outcome);
             let is_fenced = matches!(step, Step::Commit(_));
-            self.follow(&mut locked, step, flow).await?;
+            locked = self.follow(locked, step, flow).await?;
             if is_fenced {
                 if !is_planted {
                     locked.fenced();
@@ -175,16 +174,16 @@ impl SessionService {
     /// Does a step with a locked session.
     async fn follow(
         &self,
-        locked: &mut LockedSession,
+        locked: LockedSession,
         step: Step,
         flow: Flow,
-    ) -> Result<(), ActError> {
+    ) -> Result<LockedSession, ActError> {
         match step {
             Step::Commit(ttl) => {
                 if self.store.is_some() {
                     locked.session().set_ttl(ttl);
                 }
-                Ok(())
+                Ok(locked)
             }
             Step::GoOn(record) | Step::Conflict(record) => {
                 self.take_over(locked, *record, flow).await
