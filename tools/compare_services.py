@@ -155,14 +155,14 @@ def measure(name, clip, clients, frames, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", nargs="+", type=pathlib.Path)
-    parser.add_argument("--trackers", default="CSRT,KCF", help="trackers of OpenCV")
+    parser.add_argument("--trackers", default="CSRT,KCF", help="trackers of OpenCV, or '' for none")
     parser.add_argument("--nano", nargs=2, metavar=("BACKBONE", "HEAD"), help="also NanoTrack, with these ONNX files")
     parser.add_argument("--clients", default="1,8,64")
     parser.add_argument("--targets", type=int, default=1, help="also bagtrack with so many targets of one client")
     parser.add_argument("--frames", type=int, default=100, help="frames of all clients together, and at least ten each")
     parser.add_argument("--bagtrack", default=str(ROOT / "target/release/bagtrack"))
     options = parser.parse_args()
-    names = ["bagtrack", *options.trackers.split(","), *(["Nano"] if options.nano else [])]
+    names = ["bagtrack", *filter(None, options.trackers.split(",")), *(["Nano"] if options.nano else [])]
     print("| clip | clients | service | CPU, × bagtrack | CPU ms a frame | p50 ms | p99 ms | frames a second | MiB |")
     print("|---|---:|---|---:|---:|---:|---:|---:|---:|")
     for folder in options.clips:
