@@ -17,7 +17,7 @@ use std::sync::{Arc, Weak};
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
 
-/// How long a state stays whose script the server did not run.
+/// How long a state stays in the server where the script that commits it did not run.
 const UNCOMMITTED: Duration = Duration::from_secs(10);
 /// How long an idempotency key names its session.
 const CLAIMED: Duration = Duration::from_secs(24 * 3600);

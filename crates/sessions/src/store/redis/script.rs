@@ -5,7 +5,7 @@ use redis::{Pipeline, RedisError, RedisFuture, RedisResult, ScriptInvocation, To
 use std::fmt;
 use std::time::Duration;
 
-/// A hash of one field, which lives so long.
+/// A hash with one field, which is made in one transaction with a script.
 #[derive(Debug, Clone)]
 pub struct NewHash {
     /// Its key.
