@@ -40,7 +40,7 @@ export class Camera {
     this.isShown = true;
     const next = () => {
       if (this.isStopped || !this.isShown) return;
-      show(drawFrame(this.video, this.video, this.canvas));
+      show(drawFrame(this.video, this.canvas));
       this.video.requestVideoFrameCallback(next);
     };
     next();

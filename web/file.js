@@ -1,12 +1,12 @@
-// The frames of a video file, each exactly once.
+// The frames of a video file that is played: over plain http a page is not given the browser's decoders.
 //
-// A browser plays files and does not say which frames they have. So the file is played and paused, and every frame that
+// The browser does not say which frames a file has. So the file is played and paused, and every frame that
 // the browser tells of is taken. Where the media times leave room for another one, the file is looked into right before
 // the later of the two frames; where that is not the earlier one, the file is played from there again, more slowly.
 
 import { Delivery } from "./delivery.js";
 import { BEFORE, Gaps, SAME_PASSES } from "./gaps.js";
-import { Playback, SAME, areEqual, frameAt, learnRate } from "./playback.js";
+import { Playback, SAME, areEqual, learnRate } from "./playback.js";
 import { addVideo, drawFrame, encoded, loaded } from "./source.js";
 
 /**
@@ -114,7 +114,7 @@ export class VideoFile {
    * @returns {Promise<Picture>} */
   at(frame, time) {
     const looked = this.looked.then(async () => {
-      this.reader ??= await openFile(this.file, this.place);
+      this.reader ??= await openPlayed(this.file, this.place);
       await this.reader.playback.seek(time + BEFORE);
       const image = drawFrame(this.reader.video);
       return { image, blob: await encoded(image), time, frame };
@@ -151,8 +151,7 @@ export class VideoFile {
 
   /** Takes the frame that is shown, if it is the next one.
    * @param {VideoFrameCallbackMetadata} shown */
-  look({ mediaTime, presentedFrames }) {
-    const { frame, time } = frameAt(this.video, mediaTime);
+  look({ mediaTime: time, presentedFrames }) {
     const { last } = this;
     const steps = presentedFrames - (last.shown ?? presentedFrames - 1);
     if (time <= last.time + SAME) {
@@ -162,13 +161,9 @@ export class VideoFile {
       if (time > this.settling + SAME) this.settling = Infinity;
     } else if (this.gaps.mayPassOver(last.time, time, steps)) {
       this.gaps.lookInto(time, steps);
-    } else if (frame) {
-      this.interval = Math.min(this.interval, time - last.time);
-      this.take(drawFrame(this.video, frame), time, presentedFrames);
     } else {
       this.settle(time, presentedFrames);
     }
-    frame?.close();
     this.adjust();
   }
 
@@ -279,7 +274,7 @@ export class VideoFile {
  * @param {File} file
  * @param {HTMLElement} place
  */
-export async function openFile(file, place) {
+export async function openPlayed(file, place) {
   const video = addVideo(place);
   const ready = loaded(video);
   video.src = URL.createObjectURL(file);

@@ -40,20 +40,6 @@ export class Playback {
   }
 }
 
-/** The frame that a video shows, and its media time. It may be newer than the one that was told of.
- * @param {HTMLVideoElement} video
- * @param {number} mediaTime
- * @returns {{frame: VideoFrame | undefined, time: number}} */
-export function frameAt(video, mediaTime) {
-  if (typeof VideoFrame === "undefined") return { frame: undefined, time: mediaTime };
-  const frame = new VideoFrame(video);
-  const time = frame.timestamp / 1e6;
-  if (time >= mediaTime - SAME) return { frame, time };
-  // Not every browser gives it the time that it has in the file.
-  frame.close();
-  return { frame: undefined, time: mediaTime };
-}
-
 /** Whether the time of the frame is told. Some browsers tell the one that was sought, and some go on to a key frame.
  * @param {VideoFrameCallbackMetadata | undefined} shown
  * @param {number} sought

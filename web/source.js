@@ -55,22 +55,27 @@ export function loaded(video) {
 
 /** Draws what a video shows, as large as it is uploaded.
  * @param {HTMLVideoElement} video
- * @param {CanvasImageSource} [shown] The frame, where it is at hand.
  * @param {HTMLCanvasElement} [canvas] Where to, if not onto a new one. */
-export function drawFrame(video, shown = video, canvas = document.createElement("canvas")) {
-  return drawScaled(shown, { width: video.videoWidth, height: video.videoHeight }, canvas);
+export function drawFrame(video, canvas = document.createElement("canvas")) {
+  return drawScaled(video, { width: video.videoWidth, height: video.videoHeight }, canvas);
 }
 
-/** Draws an image of this size as large as it is uploaded.
+/** Draws an image as large as it is uploaded.
  * @param {CanvasImageSource} image
- * @param {{width: number, height: number}} size
- * @param {HTMLCanvasElement} [canvas] */
-export function drawScaled(image, size, canvas = document.createElement("canvas")) {
+ * @param {{width: number, height: number}} size As it is shown.
+ * @param {HTMLCanvasElement} [canvas]
+ * @param {number} [rotation] How far it is to be turned clockwise, in degrees: quarters of a turn. */
+export function drawScaled(image, size, canvas = document.createElement("canvas"), rotation = 0) {
   const scale = Math.min(1, LONGEST_SIDE / Math.max(size.width, size.height));
   const [width, height] = [size.width, size.height].map((side) => Math.max(1, Math.round(side * scale)));
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;
-  canvas.getContext("2d", { willReadFrequently: true })?.drawImage(image, 0, 0, width, height);
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context?.translate(width / 2, height / 2);
+  context?.rotate((rotation * Math.PI) / 180);
+  const [across, down] = rotation % 180 === 0 ? [width, height] : [height, width];
+  context?.drawImage(image, -across / 2, -down / 2, across, down);
+  context?.resetTransform();
   return canvas;
 }
 

@@ -5,7 +5,7 @@ import { get, input } from "./dom.js";
 import { UnplayableError } from "./problems.js";
 
 /** What opens files and the camera is loaded when one is about to choose. */
-const modules = () => Promise.all([import("./file.js"), import("./images.js"), import("./camera.js")]);
+const modules = () => Promise.all([import("./video.js"), import("./images.js"), import("./camera.js")]);
 
 /** @typedef {import("./source.js").Source} Source */
 
@@ -13,11 +13,11 @@ const modules = () => Promise.all([import("./file.js"), import("./images.js"), i
  * @param {File[]} files
  * @returns {Promise<Source>} */
 export async function openFiles(files) {
-  const [{ openFile }, { isImage, openImages }] = await modules();
+  const [{ openVideo }, { isImage, openImages }] = await modules();
   const video = files.find((file) => file.type.startsWith("video/"));
   if (!video && files.some(isImage)) return openImages(files);
   const file = video ?? files[0];
-  return openFile(file, get("stage")).catch((error) => {
+  return openVideo(file, get("stage")).catch((error) => {
     throw error.name === "NotSupportedError" && file.size > 0 ? new UnplayableError(file) : error;
   });
 }

@@ -1,4 +1,4 @@
-// Frames that are files of their own: a sample clip, or a folder of images. Any of them can be had at any time.
+// Frames of which any can be had at any time: those of a sample clip, a folder of images, a decoded file.
 
 /**
  * @typedef {import("./source.js").Picture} Picture
@@ -13,9 +13,9 @@ export class Stills {
   /**
    * @param {string} name
    * @param {number} rate Frames a second.
-   * @param {(index: number) => Promise<Blob>} load
+   * @param {(index: number) => Promise<Blob>} [load] For frames that are files of their own.
    */
-  constructor(name, rate, load) {
+  constructor(name, rate, load = () => Promise.reject(new Error("There is no such file."))) {
     this.name = name;
     this.isLive = false;
     this.size = { width: 0, height: 0 };
@@ -27,7 +27,7 @@ export class Stills {
     this.skipped = 0;
     /** How many there are. */
     this.count = 0;
-    /** @type {Map<number, Promise<Picture>>} */
+    /** @type {Map<number, Promise<Picture | undefined>>} */
     this.loaded = new Map();
     /** The one that was delivered last. */
     this.index = 0;
@@ -35,6 +35,8 @@ export class Stills {
     this.isStopped = false;
     /** @type {File[] | undefined} Where they are files of this machine. */
     this.files = undefined;
+    /** @type {(() => void) | undefined} */
+    this.close = undefined;
   }
 
   get duration() {
@@ -58,16 +60,17 @@ export class Stills {
     while (index > 0 && distance(index - 1) < distance(index)) index -= 1;
     while (index + 1 < this.count && distance(index + 1) < distance(index)) index += 1;
     this.index = index;
-    return this.picture(this.index);
+    return this.at(index);
   }
 
   /** @param {number} index */
-  at(index) {
-    return this.picture(index);
+  async at(index) {
+    return undamaged(await this.picture(index));
   }
 
-  /** @param {number} index
-   * @returns {Promise<Picture>} */
+  /** One of them; nothing where it is damaged, and those after it can be had.
+   * @param {number} index
+   * @returns {Promise<Picture | undefined>} */
   async picture(index) {
     const blob = await this.load(index);
     return { blob, image: await createImageBitmap(blob), time: this.timeOf(index), frame: index };
@@ -100,7 +103,8 @@ export class Stills {
         if (this.isHeld) due = performance.now() + 10;
       } while (this.isHeld && !this.isStopped);
       this.index = index;
-      if (!this.isStopped) deliver(picture);
+      if (!picture) this.skipped += 1;
+      else if (!this.isStopped) deliver(picture);
     }
     if (!this.isStopped) end();
   }
@@ -113,4 +117,10 @@ export class Stills {
   stop() {
     this.isStopped = true;
   }
+}
+
+/** @param {Picture | undefined} picture */
+export function undamaged(picture) {
+  if (!picture) throw new DOMException("", "EncodingError");
+  return picture;
 }

@@ -112,12 +112,20 @@ def whole_file(checks, path, rate):
 
 def file_of_varying_rate(checks):
     """After a while three of seven frames are missing, and the frame before them stays for longer."""
-    path = checks.files.file("vary.mp4", 30, H264, "gt(mod(n,7),2)+lt(n,20)")
-    numbers = [n for n in range(FRAMES) if n % 7 > 2 or n < 20]
+    path, numbers = checks.files.varying_file()
     page = checks.page()
     follow_file(checks, page, path)
     to_the_end(page)
     check_rows(rows(page), path, checks.files.truth, numbers, times_of(path))
+    page.context.close()
+
+
+def file_of_a_phone(checks):
+    page = checks.page()
+    follow_file(checks, page, path := checks.files.phone_file())
+    to_the_end(page)
+    check_rows(rows(page), path, checks.files.truth, list(range(FRAMES)), times_of(path))
+    check_video(saved_video(checks, page, "phone.webm"), list(range(FRAMES)), FRAMES / 30)
     page.context.close()
 
 
@@ -230,6 +238,7 @@ ALL = [
     h264_file,
     vp8_file,
     file_of_varying_rate,
+    file_of_a_phone,
     file_with_corrections,
     service_killed,
     paused_past_the_expiry,

@@ -68,7 +68,7 @@ class Page:
         return new()[0]
 
 
-def whole_file(page, path, truth, downloads):
+def whole_file(page, path, numbers, truth, downloads):
     page.find("file").send_keys(str(path))
     page.said("Draw a box")
     gray = page.script(f"return ({GRAY})()")
@@ -78,7 +78,6 @@ def whole_file(page, path, truth, downloads):
     skipped = page.find("skipped").text
     table = list(csv.DictReader(io.StringIO(page.saved("save-csv", downloads).read_text())))
     times = times_of(path)
-    numbers = list(range(FRAMES))
     check_rows(table, path, truth, numbers, times)
     assert skipped == "0", skipped
     video = page.saved("save-video", downloads)
@@ -91,7 +90,7 @@ def free_port():
         return listener.getsockname()[1]
 
 
-def in_firefox(service, clips, path):
+def in_firefox(service, clips, path, numbers):
     """A file, in a browser that keeps nothing of another one."""
     with tempfile.TemporaryDirectory() as folder:
         downloads = pathlib.Path(folder) / "downloads"
@@ -105,7 +104,7 @@ def in_firefox(service, clips, path):
             firefox.start_session()
             print(f"Firefox {firefox.session_capabilities['browserVersion']}")
             firefox.set_window_rect(width=1000, height=1200)
-            whole_file(Page(firefox, service.url), path, clips.truth, downloads)
+            whole_file(Page(firefox, service.url), path, numbers, clips.truth, downloads)
         finally:
             firefox.quit()
 
@@ -115,12 +114,15 @@ def main():
     try:
         with tempfile.TemporaryDirectory() as folder:
             clips = Clips(sys.argv[1], pathlib.Path(folder) / "clip")
-            in_firefox(service, clips, clips.file("clip.mp4", 30, H264))
-            in_firefox(service, clips, clips.file("clip.webm", 25, VP8))
+            every = list(range(FRAMES))
+            in_firefox(service, clips, clips.file("clip.mp4", 30, H264), every)
+            in_firefox(service, clips, clips.file("clip.webm", 25, VP8), every)
+            in_firefox(service, clips, clips.file("clip.mkv", 30, H264), every)
+            in_firefox(service, clips, clips.phone_file(), every)
+            in_firefox(service, clips, *clips.varying_file())
     finally:
         service.stop()
     print("Left out in Firefox, since its driver does not give them: camera, touch, lines that are cut, axe.")
-    print("Left out in Firefox: a file of varying rate, where it passes over frames after long ones; the page counts them.")
 
 
 if __name__ == "__main__":

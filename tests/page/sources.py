@@ -54,6 +54,51 @@ def dropped_and_pasted(checks):
         page.context.close()
 
 
+RECORDED = """async (seconds) => {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [320, 240];
+    const context = canvas.getContext("2d");
+    const recorder = new MediaRecorder(canvas.captureStream(), { mimeType: "video/webm;codecs=vp8" });
+    const parts = [];
+    recorder.ondataavailable = ({ data }) => parts.push(data);
+    const stopped = new Promise((resolve) => (recorder.onstop = resolve));
+    recorder.start(100);
+    const begun = performance.now();
+    for (let now = begun; now - begun < 1000 * seconds; now = await new Promise(requestAnimationFrame)) {
+        for (let y = 0; y < 240; y += 40) for (let x = 0; x < 320; x += 40) {
+            context.fillStyle = `hsl(${x + y} 30% 50%)`;
+            context.fillRect(x, y, 40, 40);
+        }
+        context.fillStyle = "white";
+        context.fillRect(100 + (now - begun) / 50, 100, 30, 30);
+        context.fillStyle = "black";
+        context.fillRect(108 + (now - begun) / 50, 108, 14, 14);
+    }
+    recorder.stop();
+    await stopped;
+    const reader = new FileReader();
+    reader.readAsDataURL(new Blob(parts));
+    await new Promise((resolve) => (reader.onload = resolve));
+    return reader.result.split(",")[1];
+}"""
+
+
+def recorded_in_a_browser(checks):
+    """What a browser records, it writes as it comes: neither the file nor its parts say how long they are."""
+    page = checks.page(where="here")
+    path = checks.files.folder / "recorded.webm"
+    path.write_bytes(base64.b64decode(page.evaluate(RECORDED, 2)))
+    choose_file(page, path)
+    drag(page, [100, 100, 30, 30])
+    to_the_end(page)
+    table, times = rows(page), times_of(path)
+    assert len(times) > 20, times
+    told = [float(row["time"]) for row in table]
+    assert len(told) == len(times) and max(map(abs, map(float.__sub__, told, times))) < 0.0015, (told, times)
+    assert abs(float(table[-1]["x"]) - 140) < 6, table[-1]
+    page.context.close()
+
+
 def begun_in_the_middle(checks):
     """A file is begun at a later frame. Its rows have the numbers and times of the file."""
     for path, rate in ((checks.files.file("clip.mp4", 30, H264), 30), (checks.files.file("clip.webm", 25, VP8), 25)):
@@ -108,4 +153,11 @@ def no_video_at_all(checks):
     page.context.close()
 
 
-ALL = [folder_of_images, dropped_and_pasted, begun_in_the_middle, decoded_by_the_service, no_video_at_all]
+ALL = [
+    folder_of_images,
+    dropped_and_pasted,
+    recorded_in_a_browser,
+    begun_in_the_middle,
+    decoded_by_the_service,
+    no_video_at_all,
+]

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 63] = [
+const FILES: [File; 68] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -59,6 +59,7 @@ const FILES: [File; 63] = [
     file!("camera.js", SCRIPT),
     file!("clip.js", SCRIPT),
     file!("decoded.js", SCRIPT),
+    file!("decoder.js", SCRIPT),
     file!("delivery.js", SCRIPT),
     file!("dom.js", SCRIPT),
     file!("editing.js", SCRIPT),
@@ -68,6 +69,7 @@ const FILES: [File; 63] = [
     file!("gaps.js", SCRIPT),
     file!("handover.js", SCRIPT),
     file!("images.js", SCRIPT),
+    file!("indexer.js", SCRIPT),
     file!("keeping.js", SCRIPT),
     file!("kept.js", SCRIPT),
     file!("list.js", SCRIPT),
@@ -91,10 +93,13 @@ const FILES: [File; 63] = [
     file!("stage.js", SCRIPT),
     file!("stills.js", SCRIPT),
     file!("timeline.js", SCRIPT),
+    file!("video.js", SCRIPT),
     file!("votes.js", SCRIPT),
     file!("welcome-rows.js", SCRIPT),
     file!("welcome.js", SCRIPT),
     file!("zip.js", SCRIPT),
+    file!("wasm/bagtrack_demux.js", SCRIPT),
+    file!("wasm/bagtrack_demux_bg.wasm", WASM),
     client_file!("js/backoff.js"),
     client_file!("js/bag.js"),
     client_file!("js/bagtrack.js"),

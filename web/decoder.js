@@ -1,0 +1,161 @@
+// The frames of a file, decoded one after the other. Each is asked for by its number, in the order in which they are
+// shown.
+
+/** @typedef {import("./indexer.js").Index} Index */
+
+/** Samples that wait for the decoder at a time. */
+const MOST_QUEUED = 4;
+/** Bytes of the file that are read at a time. */
+const READ_AHEAD = 1 << 20;
+
+/** The frames of an index: the sample of each, and their numbers by their times. */
+export class FrameNumbers {
+  /** @param {Index} index */
+  constructor({ times, keys, shown }) {
+    const samples = Array.from(times.keys()).filter((sample) => shown[sample]);
+    this.samples = samples.sort((one, other) => times[one] - times[other]);
+    this.numbers = new Map(this.samples.map((sample, number) => [times[sample], number]));
+    /** The samples that need no other ones, ascending. */
+    this.keys = Array.from(keys.keys()).filter((sample) => keys[sample]);
+    /** In seconds. */
+    this.times = this.samples.map((sample) => times[sample] / 1e6);
+  }
+
+  /** The sample that decoding begins with, for this one.
+   * @param {number} sample */
+  keyOf(sample) {
+    let [low, high] = [0, this.keys.length];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.keys[middle] <= sample) low = middle;
+      else high = middle;
+    }
+    return this.keys[low];
+  }
+}
+
+export class FrameDecoder {
+  /**
+   * @param {File} file
+   * @param {Index} index
+   * @param {FrameNumbers} frames
+   */
+  constructor(file, index, frames) {
+    this.file = file;
+    this.index = index;
+    this.frames = frames;
+    /** @type {VideoDecoder | undefined} */
+    this.decoder = undefined;
+    /** @type {Error | undefined} */
+    this.failure = undefined;
+    /** The sample that is decoded next. */
+    this.next = 0;
+    /** The number of the last frame that came out. */
+    this.last = -1;
+    this.wanted = 0;
+    /** @type {Map<number, VideoFrame>} Frames that came out before they were wanted. */
+    this.ready = new Map();
+    /** Something has come out, or gone in. */
+    this.changed = () => {};
+    /** @type {Promise<unknown>} What was asked for before has come. */
+    this.before = Promise.resolve();
+    /** A part of the file. */
+    this.part = { begin: 0, bytes: new Uint8Array() };
+  }
+
+  /** A frame; nothing where the decoder does not give it. It is quick where the frames before it were the last ones.
+   * @param {number} number
+   * @returns {Promise<VideoFrame | undefined>} Is to be closed. */
+  at(number) {
+    const asked = this.before.then(() => this.decode(number));
+    this.before = asked.catch(() => undefined);
+    return asked;
+  }
+
+  /** @param {number} number */
+  async decode(number) {
+    const sample = this.frames.samples[number];
+    const key = this.frames.keyOf(sample);
+    this.wanted = number;
+    this.drop(number);
+    const isAhead = this.decoder?.state === "configured" && number > this.last && key <= this.next;
+    if (!this.ready.has(number) && !isAhead) this.begin(key);
+    while (!this.ready.has(number) && this.last < number) await this.step();
+    const frame = this.ready.get(number);
+    this.ready.delete(number);
+    return frame;
+  }
+
+  /** Begins with a sample that needs no other one.
+   * @param {number} sample */
+  begin(sample) {
+    this.close();
+    const decoder = new VideoDecoder({
+      output: (frame) => decoder === this.decoder && this.keep(frame),
+      error: (error) => {
+        this.failure = error;
+        this.changed();
+      },
+    });
+    decoder.ondequeue = () => this.changed();
+    const { codec, description } = this.index;
+    decoder.configure({ codec, description });
+    [this.decoder, this.failure, this.next, this.last] = [decoder, undefined, sample, -1];
+  }
+
+  /** Gives the decoder a sample, or waits until it can take one. */
+  async step() {
+    const { decoder } = this;
+    if (!decoder || this.failure) throw new DOMException("", "EncodingError");
+    if (this.next === this.index.sizes.length) {
+      await decoder.flush().catch(() => undefined);
+      // After that it takes only what needs no other samples.
+      this.last = Infinity;
+    } else if (decoder.decodeQueueSize < MOST_QUEUED) {
+      const chunk = await this.chunk(this.next);
+      if (decoder.state === "configured") decoder.decode(chunk);
+      this.next += 1;
+    } else {
+      await new Promise((resolve) => (this.changed = () => resolve(undefined)));
+    }
+  }
+
+  /** @param {VideoFrame} frame */
+  keep(frame) {
+    const number = this.frames.numbers.get(frame.timestamp);
+    if (number === undefined || number < this.wanted) frame.close();
+    else this.ready.set(number, frame);
+    this.last = Math.max(this.last, number ?? -1);
+    this.changed();
+  }
+
+  /** Gives up frames before one.
+   * @param {number} number */
+  drop(number) {
+    for (const [early, frame] of this.ready) {
+      if (early >= number) continue;
+      frame.close();
+      this.ready.delete(early);
+    }
+  }
+
+  /** @param {number} sample */
+  async chunk(sample) {
+    const { offsets, sizes, times, keys } = this.index;
+    const [offset, size] = [offsets[sample], sizes[sample]];
+    let from = offset - this.part.begin;
+    if (from < 0 || from + size > this.part.bytes.length) {
+      const blob = this.file.slice(offset, offset + Math.max(size, READ_AHEAD));
+      this.part = { begin: offset, bytes: new Uint8Array(await blob.arrayBuffer()) };
+      from = 0;
+    }
+    const data = this.part.bytes.subarray(from, from + size);
+    return new EncodedVideoChunk({ type: keys[sample] ? "key" : "delta", timestamp: times[sample], data });
+  }
+
+  close() {
+    this.drop(Infinity);
+    if (this.decoder && this.decoder.state !== "closed") this.decoder.close();
+    this.decoder = undefined;
+  }
+}

@@ -1,0 +1,97 @@
+// A video file: decoded frame by frame where the browser gives a page its decoders, else played.
+
+import { FrameDecoder, FrameNumbers } from "./decoder.js";
+import { openPlayed } from "./file.js";
+import { drawScaled, encoded } from "./source.js";
+import { Stills, undamaged } from "./stills.js";
+
+/**
+ * @typedef {import("./indexer.js").Index} Index
+ * @typedef {import("./source.js").Picture} Picture
+ * @typedef {import("./source.js").Source} Source
+ * @typedef {{width: number, height: number}} Size
+ */
+
+/** Where the frames of a file are; nothing where that cannot be told, or the browser does not decode them for a page.
+ * @param {File} file */
+async function indexOf(file) {
+  // Pages that came over plain http are not given it.
+  if (typeof VideoDecoder === "undefined") return undefined;
+  const worker = new Worker(new URL("./indexer.js", import.meta.url), { type: "module" });
+  try {
+    /** @type {Index | undefined} */
+    const index = await new Promise((resolve, reject) => {
+      worker.onmessage = ({ data }) => resolve(data);
+      worker.onerror = reject;
+      worker.postMessage(file);
+    });
+    if (!index) return undefined;
+    const { codec, description } = index;
+    const { supported } = await VideoDecoder.isConfigSupported({ codec, description });
+    return supported ? index : undefined;
+  } catch {
+    return undefined;
+  } finally {
+    worker.terminate();
+  }
+}
+
+/**
+ * @param {File} file
+ * @param {HTMLElement} place Where the file can be played.
+ * @returns {Promise<Source>}
+ */
+export async function openVideo(file, place) {
+  const [index, played] = await Promise.allSettled([indexOf(file), openPlayed(file, place)]);
+  const player = played.status === "fulfilled" ? played.value : undefined;
+  if (index.status === "fulfilled" && index.value) {
+    try {
+      // What an element plays has the shape of its pixels and is turned as it should be.
+      const source = await decodedFile(file, index.value, player?.size);
+      player?.close();
+      return source;
+    } catch (error) {
+      if (!player) throw error;
+    }
+  }
+  if (played.status === "rejected") throw played.reason;
+  return played.value;
+}
+
+/**
+ * @param {File} file
+ * @param {Index} index
+ * @param {Size | undefined} size
+ * @returns {Promise<Source>}
+ */
+async function decodedFile(file, index, size) {
+  const frames = new FrameNumbers(index);
+  const { times } = frames;
+  const mean = (times.length - 1) / (times[times.length - 1] - times[0]);
+  const source = new Stills(file.name, times.length > 1 ? mean : 25);
+  // What is looked at while the file goes on does not hold it up.
+  const [decoder, viewer] = [0, 1].map(() => new FrameDecoder(file, index, frames));
+  const pictureOf = async (/** @type {FrameDecoder} */ from, /** @type {number} */ number) => {
+    const frame = await from.at(number);
+    if (!frame) return undefined;
+    size ??= turned({ width: frame.displayWidth, height: frame.displayHeight }, index.rotation);
+    const image = drawScaled(frame, size, undefined, index.rotation);
+    frame.close();
+    return { image, blob: await encoded(image), time: times[number], frame: number };
+  };
+  source.picture = (number) => pictureOf(decoder, number);
+  source.at = async (number) => undamaged(await pictureOf(viewer, number));
+  source.close = () => [decoder, viewer].forEach((it) => it.close());
+  source.count = times.length;
+  source.times = times;
+  source.files = [file];
+  await source.first();
+  source.size = size ?? source.size;
+  return source;
+}
+
+/** @param {Size} size
+ * @param {number} rotation */
+function turned({ width, height }, rotation) {
+  return rotation % 180 === 0 ? { width, height } : { width: height, height: width };
+}
