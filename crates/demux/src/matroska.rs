@@ -6,6 +6,9 @@ use std::cell::RefCell;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::rc::Rc;
 
+/// H.264 of any profile and level, for a decoder that reads them in the pictures.
+const H264: &str = "avc1.640034";
+
 pub fn index<R: Read + Seek>(reader: R) -> Result<Index, DemuxError> {
     let reads = Reads::default();
     let reader = Recorded {
@@ -59,6 +62,8 @@ fn codec(track: &TrackEntry) -> Result<(String, Option<Vec<u8>>), DemuxError> {
             let codec = format!("avc1.{profile:02x}{constraints:02x}{level:02x}");
             Ok((codec, Some(config.to_vec())))
         }
+        // As a byte stream: what is needed stands before each key picture, its level too.
+        ("V_MPEG4/ISO/AVC", _) => Ok((H264.to_owned(), None)),
         // The AV1 Codec ISO Media File Format Binding, 2.3.3.
         ("V_AV1", Some([_, profile_and_level, depth, ..])) => {
             let tier = if depth & 0x80 == 0 { 'M' } else { 'H' };

@@ -41,13 +41,17 @@ pub fn index<R: Read + Seek>(reader: R, size: u64) -> Result<Index, DemuxError> 
         codec: codec.ok_or_else(|| DemuxError::Codec("a codec of another kind".to_owned()))?,
         description: track.raw_codec_config(&mp4).filter(|_| needs_description),
         rotation: turn.ok_or(DemuxError::Turned)?.1,
-        samples: samples(track, &edit)?,
+        samples: samples(&mp4, track, &edit)?,
     })
 }
 
-fn samples(track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxError> {
-    let sample = |of: &re_mp4::Sample| {
-        let time = edit.delay + edit.micros(of.composition_timestamp - edit.begin);
+fn samples(mp4: &Mp4, track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxError> {
+    let shifts = shifts(mp4, track);
+    let sample = |(of, shift): (&re_mp4::Sample, i64)| {
+        // In a fragment a negative offset is told as that much below 2^32.
+        let offset = (of.composition_timestamp - of.decode_timestamp) as i32;
+        let shown = of.decode_timestamp + shift + i64::from(offset);
+        let time = edit.delay + edit.micros(shown - edit.begin);
         Ok(Sample {
             offset: of.offset,
             size: u32::try_from(of.size).map_err(|_| DemuxError::Order)?,
@@ -56,7 +60,33 @@ fn samples(track: &Track, edit: &Edit) -> Result<Vec<Sample>, DemuxError> {
             is_shown: time >= edit.delay && edit.end.is_none_or(|end| time < end),
         })
     };
-    track.samples.iter().map(sample).collect()
+    track.samples.iter().zip(shifts).map(sample).collect()
+}
+
+/// How much later each sample is decoded than the ones before it say: a fragment tells when it begins, and `re_mp4` reads
+/// that of the first one only.
+fn shifts(mp4: &Mp4, track: &Track) -> Vec<i64> {
+    let fragments = mp4.moofs.iter().flat_map(|moof| &moof.trafs);
+    let fragments = fragments.filter(|traf| traf.tfhd.track_id == track.track_id);
+    let counted = fragments.map(|traf| {
+        let counts = traf.truns.iter().map(|run| run.sample_count as usize);
+        (counts.sum(), &traf.tfdt)
+    });
+    let counted: Vec<(usize, _)> = counted.collect();
+    let in_fragments = counted.iter().map(|(count, _)| count).sum();
+    let mut shifts = vec![0; track.samples.len().saturating_sub(in_fragments)];
+    for (count, begin) in counted {
+        let told = track
+            .samples
+            .get(shifts.len())
+            .map_or(0, |first| first.decode_timestamp);
+        let begin = begin
+            .as_ref()
+            .map(|it| it.base_media_decode_time.cast_signed());
+        let shift = begin.map_or_else(|| shifts.last().copied().unwrap_or(0), |begin| begin - told);
+        shifts.extend(std::iter::repeat_n(shift, count));
+    }
+    shifts
 }
 
 /// The part of a track that is shown.

@@ -106,6 +106,14 @@ fn of(index: &Index, path: &Path) -> Vec<Packet> {
     index.samples.iter().map(packet).collect()
 }
 
+/// When pictures are shown, ascending.
+fn shown(index: &Index) -> Vec<i64> {
+    let shown = index.samples.iter().filter(|sample| sample.is_shown);
+    let mut times: Vec<i64> = shown.map(|sample| sample.time).collect();
+    times.sort_unstable();
+    times
+}
+
 /// Whether these are the same, but for what ffprobe rounds: to a microsecond.
 fn agree(told: &[Packet], found: &[Packet]) -> bool {
     let near = |(one, other): (&Packet, &Packet)| {
@@ -161,6 +169,45 @@ fn the_samples_of_each_kind_of_file_are_those_that_ffprobe_tells() {
     }
 }
 
+/// ffprobe counts such times from the first decoding, so they are compared with what was made.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn pictures_in_fragments_may_be_shown_before_they_are_decoded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let negative: &[&str] = &["-movflags", "frag_keyframe+empty_moov+negative_cts_offsets"];
+    let path = made(folder.path(), "negative.mp4", &[H264, negative]);
+    let index = index(File::open(&path).expect("it is there")).expect("an index");
+    let made = (0..50)
+        .filter(|frame| *frame < 2 || frame % 3 > 0)
+        .map(|frame| frame * 40_000);
+    assert_eq!(shown(&index), made.collect::<Vec<i64>>());
+}
+
+/// Chrome records so: a fragment begins later than the one before it ends.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_fragment_tells_when_it_begins() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = made(folder.path(), "gap.mp4", &[H264, FRAGMENTS]);
+    let mut bytes = std::fs::read(&path).expect("it can be read");
+    let boxes = bytes.windows(4).enumerate();
+    let begins: Vec<usize> = boxes
+        .filter(|(_, name)| name == b"tfdt")
+        .map(|(at, _)| at)
+        .collect();
+    assert!(begins.len() >= 3, "{begins:?}");
+    for begin in &begins[1..] {
+        // After the name, the version and the flags: 64 bits.
+        let time = &mut bytes[begin + 8..begin + 16];
+        let later = u64::from_be_bytes((&*time).try_into().expect("eight")) + 5000;
+        time.copy_from_slice(&later.to_be_bytes());
+    }
+    std::fs::write(&path, bytes).expect("it can be written");
+    let index = index(File::open(&path).expect("it is there")).expect("an index");
+    let (told, found) = (packets(&path), of(&index, &path));
+    assert!(agree(&told, &found), "{told:#?} {found:#?}");
+}
+
 #[test]
 #[ignore = "needs ffmpeg"]
 fn a_turned_video_tells_how_far() {
@@ -202,11 +249,7 @@ fn a_trimmed_video_shows_what_is_left_of_it() {
         .expect("ffmpeg runs");
     assert!(status.success());
     let index = index(File::open(&trimmed).expect("it is there")).expect("an index");
-    let mut shown: Vec<i64> = { index.samples.iter() }
-        .filter(|sample| sample.is_shown)
-        .map(|sample| sample.time)
-        .collect();
-    shown.sort_unstable();
+    let shown = shown(&index);
     assert!(
         shown.len() < index.samples.len(),
         "none is cut off: {shown:?}"
