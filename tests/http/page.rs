@@ -34,7 +34,7 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
         let response = app.get(&path).await;
         assert_eq!(response.status(), StatusCode::OK, "{path}");
         let text = response.text().await.unwrap();
-        // The tracker is loaded when something is tracked in the page.
+        // The modules are loaded when something is tracked in the page, or a file is opened.
         let bytes = if path.contains("/wasm/") {
             0
         } else {
@@ -48,7 +48,7 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
             }
         }
     }
-    assert_eq!(seen.len(), 63, "{seen:?}");
+    assert_eq!(seen.len(), 67, "{seen:?}");
     assert!(at_once < 200_000, "{at_once}");
     assert!(later < 100_000, "{later}");
     expect_problem(app.get("/page/none.js").await, "route-not-found").await;
