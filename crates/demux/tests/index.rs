@@ -183,13 +183,9 @@ fn pictures_in_fragments_may_be_shown_before_they_are_decoded() {
     assert_eq!(shown(&index), made.collect::<Vec<i64>>());
 }
 
-/// Chrome records so: a fragment begins later than the one before it ends.
-#[test]
-#[ignore = "needs ffmpeg"]
-fn a_fragment_tells_when_it_begins() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = made(folder.path(), "gap.mp4", &[H264, FRAGMENTS]);
-    let mut bytes = std::fs::read(&path).expect("it can be read");
+/// Lets the fragments after the first begin later.
+fn delay_fragments(path: &Path) {
+    let mut bytes = std::fs::read(path).expect("it can be read");
     let boxes = bytes.windows(4).enumerate();
     let begins: Vec<usize> = boxes
         .filter(|(_, name)| name == b"tfdt")
@@ -202,7 +198,16 @@ fn a_fragment_tells_when_it_begins() {
         let later = u64::from_be_bytes((&*time).try_into().expect("eight")) + 5000;
         time.copy_from_slice(&later.to_be_bytes());
     }
-    std::fs::write(&path, bytes).expect("it can be written");
+    std::fs::write(path, bytes).expect("it can be written");
+}
+
+/// Chrome records so: a fragment begins later than the one before it ends.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_fragment_tells_when_it_begins() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = made(folder.path(), "gap.mp4", &[H264, FRAGMENTS]);
+    delay_fragments(&path);
     let index = index(File::open(&path).expect("it is there")).expect("an index");
     let (told, found) = (packets(&path), of(&index, &path));
     assert!(agree(&told, &found), "{told:#?} {found:#?}");
@@ -315,4 +320,75 @@ fn what_is_no_video_is_refused() {
         refused(b"GIF89a, which is a picture that moves"),
         DemuxError::Mp4(_)
     ));
+}
+
+/// `docs/upstream/re_mp4.md`: the index mends both.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn re_mp4_alone_misreads_fragments() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let read = |path: &Path| {
+        let bytes = std::fs::read(path).expect("it can be read");
+        re_mp4::Mp4::read_bytes(&bytes).expect("it is an MP4 file")
+    };
+    let is_late = |path: &Path| {
+        let mp4 = read(path);
+        let mut tracks = mp4.tracks().values();
+        tracks.any(|track| {
+            track
+                .samples
+                .iter()
+                .any(|it| it.composition_timestamp > 1 << 31)
+        })
+    };
+    let negative: &[&str] = &["-movflags", "frag_keyframe+empty_moov+negative_cts_offsets"];
+    let path = made(folder.path(), "negative.mp4", &[H264, negative]);
+    assert!(is_late(&path), "offsets below zero are read: mended");
+
+    let ends = |path: &Path| {
+        let mp4 = read(path);
+        let last = |track: &re_mp4::Track| track.samples.last().map(|it| it.decode_timestamp);
+        mp4.tracks().values().filter_map(last).max()
+    };
+    let path = made(folder.path(), "gap.mp4", &[H264, FRAGMENTS]);
+    let before = ends(&path);
+    delay_fragments(&path);
+    assert_eq!(
+        ends(&path),
+        before,
+        "the later fragments tell when they begin: mended"
+    );
+}
+
+/// `docs/upstream/matroska-demuxer.md`: the reader that it is given mends it.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn matroska_demuxer_alone_takes_an_unknown_size_for_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = made(
+        folder.path(),
+        "part.webm",
+        &[&["-c:v", "libvpx", "-deadline", "realtime"]],
+    );
+    let mut bytes = std::fs::read(&path).expect("it can be read");
+    let cluster = [0x1f, 0x43, 0xb6, 0x75];
+    let first = bytes
+        .windows(4)
+        .position(|name| name == cluster)
+        .expect("it has a cluster");
+    // Its size as browsers write it that record: unknown, in eight bytes.
+    let length = bytes[first + 4].leading_zeros() as usize + 1;
+    let unknown = [0x01, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
+    bytes.splice(first + 4..first + 4 + length, unknown);
+    // The places that the file tells of its parts are not theirs any more: it is a void in as many bytes.
+    let seek_head = [0x11, 0x4d, 0x9b, 0x74];
+    let head = bytes.windows(4).position(|name| name == seek_head);
+    let head = head.expect("it tells of its parts");
+    let size = bytes[head + 4] & 0x7f;
+    bytes[head..head + 5].copy_from_slice(&[0xec, 0x10, 0, 0, size]);
+    std::fs::write(&path, &bytes).expect("it can be written");
+    let file = || File::open(&path).expect("it is there");
+    index(file()).expect("an index");
+    let alone = matroska_demuxer::MatroskaFile::open(file());
+    assert!(alone.is_err(), "the file is opened: mended");
 }
