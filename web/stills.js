@@ -31,7 +31,11 @@ export class Stills {
     this.loaded = new Map();
     /** The one that was delivered last. */
     this.index = 0;
+    /** Whether frames come at their rate. Else they come as fast as they can be tracked, in a hidden tab too. */
+    this.isPaced = false;
     this.isHeld = false;
+    /** Is not held any more. */
+    this.released = () => {};
     this.isStopped = false;
     /** @type {File[] | undefined} Where they are files of this machine. */
     this.files = undefined;
@@ -97,11 +101,11 @@ export class Stills {
       for (let next = index; next < Math.min(index + AHEAD, this.count); next += 1) this.ahead(next);
       const picture = await this.ahead(index);
       this.loaded.delete(index);
-      due = Math.max(due + 1000 * (this.timeOf(index) - this.timeOf(index - 1)), performance.now() - 100);
-      do {
+      if (this.isPaced) {
+        due = Math.max(due + 1000 * (this.timeOf(index) - this.timeOf(index - 1)), performance.now() - 100);
         await new Promise((resolve) => setTimeout(resolve, Math.max(0, due - performance.now())));
-        if (this.isHeld) due = performance.now() + 10;
-      } while (this.isHeld && !this.isStopped);
+      }
+      while (this.isHeld && !this.isStopped) await new Promise((resolve) => (this.released = () => resolve(undefined)));
       this.index = index;
       if (!picture) this.skipped += 1;
       else if (!this.isStopped) deliver(picture);
@@ -112,10 +116,12 @@ export class Stills {
   /** @param {boolean} isHeld */
   hold(isHeld) {
     this.isHeld = isHeld;
+    if (!isHeld) this.released();
   }
 
   stop() {
     this.isStopped = true;
+    this.released();
   }
 }
 

@@ -135,6 +135,11 @@ def frames(page, count):
         page.wait_for_timeout(50)
 
 
+def slow(page):
+    """Makes the page's machine slow: a file that is tracked as fast as it can be has not ended when one acts."""
+    page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 5})
+
+
 def to_the_end(page):
     said(page, "The video has ended")
 

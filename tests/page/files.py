@@ -4,7 +4,7 @@ import json
 import pathlib
 import statistics
 
-from browser import DRAW, distance, drag, frames, rows, said, saved, to_the_end
+from browser import DRAW, distance, drag, frames, rows, said, saved, slow, to_the_end
 from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
@@ -133,6 +133,7 @@ def file_with_corrections(checks):
     """A corrected frame stays one frame of the video; the video is saved while the file goes on."""
     path = checks.files.file("clip.mp4", 30, H264)
     page = checks.page()
+    slow(page)
     follow_file(checks, page, path)
     frames(page, 20)
     page.locator("#pause").click()
@@ -141,7 +142,8 @@ def file_with_corrections(checks):
     page.locator("#pause").click()
     frames(page, 30)
     video = saved_video(checks, page, "corrected.webm")
-    page.locator("#stop").click()
+    # Where it has ended already, this does nothing.
+    page.evaluate("document.getElementById('stop').click()")
     table = rows(page)
     scale = SIZE[0] / SENT[0]
     own = {"x": 200 * scale, "y": 200 * scale, "width": 80 * scale, "height": 60 * scale}
@@ -179,6 +181,7 @@ def service_killed(checks):
     for environment, says in ((SECRET, "The line is back"), ({}, "had lost the session")):
         mortal = Mortal(checks, **environment)
         page = checks.page(url=mortal.url, allowed=BROKEN)
+        slow(page)
         follow_file(checks, page, path)
         frames(page, 45)
         mortal.restart()
@@ -192,6 +195,7 @@ def service_killed(checks):
 def paused_past_the_expiry(checks):
     service = Service(checks.program, "--session-idle", "1")
     page = checks.page(url=service.url, allowed=("404", "410"))
+    slow(page)
     path = checks.files.file("clip.mp4", 30, H264)
     follow_file(checks, page, path)
     frames(page, 15)

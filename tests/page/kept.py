@@ -2,7 +2,7 @@
 
 import json
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, said, saved, to_the_end
+from browser import choose, drag, frames, kept_rows, numbers, rows, said, saved, slow, to_the_end
 from clips import FRAMES, H264
 from files import GRAY, check_rows, choose_file, sent_box
 from studio import to_frame
@@ -27,6 +27,7 @@ def reloaded_in_the_middle(checks):
     """The tab is loaded anew while a file is tracked: rows, names and the file are there, and it goes on to the end."""
     path = checks.files.file("clip.mp4", 30, H264)
     page = checks.page(where="here")
+    slow(page)
     choose_file(page, path)
     drag(page, sent_box(checks.files.truth[0]))
     page.locator("#list input[type=text]").fill("The card")
