@@ -23,8 +23,8 @@ onmessage = async ({ data: file }) => {
       new Uint8Array(reader.readAsArrayBuffer(file.slice(offset, offset + length)));
     const { codec, description, rotation, offsets, sizes, times, keys, shown } = index(read, file.size);
     postMessage({ codec, description, rotation, offsets, sizes, times, keys, shown });
-  } catch (error) {
+  } catch {
     // A file of another kind, or a damaged one.
-    postMessage({ error: String(error) });
+    postMessage(undefined);
   }
 };
