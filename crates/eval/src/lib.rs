@@ -4,7 +4,7 @@
 //! it once for each seed.
 //!
 //! Out: a [`Report`] with the figures as a table or as JSON, among them how good the [score](calibration) is. A
-//! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants. [`plots`] draws them.
+//! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants.
 //! [`ScoreReport`] fits the score's coefficients anew. [`results`] writes the boxes for other toolkits.
 //!
 //! What can go wrong: with frames and annotations that do not belong together the figures would mean nothing. So a
@@ -19,7 +19,6 @@ mod isotonic;
 pub mod measures;
 mod outcome;
 mod playback;
-pub mod plots;
 mod report;
 pub mod results;
 mod run;

@@ -3,7 +3,6 @@
 //! Exit status: 0, or 1 after an error that is printed as one line on standard error, or 2 from clap on wrong usage.
 
 use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, progress, read_boxes};
-use bagtrack_eval::plots::{self, Evaluated};
 use bagtrack_eval::{
     Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns, Variant,
     ablation, parse_sweep, results,
@@ -61,12 +60,8 @@ struct Args {
     sweep: Option<PathBuf>,
     /// Fits the coefficients of the score to the frames of all sequences and seeds, and compares them with
     /// the tracker's.
-    #[arg(long, conflicts_with_all = ["ablate", "sweep", "plots"])]
+    #[arg(long, conflicts_with_all = ["ablate", "sweep"])]
     fit_score: bool,
-    /// Draws precision.svg, success.svg, and error-NAME.svg for each sequence into this folder, over files of these
-    /// names.
-    #[arg(long, value_name = "DIR")]
-    plots: Option<PathBuf>,
     /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
     /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at", "every", "first_box_error"])]
@@ -127,27 +122,24 @@ fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let variants = variants(&args, &base)?;
     let evaluated = evaluate(&args, &base, &variants)?;
     if args.fit_score {
-        let report = ScoreReport::new(args.params.preset, &evaluated[0].runs)?;
+        let report = ScoreReport::new(args.params.preset, &evaluated[0])?;
         let report = report.played(args.playback());
         return print(args.format, &report, ScoreReport::markdown);
     }
-    if let Some(dir) = &args.plots {
-        plots::draw(dir, &evaluated)?;
-    }
     if let Some(dir) = &args.results {
-        results::write(dir, &evaluated[0].runs)?;
+        results::write(dir, &evaluated[0])?;
     }
     let preset = args.params.preset;
     let mut reports = Vec::new();
-    for (variant, evaluated) in variants.into_iter().zip(&evaluated) {
-        let report = Report::new(preset, &evaluated.runs).ok_or("none of the paths is a folder")?;
+    for (variant, runs) in variants.into_iter().zip(&evaluated) {
+        let report = Report::new(preset, runs).ok_or("none of the paths is a folder")?;
         reports.push((variant, report.played(args.playback())));
     }
     if !args.ablate && args.sweep.is_none() {
         let (_, report) = &reports[0];
         return print(args.format, report, Report::markdown);
     }
-    let names = evaluated[0].runs.iter().map(|runs| runs.name.clone());
+    let names = evaluated[0].iter().map(|runs| runs.name.clone());
     let comparison = Comparison::new(preset, args.seeds.get(), names.collect(), &reports);
     let comparison = comparison.played(args.playback());
     print(args.format, &comparison, Comparison::markdown)
@@ -168,12 +160,13 @@ fn variants(args: &Args, base: &Params) -> Result<Vec<Variant>, Box<dyn Error>> 
     Ok(variants)
 }
 
-/// Runs every variant on every sequence. Variants with the same parameters are run once.
+/// Runs every variant on every sequence: for each variant the runs of the sequences. Variants with the same parameters
+/// are run once.
 fn evaluate(
     args: &Args,
     base: &Params,
     variants: &[Variant],
-) -> Result<Vec<Evaluated>, Box<dyn Error>> {
+) -> Result<Vec<Vec<SequenceRuns>>, Box<dyn Error>> {
     let expert = args.model.load()?;
     let dirs: Vec<&PathBuf> = args.dirs.iter().filter(|dir| !dir.is_file()).collect();
     // A wrong path should be told now, not after the sequences before it.
@@ -181,21 +174,12 @@ fn evaluate(
         frames::list(dir)?;
         read_boxes(dir)?;
     }
-    if let Some(dir) = &args.plots {
-        plots::prepare(dir)?;
-    }
     let mut params = Vec::new();
     for variant in variants {
         let set = variant.params(base);
         params.push(set.map_err(|error| format!("{}: {error}", variant.label))?);
     }
-    let mut evaluated: Vec<Evaluated> = variants
-        .iter()
-        .map(|variant| Evaluated {
-            label: variant.label.clone(),
-            runs: Vec::new(),
-        })
-        .collect();
+    let mut evaluated: Vec<Vec<SequenceRuns>> = vec![Vec::new(); variants.len()];
     let bar = progress::bar((dirs.len() * variants.len()) as u64, "sequences");
     for dir in dirs {
         let sequence = Sequence::load_played(dir, args.playback(), &Limits::default())?;
@@ -208,8 +192,8 @@ fn evaluate(
             });
             bar.inc(1);
         }
-        for (variant, runs) in evaluated.iter_mut().zip(done) {
-            variant.runs.push(runs);
+        for (of_variant, runs) in evaluated.iter_mut().zip(done) {
+            of_variant.push(runs);
         }
     }
     bar.finish_and_clear();
