@@ -5,7 +5,7 @@
 //!
 //! Out: a [`Report`] with the figures as a table or as JSON, among them how good the [score](calibration) is. A
 //! [`Comparison`] has a row for each [`Variant`]; the [`ablation`] is a fixed list of variants.
-//! [`ScoreReport`] fits the score's coefficients anew. [`results`] writes the boxes for other toolkits.
+//! [`results`] writes the boxes for other toolkits, and the figures of each frame.
 //!
 //! What can go wrong: with frames and annotations that do not belong together the figures would mean nothing. So a
 //! sequence with a missing frame, a missing line or an unreadable frame is refused as a whole, with a message that
@@ -22,9 +22,6 @@ mod playback;
 mod report;
 pub mod results;
 mod run;
-mod score_fit;
-mod score_report;
-mod score_table;
 mod sequence;
 mod sweep;
 mod table;
@@ -37,8 +34,6 @@ pub use outcome::{HIT_OVERLAP, Outcome};
 pub use playback::Playback;
 pub use report::Report;
 pub use run::{EvalError, ScoredFrame, SeedRun, SequenceRuns, run};
-pub use score_fit::{Sample, fit as fit_score};
-pub use score_report::{ScoreFitError, ScoreReport};
 pub use sequence::Sequence;
 pub use sweep::{SweepError, parse_sweep};
 pub use variant::Variant;

@@ -4,8 +4,7 @@
 
 use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, progress, read_boxes};
 use bagtrack_eval::{
-    Comparison, Playback, Report, ScoreFitError, ScoreReport, Sequence, SequenceRuns, Variant,
-    ablation, parse_sweep, results,
+    Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation, parse_sweep, results,
 };
 use bagtrack_ingest::Limits;
 use bagtrack_tracker::Params;
@@ -58,14 +57,13 @@ struct Args {
     /// preset as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
     #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
     sweep: Option<PathBuf>,
-    /// Fits the coefficients of the score to the frames of all sequences and seeds, and compares them with
-    /// the tracker's.
-    #[arg(long, conflicts_with_all = ["ablate", "sweep"])]
-    fit_score: bool,
     /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
     /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "fit_score", "backwards", "start_at", "every", "first_box_error"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "backwards", "start_at", "every", "first_box_error"])]
     results: Option<PathBuf>,
+    /// Writes a line of JSON for each scored frame into this file: its figures, and what its score is made of.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["ablate", "sweep"])]
+    frames: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -116,18 +114,13 @@ fn main() -> ExitCode {
 
 fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let base = args.params.params()?;
-    if args.fit_score && base.discriminant_weight <= 0.0 {
-        return Err(ScoreFitError::NoDiscriminant.into());
-    }
     let variants = variants(&args, &base)?;
     let evaluated = evaluate(&args, &base, &variants)?;
-    if args.fit_score {
-        let report = ScoreReport::new(args.params.preset, &evaluated[0])?;
-        let report = report.played(args.playback());
-        return print(args.format, &report, ScoreReport::markdown);
-    }
     if let Some(dir) = &args.results {
         results::write(dir, &evaluated[0])?;
+    }
+    if let Some(file) = &args.frames {
+        results::write_frames(file, &evaluated[0])?;
     }
     let preset = args.params.preset;
     let mut reports = Vec::new();

@@ -1,7 +1,6 @@
 //! The evaluation: its program, synthetic clips, and the accuracy that is promised.
 
 mod command;
-mod fit_score;
 mod model;
 mod playback;
 mod program;
