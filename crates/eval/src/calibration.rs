@@ -24,7 +24,7 @@
 //! there is no other to learn from; those figures are then None.
 
 use super::isotonic::Isotonic;
-use super::outcome::Outcome;
+use super::run::Outcome;
 
 /// Number of bins of the calibration error.
 pub const BINS: usize = 10;

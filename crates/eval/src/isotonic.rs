@@ -1,7 +1,7 @@
 //! Isotonic regression: the non-decreasing function of the score that fits yes-or-no outcomes best in least squares,
 //! found by pooling adjacent violators (Ayer et al. 1955; used for calibration by Zadrozny and Elkan 2002).
 
-use super::outcome::Outcome;
+use super::run::Outcome;
 
 /// A run of scores that share one rate of hits.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,5 @@
 //! Runs: one sequence, several seeds.
 
-use super::outcome::{HIT_OVERLAP, Outcome};
 use super::sequence::Sequence;
 use bagtrack_cli::SequenceError;
 use bagtrack_tracker::{Evidence, Expert, Params, Rect, Status, Tracker, TrackerError};
@@ -47,6 +46,18 @@ pub struct ScoredFrame {
     pub status: Status,
     /// The predictors from which the score is computed.
     pub evidence: Option<Evidence>,
+}
+
+/// The smallest overlap (intersection over union) of a hit.
+pub const HIT_OVERLAP: f64 = 0.5;
+
+/// The outcome of one scored frame of one run: what its score claimed, and what came.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// The claimed probability of a hit, 0 to 1: the tracker's score, or a value fitted to it.
+    pub score: f64,
+    /// Whether it was a hit.
+    pub hit: bool,
 }
 
 /// The result of one seed.
