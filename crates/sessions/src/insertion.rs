@@ -1,12 +1,11 @@
 //! Adding a session to the map, and making room for it.
 
-use super::new_session::NewSession;
 use super::opening::Opening;
 use super::random::random;
 use super::registry::{Registry, TooManySessions};
 use super::scheduler::budget::Charge;
 use super::scheduler::queue_permit::Reservation;
-use super::session::Session;
+use super::session::{NewSession, Session};
 use super::state::SessionState;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;

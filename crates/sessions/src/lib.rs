@@ -27,11 +27,8 @@ mod expired;
 mod insertion;
 #[cfg(all(test, feature = "shuttle"))]
 mod interleavings;
-mod lease;
 mod mac;
-mod new_session;
 mod opening;
-mod owner;
 mod per_target;
 mod planted;
 pub mod random;
@@ -41,7 +38,6 @@ mod scheduler;
 mod selection;
 mod session;
 mod session_permit;
-mod short_id;
 mod snapshot;
 mod state;
 mod store;
@@ -57,11 +53,8 @@ pub use acts::{
 };
 pub use clock::Clock;
 pub use insertion::InsertError;
-pub use lease::Lease;
 pub use mac::{MAC_BYTES, MacKeys};
-pub use new_session::NewSession;
-pub use opening::Opening;
-pub use owner::Owner;
+pub use opening::{Opening, Owner};
 pub use per_target::{MAX_TARGETS, PerTarget};
 #[cfg(feature = "planted-faults")]
 pub use planted::{PlantedFault, plant};
@@ -77,9 +70,8 @@ pub use scheduler::queue_permit::{QueuePermit, Reservation, Ticket};
 pub use scheduler::work_limit::{CpuSpent, Stopped, WorkLimit, WorkMeter};
 pub use scheduler::workers::{AfterWork, Work};
 pub use selection::Selection;
-pub use session::Session;
+pub use session::{Lease, NewSession, Session, short_id};
 pub use session_permit::{LockedSession, SessionBusy, SessionClosed, SessionPermit};
-pub use short_id::short_id;
 pub use snapshot::{
     KEY_CONTEXT as SNAPSHOT_KEY_CONTEXT, MAGIC as SNAPSHOT_MAGIC, SnapshotError, is_snapshot,
 };

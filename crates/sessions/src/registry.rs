@@ -2,10 +2,9 @@
 
 use super::clock::Clock;
 use super::expired::ExpiredIds;
-use super::lease::Lease;
-use super::owner::Owner;
+use super::opening::Owner;
 use super::scheduler::budget::Budget;
-use super::session::Session;
+use super::session::{Lease, Session};
 use super::store::SessionName;
 use super::sync::{Mutex, MutexGuard, PoisonError};
 use std::collections::HashMap;

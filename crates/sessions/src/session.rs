@@ -1,12 +1,8 @@
-//! One session: its trackers behind a lock, and what can be read of it without the lock.
+//! One session: what it is made of, its trackers behind a lock, and what can be read of it without the lock.
 
 use super::clock::Clock;
-use super::lease::Lease;
-use super::new_session::NewSession;
-use super::opening::Opening;
-use super::owner::Owner;
+use super::opening::{Opening, Owner};
 use super::scheduler::queue_permit::Reservation;
-use super::short_id::short_id;
 use super::state::SessionState;
 use super::store::{SessionName, Version};
 use super::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -17,6 +13,33 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{Mutex as AsyncMutex, Semaphore, watch};
 use uuid::Uuid;
+
+/// How long a session lives without use.
+#[derive(Debug, Clone, Copy)]
+pub struct Lease {
+    /// From its opening to its first frame.
+    pub first: Duration,
+    /// After each frame.
+    pub idle: Duration,
+}
+
+/// What a session is made of.
+pub struct NewSession {
+    /// Its id: the client's own, or a random one.
+    pub id: Uuid,
+    /// How it was opened.
+    pub opening: Opening,
+    /// Whose it is.
+    pub owner: Owner,
+    /// Which version of the record in the store this is, where there is one.
+    pub version: Option<Version>,
+    /// It expires after this time without a frame.
+    pub ttl: Duration,
+    /// The trackers and the last answers.
+    pub state: SessionState,
+    /// What is kept until the session is freed.
+    pub held: Reservation,
+}
 
 /// One session.
 #[cfg_attr(not(test), derive(Debug))]
@@ -207,6 +230,14 @@ impl Session {
     pub(super) fn close(&self) {
         self.closed.store(true, Ordering::Release);
     }
+}
+
+/// The beginning of an id, for the log.
+pub fn short_id(id: Uuid) -> String {
+    let mut text = id.simple().to_string();
+    text.truncate(8);
+    text.push('…');
+    text
 }
 
 fn milliseconds(time: Duration) -> u64 {

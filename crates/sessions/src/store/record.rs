@@ -1,7 +1,6 @@
 //! What the store holds of a session.
 
-use crate::opening::Opening;
-use crate::owner::Owner;
+use crate::opening::{Opening, Owner};
 use crate::per_target::{MAX_TARGETS, PerTarget};
 use crate::planted::PlantedFault;
 use crate::random::random;

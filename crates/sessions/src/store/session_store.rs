@@ -1,7 +1,7 @@
 //! What a store of sessions does, whatever keeps them.
 
 use super::record::{Record, SessionName, Version};
-use crate::owner::Owner;
+use crate::opening::Owner;
 use futures_util::future::BoxFuture;
 use std::fmt::Debug;
 use std::time::Duration;

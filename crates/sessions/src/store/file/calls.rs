@@ -10,7 +10,7 @@ use super::rules::{Fault, OwnedCommit};
 use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};
-use crate::owner::Owner;
+use crate::opening::Owner;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;

@@ -4,7 +4,7 @@ use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
 use super::database::{Transaction, moment};
 use super::row::{Row, with_frame};
-use crate::owner::Owner;
+use crate::opening::Owner;
 use fjall::Readable;
 use std::time::Duration;
 use uuid::Uuid;

@@ -9,7 +9,7 @@ use super::connection::{Call, Connection};
 use super::script::{NewHash, Script, ScriptCall, ScriptServer};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
-use crate::owner::Owner;
+use crate::opening::Owner;
 use crate::random::random;
 use redis::FromRedisValue;
 use std::sync::atomic::{AtomicBool, Ordering};
