@@ -12,7 +12,6 @@ mod confined;
 mod evaluate;
 #[cfg(feature = "otel")]
 mod export;
-mod headings;
 mod health;
 mod log;
 mod memory_limit;
@@ -68,9 +67,7 @@ enum Command {
 /// The commands. The settings of the service are in the help of `serve` only, so that the first help fits a screen.
 fn command() -> clap::Command {
     let command = Cli::command().mut_args(|arg| arg.hide(true));
-    command
-        .mut_subcommand("serve", |serve| serve.mut_args(headings::put))
-        .after_help(AFTER)
+    command.after_help(AFTER)
 }
 
 /// Reads the command line.

@@ -20,10 +20,15 @@ pub struct Args {
     #[command(flatten)]
     config: Config,
     /// What to log: a level, or levels by module.
-    #[arg(long, env = "BAGTRACK_LOG", default_value = "info")]
+    #[arg(
+        long,
+        env = "BAGTRACK_LOG",
+        default_value = "info",
+        help_heading = "Logging"
+    )]
     log: String,
     /// How to log.
-    #[arg(long, env = "BAGTRACK_LOG_FORMAT", value_enum, default_value_t = LogFormat::Text)]
+    #[arg(long, env = "BAGTRACK_LOG_FORMAT", value_enum, default_value_t = LogFormat::Text, help_heading = "Logging")]
     log_format: LogFormat,
 }
 

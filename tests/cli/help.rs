@@ -84,7 +84,7 @@ fn each_setting_of_the_service_is_below_a_heading() {
             flags.entry(heading).or_default().push(flag);
         }
     }
-    // A new setting belongs into src/cli/headings.rs.
+    // The tables of crates/config have the headings of the settings, `serve` those of its own flags.
     assert_eq!(flags["Options"], ["--help"], "without a heading: {help}");
     assert!(flags["Listening"].contains(&"--listen"), "{help}");
     assert!(flags["Store"].contains(&"--store-prefix"), "{help}");

@@ -9,6 +9,7 @@ settings! {
     /// Who may use the service. Secrets are better given by variables and files than by flags, which other users of the
     /// machine can see.
     pub struct AccessConfig {
+        # "Access and keys"
         /// API keys as `name:key`, separated by commas. A key has 16 to 256 visible characters.
         api_keys: Vec<Secret> = Vec::new(), as "NAME:KEY";
         /// File with an API key a line, as `name:key`; lines that begin with # are left out. Read again on SIGHUP.

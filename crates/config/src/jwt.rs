@@ -5,6 +5,7 @@ use super::settings::settings;
 settings! {
     /// Whose tokens are taken beside API keys: JSON Web Tokens (RFC 7519), of OpenID Connect or OAuth 2.0.
     pub struct JwtConfig {
+        # "Access and keys"
         /// Take the JSON Web Tokens of this issuer too: its address, as their claim `iss` has it.
         jwt_issuer: Option<String> = None, as "URL";
         /// Whom those tokens must be for, separated by commas: one of these is among their claim `aud`.

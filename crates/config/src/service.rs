@@ -18,8 +18,13 @@ const USUAL_SESSION_BYTES: usize = 512 << 10;
 settings! {
     /// The settings of the service. Durations are written like `10m`, `30s`, `500ms`; a number alone is seconds.
     pub struct Config {
+        # "Listening"
         /// Address to listen on, or a host's name with a port; port 0 picks a free one.
         listen: SocketAddr = SocketAddr::from((Ipv4Addr::LOCALHOST, 8080));
+        /// The path of the service on a host that it shares with others, like `/tracker`.
+        base_path: BasePath = BasePath::default();
+
+        # "Work and queues"
         /// Frames decoded and tracked at the same time [default: the number of cores].
         workers: Option<usize> = None, |workers| workers.as_ref().map_or(Ok(()), permits);
         /// Requests with a frame that are inside at the same time, the ones at work included.
@@ -28,14 +33,26 @@ settings! {
         /// first, and older ones that have waited twice as long are refused. Frames of streams and posts of several wait.
         /// 0s: none is refused.
         queue_delay: Duration = Duration::from_millis(75), delay;
-        /// Most sessions alive.
-        max_sessions: usize = 1024, positive;
         /// Requests at one session at the same time, the one at work included.
         session_queue: usize = 8, permits;
+        /// Time for a request to wait for its session and a worker and to be worked on.
+        work_timeout: Duration = Duration::from_secs(30), moment;
+
+        # "Sessions"
+        /// Most sessions alive.
+        max_sessions: usize = 1024, positive;
         /// A session expires when no frame comes for this long.
         session_idle: Duration = Duration::from_secs(600), moment;
         /// A new session expires when its first frame does not come for this long.
         session_first: Duration = Duration::from_secs(60), moment;
+        /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its head.
+        /// Sessions that were opened with one go on with the same one alone.
+        model: Option<ModelFiles> = None, as "nanotrack:BACKBONE,HEAD";
+        /// The network is asked only of frames of which the filter is not sure: with a score below 0.95. All replicas must
+        /// have the same.
+        model_in_doubt: bool = false;
+
+        # "Uploads"
         /// Most bytes of a request body.
         max_body_bytes: usize = 32 << 20, positive;
         /// Most bytes of all bodies together: of what has come of requests, and of large answers that are not taken yet.
@@ -50,32 +67,29 @@ settings! {
         max_frame_pixels: u64 = bagtrack_ingest::Limits::default().max_pixels, positive;
         /// Most memory in bytes that decoding one frame may take.
         max_frame_memory: u64 = bagtrack_ingest::Limits::default().max_memory, positive;
+
+        # "Connections"
         /// Most connections open at the same time.
         max_connections: usize = 4096, permits;
-        /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
-        /// commas; `*` for all. Requests of other pages are refused.
-        cors_origins: Vec<String> = Vec::new(), |values| origins(values);
-        /// A network that gives a second opinion of every frame of a session: the ONNX files of its backbone and its head.
-        /// Sessions that were opened with one go on with the same one alone.
-        model: Option<ModelFiles> = None, as "nanotrack:BACKBONE,HEAD";
-        /// The network is asked only of frames of which the filter is not sure: with a score below 0.95. All replicas must
-        /// have the same.
-        model_in_doubt: bool = false;
-        /// The path of the service on a host that it shares with others, like `/tracker`.
-        base_path: BasePath = BasePath::default();
         /// Time for a client to send its request head, and for its TLS handshake before; a connection that is idle for
         /// longer is closed too.
         header_timeout: Duration = Duration::from_secs(30), moment;
         /// Time for a client to send its request body.
         body_timeout: Duration = Duration::from_secs(30), moment;
-        /// Time for a request to wait for its session and a worker and to be worked on.
-        work_timeout: Duration = Duration::from_secs(30), moment;
+
+        # "Access and keys"
+        /// Origins of web pages that may use the service from elsewhere, like `https://example.org`, separated by
+        /// commas; `*` for all. Requests of other pages are refused.
+        cors_origins: Vec<String> = Vec::new(), |values| origins(values);
+
+        # "Shutdown"
         /// On SIGTERM, /readyz answers 503 and no session can be opened for this long before connections are refused, so
         /// that load balancers notice, and clients take their sessions elsewhere. SIGINT leaves it out.
         shutdown_delay: Duration = Duration::from_secs(5), delay;
         /// Time for open requests to end on shutdown.
         shutdown_timeout: Duration = Duration::from_secs(20), delay;
-    }    flattened {
+    }
+    flattened {
         /// The certificate that clients see.
         #[cfg(feature = "tls")]
         tls: TlsConfig;

@@ -1,4 +1,5 @@
-//! Settings as rows of a table: the text, the name, the type, the default and the range of each stand in one place.
+//! Settings as rows of a table: the text, the name, the type, the default and the range of each stand in one place,
+//! below the heading that it has in the help.
 //!
 //! The macro [`settings`] makes of such a table the struct, its defaults, its flags with their environment variables, and
 //! the check of its ranges.
@@ -175,13 +176,19 @@ impl Setting for bool {
 }
 
 /// The flag of a setting, and its variable: `max_frames` is `--max-frames` and `BAGTRACK_MAX_FRAMES`.
-pub(super) fn flag<S: Setting>(name: &'static str, doc: &[&str], default: &S) -> Arg {
+pub(super) fn flag<S: Setting>(
+    name: &'static str,
+    heading: &'static str,
+    doc: &[&str],
+    default: &S,
+) -> Arg {
     let lines: Vec<&str> = doc.iter().map(|line| line.trim()).collect();
     let help = lines.join(" ");
     let arg = Arg::new(name)
         .long(name.replace('_', "-"))
         .env(format!("BAGTRACK_{}", name.to_uppercase()))
         .value_name(name.to_uppercase())
+        .help_heading(heading)
         .help(help.strip_suffix('.').unwrap_or(&help).to_owned());
     S::flag(arg, default)
 }
@@ -252,13 +259,16 @@ impl ConfigError {
     }
 }
 
-/// Makes a struct of settings from a table with a row for each: its text, `name: type = default`, and its range. What is
-/// set `by_code` has no flag; what is `flattened` is a table of its own.
+/// Makes a struct of settings from a table with a row for each: its text, `name: type = default`, and its range. A line
+/// `# "Heading"` says what the rows below it stand under in the help. What is set `by_code` has no flag; what is
+/// `flattened` is a table of its own.
 macro_rules! settings {
     (
         $(#[$of_struct:meta])*
         pub struct $struct:ident {
-            $($(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr $(, $range:expr)? $(, as $shown:literal)?;)*
+            $(# $heading:literal
+                $($(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr $(, $range:expr)? $(, as $shown:literal)?;)+
+            )+
         }
         $(by_code {
             $($(#[doc = $code_doc:literal])* $code:ident: $code_type:ty;)*
@@ -270,7 +280,7 @@ macro_rules! settings {
         $(#[$of_struct])*
         #[derive(Debug, Clone)]
         pub struct $struct {
-            $($(#[doc = $doc])* pub $name: $type,)*
+            $($($(#[doc = $doc])* pub $name: $type,)+)+
             $($($(#[doc = $code_doc])* pub $code: $code_type,)*)?
             $($($(#[doc = $part_doc])* $(#[cfg($part_cfg)])? pub $part: $part_type,)*)?
         }
@@ -279,7 +289,7 @@ macro_rules! settings {
             /// The settings that hold where no other is given. Neither flags nor the environment are read.
             fn default() -> Self {
                 Self {
-                    $($name: $default,)*
+                    $($($name: $default,)+)+
                     $($($code: Default::default(),)*)?
                     $($($(#[cfg($part_cfg)])? $part: <$part_type>::default(),)*)?
                 }
@@ -290,13 +300,13 @@ macro_rules! settings {
             fn augment_args(command: clap::Command) -> clap::Command {
                 let defaults = Self::default();
                 let command = command
-                    $(.arg({
+                    $($(.arg({
                         let arg = $crate::settings::flag(
-                            stringify!($name), &[$($doc),*], &defaults.$name,
+                            stringify!($name), $heading, &[$($doc),*], &defaults.$name,
                         );
                         $(let arg = arg.value_name($shown);)?
                         arg
-                    }))*;
+                    }))+)+;
                 $($($(#[cfg($part_cfg)])? let command = <$part_type as clap::Args>::augment_args(command);)*)?
                 command
             }
@@ -314,7 +324,7 @@ macro_rules! settings {
             fn from_arg_matches_mut(matches: &mut clap::ArgMatches) -> Result<Self, clap::Error> {
                 use $crate::settings::Setting;
                 Ok(Self {
-                    $($name: Setting::take(matches, stringify!($name)),)*
+                    $($($name: Setting::take(matches, stringify!($name)),)+)+
                     $($($code: Default::default(),)*)?
                     $($($(#[cfg($part_cfg)])? $part: <$part_type>::from_arg_matches_mut(matches)?,)*)?
                 })
@@ -331,10 +341,10 @@ macro_rules! settings {
             pub(crate) fn check_ranges(
                 &self,
             ) -> Result<(), $crate::settings::ConfigError> {
-                $($(
+                $($($(
                     let range: $crate::settings::Range<$type> = $range;
                     $crate::settings::ConfigError::check(stringify!($name), range(&self.$name))?;
-                )?)*
+                )?)+)+
                 $($($(#[cfg($part_cfg)])? self.$part.check_ranges()?;)*)?
                 Ok(())
             }

@@ -10,6 +10,7 @@ use std::time::Duration;
 settings! {
     /// Where sessions are kept. Without a store they live in this process only, and end with it.
     pub struct StoreConfig {
+        # "Store"
         /// Where sessions are stored: `file:DIR` for one process, which goes on from there after a restart. For replicas
         /// `redis://[user:password@]host[:port][/database]`, `valkey` alike, or `redis-cluster://host:port,host:port`.
         /// `rediss` and `valkeys` for TLS.
