@@ -57,7 +57,7 @@ async fn replicas_share_sessions(environment: &[(&str, &str)], store: &str) {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_behind_a_password() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let flags = ["--port", &port.to_string(), "--requirepass", "s3cret"];
@@ -71,7 +71,7 @@ async fn a_store_behind_a_password() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_at_a_socket_file() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let flags = ["--port", &port.to_string(), "--unixsocket", "redis.sock"];
@@ -82,7 +82,7 @@ async fn a_store_at_a_socket_file() {
 
 #[cfg(feature = "tls")]
 #[tokio::test]
-#[ignore = "needs redis, haproxy and openssl"]
+#[ignore = "needs redis and openssl"]
 async fn a_store_behind_tls_whose_certificate_is_checked() {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let path = |name: &str| folder.path().join(name).display().to_string();
@@ -108,7 +108,7 @@ async fn a_store_behind_tls_whose_certificate_is_checked() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_of_three_nodes() {
     let nodes: Vec<(TempDir, u16)> = (0..3)
         .map(|_| (tempfile::tempdir().unwrap(), free_port()))

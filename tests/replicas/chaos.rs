@@ -156,7 +156,7 @@ where
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn no_track_is_lost_in_round_robin() {
     let front = async |replicas| {
         // Connections in turns, and a connection for every frame.
@@ -177,7 +177,7 @@ async fn no_track_is_lost_behind_haproxy() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis and nginx"]
 async fn no_track_is_lost_behind_nginx() {
     let front = async |replicas: Vec<SocketAddr>| {
         let balancer = nginx(&replicas);

@@ -68,7 +68,7 @@ async fn until_ready(replica: &Replica, status: StatusCode) {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn after_the_end_of_a_replica_the_frames_after_the_checkpoint_are_asked_for() {
     let redis = Redis::start();
     let replica = || Replica::with_store(&redis.url(), &["--store-every", "10"]);
@@ -93,7 +93,7 @@ async fn after_the_end_of_a_replica_the_frames_after_the_checkpoint_are_asked_fo
 
 /// The same with the Rust client, which keeps those frames and sends them again.
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn the_client_sends_the_frames_after_the_checkpoint_again() {
     let redis = Redis::start();
     let replica = || Replica::with_store(&redis.url(), &["--store-every", "10"]);
@@ -118,7 +118,7 @@ async fn the_client_sends_the_frames_after_the_checkpoint_again() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_replica_that_is_asked_to_end_writes_what_it_has() {
     let redis = Redis::start();
     let replica = || Replica::with_store(&redis.url(), &["--store-every", "100"]);
@@ -137,7 +137,7 @@ async fn a_replica_that_is_asked_to_end_writes_what_it_has() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
     let redis = Redis::start();
     let replica = || Replica::with_store(&redis.url(), &["--store-every", "4"]);
@@ -170,7 +170,7 @@ async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
     let redis = Redis::start();
     let replica = || Replica::with_store(&redis.url(), &["--store-every", "10"]);
@@ -195,7 +195,7 @@ async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
     let mut redis = Redis::start();
     let replica = Replica::with_store(&redis.url(), &["--store-timeout", "300ms"]);

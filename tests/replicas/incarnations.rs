@@ -8,7 +8,7 @@ use reqwest::{Client, Response, StatusCode};
 use uuid::Uuid;
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_request_to_open_a_session_is_compared_with_the_one_that_has_the_id_now() {
     let pair = Pair::open(&[], 3).await;
     json(pair.post(0, 1).await, StatusCode::OK).await;
@@ -28,7 +28,7 @@ const ANN: &str = "0123456789abcdef";
 const BEN: &str = "fedcba9876543210";
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn an_id_that_another_owner_has_now_is_found_where_the_old_session_was() {
     let redis = Redis::start();
     let keys = format!("ann:{ANN},ben:{BEN}");
@@ -64,7 +64,7 @@ async fn an_id_that_another_owner_has_now_is_found_where_the_old_session_was() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_session_is_ended_once() {
     let pair = Pair::open(&[], 3).await;
     json(pair.post(1, 1).await, StatusCode::OK).await;

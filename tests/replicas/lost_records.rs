@@ -13,7 +13,7 @@ async fn must_be_lost(answer: Response) {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_session_that_the_store_has_lost_is_gone_at_all_replicas() {
     let pair = Pair::open(&[], 8).await;
     json(pair.post(0, 1).await, StatusCode::OK).await;
@@ -31,7 +31,7 @@ async fn a_session_that_the_store_has_lost_is_gone_at_all_replicas() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_lost_session_goes_on_from_its_snapshot_under_the_same_id() {
     let pair = Pair::open(&["--snapshot-keys", "a-secret-of-both-replicas"], 6).await;
     let expected = pair.undisturbed().await;
@@ -51,7 +51,7 @@ async fn a_lost_session_goes_on_from_its_snapshot_under_the_same_id() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_session_that_was_ended_does_not_come_back() {
     let pair = Pair::open(&[], 4).await;
     json(pair.post(0, 1).await, StatusCode::OK).await;
@@ -65,7 +65,7 @@ async fn a_session_that_was_ended_does_not_come_back() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn the_stream_of_a_lost_session_ends_and_says_why() {
     let pair = Pair::open(&[], 4).await;
     let mut stream = StreamClient::open(pair.replicas[0].address, pair.id, "").await;

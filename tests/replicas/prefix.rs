@@ -50,14 +50,14 @@ async fn sessions_stay_at_their_replicas(
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs haproxy"]
 async fn sessions_below_a_path_stay_at_their_replicas_behind_haproxy() {
     sessions_stay_at_their_replicas(haproxy, false).await;
     sessions_stay_at_their_replicas(haproxy, true).await;
 }
 
 #[tokio::test]
-#[ignore = "needs redis and nginx"]
+#[ignore = "needs nginx"]
 async fn sessions_below_a_path_stay_at_their_replicas_behind_nginx() {
     sessions_stay_at_their_replicas(nginx, true).await;
 }

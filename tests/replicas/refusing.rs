@@ -48,21 +48,21 @@ async fn is_not_ready_while(refuse: &[&str], take: &[&str]) {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_whose_memory_is_used_up_is_not_ready() {
     let refuse = ["config", "set", "maxmemory", "1"];
     is_not_ready_while(&refuse, &["config", "set", "maxmemory", "0"]).await;
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_that_does_not_allow_writes_is_not_ready() {
     let refuse = ["acl", "setuser", "default", "-hset"];
     is_not_ready_while(&refuse, &["acl", "setuser", "default", "+hset"]).await;
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_session_can_be_ended_where_the_memory_is_used_up() {
     let pair = Pair::open(&[], 3).await;
     pair.redis.ask(&["config", "set", "maxmemory", "1"]);
@@ -72,7 +72,7 @@ async fn a_session_can_be_ended_where_the_memory_is_used_up() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_store_that_gives_no_answer_is_waited_for_once() {
     let pair = Pair::open(&["--store-timeout", "500ms"], 8).await;
     let expected = pair.undisturbed().await;
@@ -101,7 +101,7 @@ async fn a_store_that_gives_no_answer_is_waited_for_once() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_frame_that_is_taken_renews_the_time_to_live_and_a_refused_one_does_not() {
     let flags = ["--session-first", "20s", "--session-idle", "100s"];
     let pair = Pair::open(&flags, 3).await;

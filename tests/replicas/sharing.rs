@@ -9,7 +9,7 @@ use serde_json::Value;
 use uuid::Uuid;
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
     let pair = Pair::open(&[], 20).await;
     let expected = pair.undisturbed().await;
@@ -32,7 +32,7 @@ async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn of_two_frames_with_one_number_one_wins_and_the_other_is_told_the_next_number() {
     let pair = Pair::open(&[], 30).await;
     for number in 1..15 {
@@ -56,7 +56,7 @@ async fn of_two_frames_with_one_number_one_wins_and_the_other_is_told_the_next_n
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
     let pair = Pair::open(&[], 3).await;
     for number in 1..7 {
@@ -87,7 +87,7 @@ async fn frames_without_numbers_are_taken_in_turns_but_not_at_once() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn an_early_frame_waits_for_those_that_go_to_the_other_replica() {
     let pair = Pair::open(&[], 12).await;
     let expected = pair.undisturbed().await;
@@ -117,7 +117,7 @@ async fn an_early_frame_waits_for_those_that_go_to_the_other_replica() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_refused_frame_does_not_keep_a_session_in_the_store() {
     let pair = Pair::open(&["--session-first", "3s", "--session-idle", "3s"], 3).await;
     let opened = std::time::Instant::now();
@@ -142,7 +142,7 @@ async fn a_refused_frame_does_not_keep_a_session_in_the_store() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_session_is_opened_once_and_ended_everywhere() {
     let pair = Pair::open(&[], 3).await;
     let first = pair.put(0, 7).await.text().await.unwrap();
@@ -177,7 +177,7 @@ async fn a_session_is_opened_once_and_ended_everywhere() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn sessions_belong_to_their_keys_at_every_replica_and_expire_everywhere() {
     let redis = Redis::start();
     let flags = [

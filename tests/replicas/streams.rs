@@ -19,7 +19,7 @@ fn answer_of(message: &Value) -> Value {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more() {
     let pair = Pair::open(&[], 20).await;
     let expected = pair.undisturbed().await;
@@ -61,7 +61,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
     let flags = ["--ping-interval", "100ms", "--store-timeout", "10s"];
     let pair = Pair::open(&flags, 6).await;
@@ -81,7 +81,7 @@ async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_frame_of_a_stream_waits_while_the_store_is_away() {
     let mut pair = Pair::open(&[], 10).await;
     let expected = pair.undisturbed().await;
@@ -103,7 +103,7 @@ async fn a_frame_of_a_stream_waits_while_the_store_is_away() {
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_stream() {
     let flags = ["--ping-interval", "1s"];
     let pair = Pair::open(&flags, 2).await;
@@ -130,7 +130,7 @@ async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_strea
 }
 
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs redis"]
 async fn the_picture_of_the_bag_is_the_same_at_both_replicas() {
     let pair = Pair::open(&[], 6).await;
     for number in 1..6 {

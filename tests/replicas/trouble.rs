@@ -22,7 +22,7 @@ fn location(opened: &Response) -> String {
 
 /// Without a store: what goes to another replica would not find its session.
 #[tokio::test]
-#[ignore = "needs redis and haproxy"]
+#[ignore = "needs haproxy"]
 async fn haproxy_sends_a_replica_that_is_about_to_end_the_frames_of_its_sessions_and_no_new_ones() {
     let replicas = [(); 3].map(|()| Replica::start(&["--shutdown-delay", "60s"]));
     let front = haproxy(&replicas.each_ref().map(|replica| replica.address));
