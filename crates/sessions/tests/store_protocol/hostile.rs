@@ -193,10 +193,12 @@ impl HostileStore {
                 wire.busy -= 1;
             }
             self.idle.notify_one();
-            // Dropped while it waits, the request no longer counts; see `Given`.
-            let given = Given(self, true);
+            let waiting = Waiting {
+                store: self,
+                answered: false,
+            };
             let reply = reply.await;
-            given.up();
+            waiting.answered();
             let lost = StoreUnavailable("a test lost it".to_owned());
             let reply = reply.ok().flatten().ok_or(lost)?;
             Ok(*reply.downcast::<T>().expect("the reply to its own call"))
@@ -204,20 +206,23 @@ impl HostileStore {
     }
 }
 
-/// A request that waits for the store. Where it is given up meanwhile, its end counts nothing.
-struct Given<'a>(&'a HostileStore, bool);
+/// A request that waits for the store, and so is not busy. Dropped while it waits, it counts as busy again, which its
+/// `Busy` takes back.
+struct Waiting<'a> {
+    store: &'a HostileStore,
+    answered: bool,
+}
 
-impl Given<'_> {
-    fn up(mut self) {
-        self.1 = false;
+impl Waiting<'_> {
+    fn answered(mut self) {
+        self.answered = true;
     }
 }
 
-impl Drop for Given<'_> {
+impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        if self.1 {
-            // The `Busy` of the request takes it back.
-            self.0.wire().busy += 1;
+        if !self.answered {
+            self.store.wire().busy += 1;
         }
     }
 }
