@@ -2,10 +2,10 @@
 //!
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
 //! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the
-//!   frame's size, each with the order that is expected; as a figure, too;
+//!   frame's size, each with the order that is expected;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `forms`: processor time of a multipart form that comes in pieces of four bytes, against its size;
-//! - `memory PRESET COUNT`: resident memory of so many live trackers;
+//! - `memory PRESET COUNT`: resident memory of so many live trackers.
 
 mod decode;
 mod fit;

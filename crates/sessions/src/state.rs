@@ -36,9 +36,8 @@ pub enum StepError<E> {
 }
 
 impl SessionState {
-    /// A session that starts with `boxes` in `frame`, whose file has this digest, and with `expert` beside its trackers where
-    /// there is one. Before each target `check` says whether
-    /// to go on.
+    /// A session that starts with `boxes` in `frame`, whose file has this digest, and with `expert` beside its trackers
+    /// where there is one. Before each target `check` says whether to go on.
     ///
     /// # Errors
     /// See [`StartError`].

@@ -23,7 +23,7 @@ fn run(frames: &[Frame], target: Rect, params: Params) -> Vec<Estimate> {
         .collect()
 }
 
-/// The same with both presets, and with each mend off.
+/// The same with both presets, and with each extension off.
 fn run_variants(frames: &[Frame], target: Rect, seed: u64) {
     for (name, params) in variants(seed) {
         println!("{name}");
