@@ -1,4 +1,4 @@
-//! Each line of the threat table of SECURITY.md names a test or an attack that there is.
+//! Each line of the threat tables of SECURITY.md and docs/RELIABILITY.md names a test or an attack that there is.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -68,21 +68,25 @@ fn held_by(text: &str, heading: &str) -> Vec<(String, Vec<String>)> {
 }
 
 #[test]
-fn every_line_of_the_threat_table_names_tests_that_there_are() {
+fn every_line_of_the_threat_tables_names_tests_that_there_are() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (tests, attacks) = (tests(root), attacks(root));
     let is_there = |name: &String| match name.strip_suffix('…') {
         Some(begin) => tests.iter().filter(|test| test.starts_with(begin)).count() == 1,
         None => tests.contains(name) || attacks.contains(name),
     };
-    let security = read(&root.join("SECURITY.md"));
-    let table = held_by(&security, "## What one client can cost at most");
-    assert!(table.len() >= 12, "{table:?}");
-    let missing: Vec<_> = table
-        .iter()
-        .filter(|(_, names)| names.is_empty() || !names.iter().all(is_there))
-        .collect();
-    assert!(missing.is_empty(), "{missing:#?}");
+    for (document, heading) in [
+        ("SECURITY.md", "## What one client can cost at most"),
+        ("docs/RELIABILITY.md", "# Reliability"),
+    ] {
+        let table = held_by(&read(&root.join(document)), heading);
+        assert!(table.len() >= 12, "{table:?}");
+        let missing: Vec<_> = table
+            .iter()
+            .filter(|(_, names)| names.is_empty() || !names.iter().all(is_there))
+            .collect();
+        assert!(missing.is_empty(), "{document}: {missing:#?}");
+    }
 }
 
 #[test]

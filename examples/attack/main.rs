@@ -1,8 +1,9 @@
 //! Attacks on the service: `cargo build --release && cargo run --release --example attack -- --short`.
 //!
-//! Each attack runs against a server of its own, beside good clients that send 25 frames a second. It gets through when a
-//! good client loses a frame, when the service answers what it should refuse, or when it takes more memory than it said
-//! at its start. Then this program ends with status 1.
+//! Here are the attacks that need the program itself: its memory, and what good clients notice that send 25 frames a
+//! second. The others are tests of `tests/http`. Each attack runs against a server of its own. It gets through when a good
+//! client loses a frame, when the service answers what it should refuse, or when it takes more memory than it said at its
+//! start. Then this program ends with status 1.
 //!
 //! The server believes `X-Forwarded-For` from this machine, so that attackers and good clients have addresses of their
 //! own. `--url` attacks a server that runs already; give it `--trusted-proxies 127.0.0.0/8`. Its memory is not measured.
@@ -11,26 +12,13 @@
 
 mod costly_sessions;
 mod decode_bombs;
-mod fat_frame;
-mod forged_snapshots;
 mod garbage;
 mod good;
 mod greedy_client;
-mod half_close;
-mod idle_flood;
 mod idle_streams;
 mod json_copies;
-mod large_frame;
-mod large_length;
-mod never_readers;
-mod odd_heads;
 mod random_clients;
 mod raw;
-mod repeated_creation;
-mod session_hoard;
-mod silent_bodies;
-mod slow_readers;
-mod stalled_log;
 mod target;
 
 use clap::Parser;
@@ -123,23 +111,10 @@ async fn main() -> ExitCode {
     attack!(
         decode_bombs,
         costly_sessions,
-        silent_bodies,
-        large_length,
-        never_readers,
-        slow_readers,
         idle_streams,
-        idle_flood,
-        session_hoard,
         greedy_client,
-        odd_heads,
-        half_close,
         garbage,
-        fat_frame,
         json_copies,
-        forged_snapshots,
-        large_frame,
-        stalled_log,
-        repeated_creation,
         random_clients
     );
     match failed {

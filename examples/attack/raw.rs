@@ -21,15 +21,6 @@ pub async fn read(stream: &mut TcpStream, patience: Duration) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Whether the connection ends within this time, whatever comes before.
-pub async fn ends(stream: &mut TcpStream, within: Duration) -> bool {
-    let end = async {
-        let mut buffer = [0; 4096];
-        while let Ok(1..) = stream.read(&mut buffer).await {}
-    };
-    timeout(within, end).await.is_ok()
-}
-
 /// Holds the connection as long as the service does, and reads nothing. It sends more of what it has begun, which fails
 /// when the service has closed the connection.
 pub async fn hold(mut stream: TcpStream, until: Instant) {

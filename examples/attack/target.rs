@@ -7,8 +7,6 @@ use reqwest::{Client, RequestBuilder};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A server.
@@ -19,7 +17,6 @@ pub struct Target {
     child: Option<Child>,
     /// Bytes of resident memory that it said it stays below.
     pub bound: Option<u64>,
-    log_is_stalled: Arc<AtomicBool>,
 }
 
 impl Target {
@@ -39,7 +36,6 @@ impl Target {
                 http,
                 child: None,
                 bound: None,
-                log_is_stalled: Arc::default(),
             });
         }
         let binary = options.server.clone();
@@ -73,15 +69,7 @@ impl Target {
                 bound = Some(mib << 20);
             }
         }
-        let log_is_stalled = Arc::new(AtomicBool::new(false));
-        let is_stalled = log_is_stalled.clone();
-        std::thread::spawn(move || {
-            // The pipe stays open, for else the server's writing would fail.
-            while !is_stalled.load(Ordering::Relaxed) && lines.next().is_some() {}
-            while Arc::strong_count(&is_stalled) > 1 {
-                std::thread::sleep(Duration::from_millis(100));
-            }
-        });
+        std::thread::spawn(move || lines.for_each(drop));
         let url = url.ok_or("no address")?;
         let address = url.strip_prefix("http://").ok_or("no address")?.parse()?;
         Ok(Self {
@@ -90,7 +78,6 @@ impl Target {
             http,
             child: Some(child),
             bound,
-            log_is_stalled,
         })
     }
 
@@ -102,7 +89,6 @@ impl Target {
             http: self.http.clone(),
             child: None,
             bound: self.bound,
-            log_is_stalled: self.log_is_stalled.clone(),
         }
     }
 
@@ -146,11 +132,6 @@ impl Target {
     /// Whether this program has started the server.
     pub fn is_own(&self) -> bool {
         self.child.is_some()
-    }
-
-    /// Nobody reads the server's log any more.
-    pub fn stall_log(&self) {
-        self.log_is_stalled.store(true, Ordering::Relaxed);
     }
 
     /// A value of `/proc/PID/status` in bytes, of a server of this program's own.

@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect};
 use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
+use futures_util::future::join_all;
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::time::Duration;
@@ -11,18 +12,28 @@ use std::time::Duration;
 const HEALTH: &str = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
 #[tokio::test]
-async fn a_client_that_never_reads_loses_its_connection() {
+async fn clients_that_never_read_lose_their_connections() {
     let app = TestApplication::start_with(|config| {
+        config.max_connections = 7;
+        config.limits.client_connections = Some(7);
         config.limits.write_timeout = Duration::from_millis(100);
     });
     let app = app.await;
-    let mut connection = RawConnection::open(app.address).await;
+    let id = app.open().await;
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(50);
-    // It sends without end, which fails when the service has closed the connection.
-    let refused = async { while connection.try_send(&ask).await.is_ok() {} };
-    tokio::time::timeout(Duration::from_secs(60), refused)
+    // They send without end, which fails when the service has closed the connection.
+    let never_reads = async || {
+        let mut connection = RawConnection::open(app.address).await;
+        while connection.try_send(&ask).await.is_ok() {}
+    };
+    let refused = join_all((0..6).map(|_| never_reads()));
+    let other = async {
+        expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    };
+    let both = async { tokio::join!(refused, other) };
+    tokio::time::timeout(Duration::from_secs(60), both)
         .await
-        .expect("the connection ends");
+        .expect("the connections end");
     expect(app.get("/healthz").await, StatusCode::OK).await;
 }
 
@@ -65,8 +76,18 @@ async fn when_all_connections_are_taken_an_idle_one_makes_room() {
         silent.push(connection);
     }
     // The first three had to go.
-    for mut connection in silent.into_iter().take(3) {
+    for connection in &mut silent[..3] {
         assert_eq!(connection.read_to_end().await, "");
+    }
+    // So has a flood of them.
+    for _ in 0..50 {
+        for _ in 0..5 {
+            silent.push(RawConnection::open(app.address).await);
+        }
+        let mut connection = RawConnection::open(app.address).await;
+        connection.send(HEALTH).await;
+        let answer = connection.read_answer().await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
 }
 
@@ -140,6 +161,10 @@ async fn a_head_that_is_not_http_gets_its_status_and_the_connection_ends() {
         ("NONSENSE\r\n\r\n".to_owned(), "400"),
         (
             "GET / HTTP/1.1\r\nHost: localhost\r\nbad header: x\r\n\r\n".to_owned(),
+            "400",
+        ),
+        (
+            "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nab".to_owned(),
             "400",
         ),
         (

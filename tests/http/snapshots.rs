@@ -86,6 +86,11 @@ async fn a_damaged_snapshot_is_refused() {
         let response = app.create(snapshot[..position].to_vec(), &[]).await;
         expect_problem(response, "invalid-snapshot").await;
     }
+    for added in [1, 1 << 10, 1 << 19] {
+        let longer = [snapshot.clone(), vec![0x10; added]].concat();
+        let response = app.create(longer, &[]).await;
+        expect_problem(response, "invalid-snapshot").await;
+    }
     let response = app.create(snapshot, &[("box", BOX)]).await;
     expect_problem(response, "malformed-request").await;
 }
