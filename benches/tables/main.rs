@@ -4,12 +4,10 @@
 //! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the
 //!   frame's size, each with the order that is expected;
 //! - `decode FILE...`: decoding each file against a step;
-//! - `forms`: processor time of a multipart form that comes in pieces of four bytes, against its size;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers.
 
 mod decode;
 mod fit;
-mod forms;
 mod growth;
 mod growth_row;
 mod memory;
@@ -42,14 +40,13 @@ fn main() {
     match arguments[..] {
         ["ratios"] => ratios::print(),
         ["growth"] => growth::print(),
-        ["forms"] => forms::print(),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
         // `cargo bench` and `cargo test --benches` start it without a table.
         [] => ratios::print(),
         _ => {
-            eprintln!("tables: ratios | growth | forms | decode FILE... | memory PRESET COUNT");
+            eprintln!("tables: ratios | growth | decode FILE... | memory PRESET COUNT");
             std::process::exit(2);
         }
     }
