@@ -4,7 +4,7 @@
 //! are, and is a call for each of some thousand angles a frame; this polynomial compiles to vector instructions.
 //!
 //! Own code: no crate vectorises it for the machine it runs on, and `acos` takes 4.5 times as long
-//! (`cargo bench --bench tables -- kernels`, AVX-512).
+//! (AVX-512; docs/laboratory/NEGATIVE_RESULTS.md).
 
 use std::f64::consts::FRAC_PI_2;
 

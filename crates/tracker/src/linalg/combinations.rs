@@ -1,6 +1,6 @@
 //! Linear combinations of vectors that are kept in one slice, one after the other.
 //!
-//! Own code: nalgebra's matrix product takes 1.7 times as long (`cargo bench --bench tables -- kernels`, AVX-512).
+//! Own code: nalgebra's matrix product takes 1.8 times as long (AVX-512; docs/laboratory/NEGATIVE_RESULTS.md).
 
 use pulp::Simd;
 

@@ -5,7 +5,7 @@
 //! not depend on where its vectors stand in their sets, to the last bit.
 //!
 //! Own code: for the sizes of a step nalgebra's product takes 1.3 to 1.6 times as long, for eight vectors 3 times
-//! (`cargo bench --bench tables -- kernels`, AVX-512). faer 0.24 takes 0.93 to 1.04 times as long in f32, for four
+//! (AVX-512; docs/laboratory/NEGATIVE_RESULTS.md). faer 0.24 takes 0.93 to 1.04 times as long in f32, for four
 //! vectors 1.3 times; it is a large dependency for that, and it keeps a buffer of twice the L3 cache for each thread.
 
 use pulp::Simd;

@@ -2,8 +2,7 @@
 //! relative errors on positive semidefinite matrices, and one that always ends.
 //!
 //! Own code: nalgebra's decomposition of a matrix of any size allocates on each call, which a step must not. It takes
-//! 1.6 times as long for 3 rows, 0.6 times for 5 (`cargo bench --bench tables -- kernels`); both are about a
-//! microsecond.
+//! 1.6 times as long for 3 rows, 0.6 times for 5 (docs/laboratory/NEGATIVE_RESULTS.md); both are about a microsecond.
 
 use nalgebra::{SMatrix, SVector};
 
