@@ -4,6 +4,7 @@
 //! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the
 //!   frame's size, each with the order that is expected;
 //! - `decode FILE...`: decoding each file against a step;
+//! - `state`: a tracker's state as bytes, and back, alone and beside a copy some frames behind;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers.
 
 mod decode;
@@ -12,6 +13,7 @@ mod growth;
 mod growth_row;
 mod memory;
 mod ratios;
+mod state;
 
 use bagtrack_testing::{bench_scene as scene, cpu_time as clock, textbook};
 use bagtrack_tracker::{Params, Preset, Tracker};
@@ -40,13 +42,14 @@ fn main() {
     match arguments[..] {
         ["ratios"] => ratios::print(),
         ["growth"] => growth::print(),
+        ["state"] => state::print(),
         ["decode", ref files @ ..] if !files.is_empty() => decode::print(files),
         ["memory", "paper", count] => memory::print(Preset::Paper, number(count)),
         ["memory", "robust", count] => memory::print(Preset::Robust, number(count)),
         // `cargo bench` and `cargo test --benches` start it without a table.
         [] => ratios::print(),
         _ => {
-            eprintln!("tables: ratios | growth | decode FILE... | memory PRESET COUNT");
+            eprintln!("tables: ratios | growth | decode FILE... | state | memory PRESET COUNT");
             std::process::exit(2);
         }
     }
