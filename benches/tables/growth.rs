@@ -1,4 +1,4 @@
-//! The time of a step against each size that it depends on, with the order that is expected.
+//! The time of a step by each size that it depends on, and of what comes before it by the size of the frame.
 
 use std::hint::black_box;
 
@@ -7,15 +7,14 @@ use bagtrack_tracker::{Frame, Params, Preset, Tracker};
 use jpeg_encoder::{ColorType, Encoder};
 
 use crate::clock::Action;
-use crate::fit::Order;
-use crate::growth_row::Row;
 use crate::{clock, scene, warm};
 
 /// Both presets have work that comes every fifth or every tenth frame.
 const PERIOD: usize = 10;
 const ROUNDS: usize = 25;
 
-type Change = fn(&mut Params, u32);
+/// A parameter: its name, its values, and how it is set.
+type Size = (&'static str, &'static [u32], fn(&mut Params, u32));
 
 /// Prints the table.
 pub fn print() {
@@ -23,65 +22,35 @@ pub fn print() {
         "µs of a step, of which but one size is the preset's: over {PERIOD} steps in a row, the mean of each one's median \
          of {ROUNDS}; the sizes in turns, processor time of one thread\n"
     );
-    println!("| what | size | µs | nearest of the expected order | furthest off |");
-    println!("|---|---|---|---|---|");
-    let add = |row: Row| row.print();
-    use Order::Power;
-    let particles: (&str, &[u32], Order, Change) =
-        ("N", &[50, 100, 200, 400, 800], Power(1), |p, n| {
-            p.particles = n;
-        });
-    let entries: (&str, &[u32], Order, Change) =
-        ("K", &[2, 4, 8, 16, 32], Power(1), |p, k| p.bag_size = k);
-    let paper: [(&str, &[u32], Order, Change); 4] = [
-        particles,
-        // D = H₁ H₂.
-        ("H", &[8, 16, 32, 64], Power(2), |p, side| {
-            (p.patch_width, p.patch_height) = (side, side);
-        }),
-        entries,
-        ("P", &[1, 2, 5, 10], Power(3), |p, history| {
-            p.history = history;
-        }),
-    ];
-    for (size, values, order, change) in paper {
-        add(steps(
-            (Preset::Paper, "`paper`", size),
-            values,
-            order,
-            change,
-        ));
+    println!("| what | size | µs |");
+    println!("|---|---|---|");
+    let particles: Size = ("N", &[50, 100, 200, 400, 800], |p, n| p.particles = n);
+    // D = H₁ H₂.
+    let side: Size = ("H", &[8, 16, 32, 64], |p, side| {
+        (p.patch_width, p.patch_height) = (side, side);
+    });
+    let entries: Size = ("K", &[2, 4, 8, 16, 32], |p, k| p.bag_size = k);
+    let history: Size = ("P", &[1, 2, 5, 10], |p, history| p.history = history);
+    let samples: Size = ("background samples", &[16, 32, 64, 128], |p, samples| {
+        p.background_samples = samples;
+    });
+    for size in [particles, side, entries, history] {
+        print_steps(Preset::Paper, "`paper`", size);
     }
-    let robust: [(&str, &[u32], Order, Change); 3] = [
-        particles,
-        entries,
-        (
-            "background samples",
-            &[16, 32, 64, 128],
-            Power(1),
-            |p, samples| {
-                p.background_samples = samples;
-            },
-        ),
-    ];
-    for (size, values, order, change) in robust {
-        add(steps(
-            (Preset::Robust, "`robust`", size),
-            values,
-            order,
-            change,
-        ));
+    for size in [particles, entries, samples] {
+        print_steps(Preset::Robust, "`robust`", size);
     }
-    frame_sizes().into_iter().for_each(add);
+    print_frame_sizes();
+}
+
+fn print_row(what: &str, size: &str, values: Vec<String>, times: &[f64]) {
+    let values = values.join(" · ");
+    let times: Vec<String> = times.iter().map(|t| format!("{:.0}", t * 1e6)).collect();
+    println!("| {what} | {size}: {values} | {} |", times.join(" · "));
 }
 
 /// Steps of a preset with one parameter at each of these values.
-fn steps(
-    (preset, what, size): (Preset, &'static str, &'static str),
-    values: &[u32],
-    order: Order,
-    change: Change,
-) -> Row {
+fn print_steps(preset: Preset, what: &str, (size, values, change): Size) {
     let with = |&value: &u32| {
         let mut params = preset.params();
         change(&mut params, value);
@@ -97,47 +66,30 @@ fn steps(
         Box::new(step) as Action
     });
     let times = clock::cycles(ROUNDS, PERIOD, actions.collect());
-    let sizes = values.iter().map(|&value| f64::from(value)).collect();
-    Row::new((what, size), sizes, order, times)
+    let values = values.iter().map(u32::to_string).collect();
+    print_row(what, size, values, &times);
 }
 
 /// What comes before a step grows with the pixels of the frame, the step does not.
-fn frame_sizes() -> [Row; 4] {
+fn print_frame_sizes() {
     let mut sizes = [1, 2, 4, 6, 8].map(FrameSize::new);
     let limits = Limits::default();
-    let decode = timed(&mut sizes, |size| {
-        black_box(bagtrack_ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
-    });
-    let downscale = timed(&mut sizes, |size| {
+    print_timed(
+        "decoding a gray JPEG and downscaling it",
+        &mut sizes,
+        |size| {
+            black_box(bagtrack_ingest::decode(&size.jpeg, &limits)).expect("a whole JPEG");
+        },
+    );
+    // The smallest is the working image already: it is only copied.
+    print_timed("copying and downscaling luma", &mut sizes[1..], |size| {
         black_box(frame(size.zoom, &size.luma));
     });
-    let [paper, robust] = [0, 1].map(|preset| {
-        timed(&mut sizes, |size| {
+    for (preset, what) in ["step, `paper`", "step, `robust`"].into_iter().enumerate() {
+        print_timed(what, &mut sizes, |size| {
             black_box(size.trackers[preset].step(&size.seen)).expect("frames of one size");
-        })
-    });
-    let row = |what, order, from: usize, times: Vec<f64>| {
-        let sizes = &sizes[from..];
-        let pixels = |size: &FrameSize| (size.width() * size.height()) as f64 / 1e6;
-        let label = |size: &FrameSize| format!("{} × {}", size.width(), size.height());
-        Row {
-            labels: sizes.iter().map(label).collect(),
-            ..Row::new(
-                (what, "million pixels"),
-                sizes.iter().map(pixels).collect(),
-                order,
-                times[from..].to_vec(),
-            )
-        }
-    };
-    let (pixels, constant) = (Order::Power(1), Order::Constant);
-    [
-        row("decoding a gray JPEG and downscaling it", pixels, 0, decode),
-        // The smallest is the working image already: it is only copied.
-        row("copying and downscaling luma", pixels, 1, downscale),
-        row("step, `paper`", constant, 0, paper),
-        row("step, `robust`", constant, 0, robust),
-    ]
+        });
+    }
 }
 
 /// What frames of one size are timed with.
@@ -196,11 +148,16 @@ impl FrameSize {
     }
 }
 
-/// Seconds that `work` takes at each of `sizes`, which take turns.
-fn timed(sizes: &mut [FrameSize], work: impl Fn(&mut FrameSize)) -> Vec<f64> {
+/// Times `work` at each of `sizes`, which take turns.
+fn print_timed(what: &str, sizes: &mut [FrameSize], work: impl Fn(&mut FrameSize)) {
+    let labels = sizes
+        .iter()
+        .map(|size| format!("{} × {}", size.width(), size.height()))
+        .collect();
     let work = &work;
     let actions = sizes
         .iter_mut()
         .map(|size| Box::new(move || work(size)) as Action);
-    clock::cycles(ROUNDS, PERIOD, actions.collect())
+    let times = clock::cycles(ROUNDS, PERIOD, actions.collect());
+    print_row(what, "frame", labels, &times);
 }

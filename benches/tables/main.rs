@@ -1,16 +1,13 @@
 //! The tables of docs/laboratory/PERFORMANCE.md: `cargo bench --bench tables -- <table>`, one of
 //!
 //! - `ratios`: a step of each preset, the textbook version, one bare matrix product, in turns in one run;
-//! - `growth`: the time of a step against N, D, K, P and more, and of what comes before it against the
-//!   frame's size, each with the order that is expected;
+//! - `growth`: the time of a step against N, H, K, P and more, and of what comes before it against the frame's size;
 //! - `decode FILE...`: decoding each file against a step;
 //! - `state`: a tracker's state as bytes, and back, alone and beside a copy some frames behind;
 //! - `memory PRESET COUNT`: resident memory of so many live trackers.
 
 mod decode;
-mod fit;
 mod growth;
-mod growth_row;
 mod memory;
 mod ratios;
 mod state;
