@@ -156,6 +156,7 @@ async fn a_hangup_reads_the_keys_again() {
         let response = client.get(&url).bearer_auth(key).send().await;
         response.unwrap().status()
     };
+    assert_eq!(status("0123456789abcdef").await, StatusCode::OK);
     assert_eq!(status("fedcba9876543210").await, StatusCode::UNAUTHORIZED);
     std::fs::write(&file, "ann:0123456789abcdef\nben:fedcba9876543210").unwrap();
     service.signal(Signal::HUP);
