@@ -6,6 +6,7 @@ use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
 use reqwest::{Method, StatusCode};
+use serde_json::Value;
 use std::time::Duration;
 
 #[tokio::test]
@@ -42,7 +43,7 @@ async fn lines_and_messages_count_as_sent() {
 }
 
 #[tokio::test]
-async fn what_ends_before_a_handler_is_counted_and_told() {
+async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handler_is_counted() {
     let app = TestApplication::start_with(|config| {
         config.max_connections = 4;
         config.limits.client_connections = Some(2);
@@ -54,12 +55,16 @@ async fn what_ends_before_a_handler_is_counted_and_told() {
     }
     let refused = RawConnection::open(app.address).await.read_to_end().await;
     assert!(refused.starts_with("HTTP/1.1 429"), "{refused}");
+    let (head, body) = refused.split_once("\r\n\r\n").expect("an answer");
+    let problem: Value = serde_json::from_str(body).unwrap();
+    assert_eq!(problem["type"], "/docs/problems#quota-exceeded");
     for header in [
+        "retry-after: 1",
         "x-content-type-options: nosniff",
         "content-security-policy: ",
         "x-frame-options: DENY",
     ] {
-        assert!(refused.contains(header), "{header}: {refused}");
+        assert!(head.contains(header), "{header}: {head}");
     }
     drop(busy.pop());
     // Two idle ones, the first of which makes room, and this client's own.

@@ -6,7 +6,6 @@ use crate::pictures;
 use crate::raw::RawConnection;
 use futures_util::future::join_all;
 use reqwest::StatusCode;
-use serde_json::Value;
 use std::time::Duration;
 
 const HEALTH: &str = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
@@ -89,39 +88,6 @@ async fn when_all_connections_are_taken_an_idle_one_makes_room() {
         let answer = connection.read_answer().await;
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
-}
-
-#[tokio::test]
-async fn an_address_has_a_share_of_the_connections() {
-    let app = TestApplication::start_with(|config| config.limits.client_connections = Some(2));
-    let app = app.await;
-    let mut busy = Vec::new();
-    for _ in 0..2 {
-        busy.push(RawConnection::hold(app.address, "POST", "/sessions", 1000).await);
-    }
-    let mut third = RawConnection::open(app.address).await;
-    let answer = third.read_to_end().await;
-    let (head, body) = answer.split_once("\r\n\r\n").expect("an answer");
-    assert!(
-        head.starts_with("HTTP/1.1 429") && head.contains("retry-after: 1"),
-        "{head}"
-    );
-    let problem: Value = serde_json::from_str(body).unwrap();
-    assert_eq!(problem["type"], "/docs/problems#quota-exceeded");
-    drop(busy);
-    let served = async {
-        loop {
-            let mut next = RawConnection::open(app.address).await;
-            if next.try_send(HEALTH).await.is_ok()
-                && next.read_some().await.starts_with("HTTP/1.1 200")
-            {
-                break;
-            }
-        }
-    };
-    tokio::time::timeout(Duration::from_secs(60), served)
-        .await
-        .expect("their places are free again");
 }
 
 #[tokio::test]
