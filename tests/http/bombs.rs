@@ -2,6 +2,7 @@
 
 use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
+use crate::metrics::readiness;
 use crate::pictures;
 use image::{GrayImage, ImageFormat, Luma};
 use reqwest::multipart::{Form, Part};
@@ -99,11 +100,8 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     let (session, id) = (heavy::open(&app).await, app.open().await);
     let request = heavy::post(&app, &session, 2 * heavy::FRAMES);
     let client = heavy::send_raw(&app, &format!("{session}/frames"), request).await;
-    // Asked in a way that takes no place itself.
-    let full = async { while app.get("/readyz").await.status() == StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), full)
-        .await
-        .expect("the only place is taken by the long request");
+    // Until the only place is taken by the long request, asked in a way that takes no place itself.
+    readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
     drop(client);
     let ask = || app.post_frame(&id, pictures::png(1));
     let freed = async { while ask().await.status() != StatusCode::OK {} };

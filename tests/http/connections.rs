@@ -1,6 +1,7 @@
 //! Slow clients, large bodies, and the end of the service.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::metrics::readiness;
 use crate::pictures;
 use crate::raw::RawConnection;
 use reqwest::{Method, StatusCode};
@@ -166,11 +167,8 @@ async fn readiness_ends_before_the_service_does() {
     let before = app.post_frame(&id, pictures::png(1)).await;
     assert!(!before.headers().contains_key("draining"));
     app.shut_down();
-    let unready = async { while app.get("/readyz").await.status() == StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), unready)
-        .await
-        .unwrap();
-    expect_problem(app.get("/readyz").await, "not-ready").await;
+    let not_ready = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
+    expect_problem(not_ready, "not-ready").await;
     expect(app.get("/healthz").await, StatusCode::OK).await;
     // Sessions are served until connections are refused, and their clients are told to take them elsewhere.
     let answer = app.post_frame(&id, pictures::png(1)).await;

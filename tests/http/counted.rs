@@ -1,7 +1,7 @@
 //! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
 
 use crate::application::{TestApplication, expect, expect_problem};
-use crate::metrics::{metrics, value};
+use crate::metrics::{metrics, readiness, value};
 use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
@@ -103,22 +103,9 @@ async fn readiness_ends_when_the_memory_of_bodies_is_used_up() {
     let mut held = RawConnection::hold(app.address, "POST", &target, 99_000).await;
     expect(app.get("/readyz").await, StatusCode::OK).await;
     held.send([7; 98_000]).await;
-    let full = async {
-        loop {
-            let response = app.get("/readyz").await;
-            if response.status() != StatusCode::OK {
-                break response;
-            }
-        }
-    };
-    let full = tokio::time::timeout(Duration::from_secs(60), full)
-        .await
-        .unwrap();
+    let full = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
     let problem = expect_problem(full, "not-ready").await;
     assert!(problem["detail"].as_str().unwrap().contains("bodies"));
     drop(held);
-    let ready = async { while app.get("/readyz").await.status() != StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), ready)
-        .await
-        .unwrap();
+    readiness(&app, StatusCode::OK).await;
 }

@@ -4,7 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
 use bagtrack::http::Secret;
-use reqwest::{Method, StatusCode};
+use reqwest::{Method, Response, StatusCode};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
@@ -18,6 +18,20 @@ pub async fn metrics(app: &TestApplication) -> String {
         "{media_type}"
     );
     response.text().await.unwrap()
+}
+
+/// The first answer of `/readyz` that has this status.
+pub async fn readiness(app: &TestApplication, status: StatusCode) -> Response {
+    let answer = async {
+        loop {
+            let response = app.get("/readyz").await;
+            if response.status() == status {
+                break response;
+            }
+        }
+    };
+    let answer = tokio::time::timeout(Duration::from_secs(60), answer);
+    answer.await.expect("readiness changes")
 }
 
 /// The value of the only line that begins with `name` and has all these labels.
@@ -229,21 +243,10 @@ async fn readiness_ends_when_the_queue_is_full_and_comes_back_when_it_is_free() 
     .await;
     expect(app.get("/readyz").await, StatusCode::OK).await;
     let busy = heavy::fill_queue(&app).await;
-    let not_ready = async {
-        // Between two of the long requests the place is free for a moment.
-        loop {
-            let response = app.get("/readyz").await;
-            if response.status() != StatusCode::OK {
-                break response;
-            }
-        }
-    };
-    let not_ready = tokio::time::timeout(Duration::from_secs(60), not_ready);
-    let problem = expect_problem(not_ready.await.unwrap(), "not-ready").await;
+    // Between two of the long requests the place is free for a moment.
+    let not_ready = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
+    let problem = expect_problem(not_ready, "not-ready").await;
     assert!(problem["detail"].as_str().unwrap().contains("queue"));
     drop(busy);
-    let ready = async { while app.get("/readyz").await.status() != StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), ready)
-        .await
-        .unwrap();
+    readiness(&app, StatusCode::OK).await;
 }

@@ -2,6 +2,7 @@
 
 use crate::application::{BOX, TestApplication, expect};
 use crate::heavy;
+use crate::metrics::readiness;
 use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
@@ -212,7 +213,7 @@ impl Attempt {
             "internal" => (self.method, self.path) = (Method::GET, "/panic".to_owned()),
             "not-ready" => {
                 self.app.shut_down();
-                while self.app.get("/readyz").await.status() == StatusCode::OK {}
+                readiness(&self.app, StatusCode::SERVICE_UNAVAILABLE).await;
             }
             "too-many-sessions" | "store-unavailable" => {}
             other => panic!("nothing provokes {other}: add it here"),
