@@ -89,12 +89,8 @@ fn tile<S: Simd>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::numbers;
     use super::*;
-
-    fn numbers(count: usize, seed: usize) -> Vec<f32> {
-        let number = |i: usize| ((i * 7919 + seed * 104_729) % 1000) as f32 / 500.0 - 1.0;
-        (0..count).map(number).collect()
-    }
 
     #[test]
     fn combinations_are_those_of_loops() {

@@ -127,18 +127,17 @@ pub(crate) fn tile<S: Simd, T: Element, const A: usize, const B: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::numbers;
     use super::*;
-
-    fn numbers(count: usize, seed: usize) -> Vec<f64> {
-        let number = |i: usize| ((i * 7919 + seed * 104_729) % 1000) as f64 / 500.0 - 1.0;
-        (0..count).map(number).collect()
-    }
 
     #[test]
     fn products_are_those_of_loops_in_both_precisions() {
         for (count_a, count_b, len) in [(1, 1, 5), (3, 2, 17), (7, 4, 64), (40, 21, 71), (2, 0, 8)]
         {
-            let (a, b) = (numbers(count_a * len, 1), numbers(count_b * len, 2));
+            let (a, b) = (
+                numbers::<f64>(count_a * len, 1),
+                numbers::<f64>(count_b * len, 2),
+            );
             let stride = count_b + 2;
             let mut out = vec![9.0; count_a * stride];
             inner_products(&a, &b, len, stride, &mut out);
@@ -161,7 +160,7 @@ mod tests {
     #[test]
     fn a_product_does_not_depend_on_where_its_vectors_stand() {
         let len = 50;
-        let (a, b) = (numbers(9 * len, 3), numbers(14 * len, 4));
+        let (a, b) = (numbers::<f64>(9 * len, 3), numbers::<f64>(14 * len, 4));
         let mut all = vec![0.0; 9 * 14];
         inner_products(&a, &b, len, 14, &mut all);
         for i in 0..9 {

@@ -160,22 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn matrices_of_fixed_size_have_the_same_eigenpairs() {
+    fn eigenvalues_alone_are_those_of_the_pairs_to_six_digits() {
         for rank in 1..=6 {
             let given = matrix(6, rank, rank);
-            let (values, vectors) = eigenpairs(SMatrix::<f64, 6, 6>::from_fn(|i, j| given[(i, j)]));
+            let pairs = padded(given.as_slice(), 6);
             let alone = eigenvalues(SMatrix::<f64, 6, 6>::from_fn(|i, j| given[(i, j)]));
-            let largest = values[0];
-            for (j, (expected, vector)) in padded(given.as_slice(), 6)[..6].iter().enumerate() {
-                assert!(
-                    (values[j] - expected).abs() < 1e-15 * largest,
-                    "{rank}, {j}"
-                );
-                assert!((alone[j] - expected).abs() < 1e-6 * expected + 1e-15 * largest);
-                if *expected > 1e-14 * largest {
-                    let cosine: f64 = (0..6).map(|i| vectors[(i, j)] * vector[i]).sum();
-                    assert!((cosine.abs() - 1.0).abs() < 1e-12, "{rank}, {j}: {cosine}");
-                }
+            for (value, (expected, _)) in alone.iter().zip(&pairs) {
+                assert!((value - expected).abs() < 1e-6 * expected + 1e-15 * pairs[0].0);
             }
         }
     }

@@ -27,3 +27,10 @@ pub(crate) mod gemm;
 pub(crate) mod jacobi;
 pub(crate) mod scratch;
 pub(crate) mod vector_ops;
+
+/// Numbers from -1 to 1, for tests.
+#[cfg(test)]
+fn numbers<T: From<f32>>(count: usize, seed: usize) -> Vec<T> {
+    let number = |i: usize| ((i * 7919 + seed * 104_729) % 1000) as f32 / 500.0 - 1.0;
+    (0..count).map(|i| number(i).into()).collect()
+}

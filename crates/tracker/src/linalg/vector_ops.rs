@@ -74,12 +74,8 @@ pub(crate) fn normalize(vector: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::numbers;
     use super::*;
-
-    fn numbers(count: usize, seed: usize) -> Vec<f32> {
-        let number = |i: usize| ((i * 7919 + seed * 104_729) % 1000) as f32 / 500.0 - 1.0;
-        (0..count).map(number).collect()
-    }
 
     #[test]
     fn products_and_sums_are_those_of_loops() {
@@ -89,7 +85,7 @@ mod tests {
             assert!((dot(&a, &b) - plain).abs() < 1e-4);
             let mut sum = numbers(len, 6);
             add_all(pulp::Scalar, &mut sum, [0.5, -2.0], [&a, &b]);
-            for (i, (found, given)) in sum.iter().zip(numbers(len, 6)).enumerate() {
+            for (i, (found, given)) in sum.iter().zip(numbers::<f32>(len, 6)).enumerate() {
                 assert!((found - (given + 0.5 * a[i] - 2.0 * b[i])).abs() < 1e-5);
             }
         }
