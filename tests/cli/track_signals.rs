@@ -1,7 +1,7 @@
 //! Ctrl-C while `bagtrack track` draws a video: the video plays, and the rows are kept.
 #![cfg(unix)]
 
-use crate::command::{about, clip, folder, has_ffmpeg, rows, text, video_of};
+use crate::command::{about, clip, folder, rows, text, video_of};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -52,10 +52,8 @@ fn long_video(parent: &Path) -> std::path::PathBuf {
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn a_signal_ends_the_drawn_video_properly_and_keeps_the_rows() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let video = long_video(parent.path());
     for (signal, status, name) in [
@@ -76,10 +74,8 @@ fn a_signal_ends_the_drawn_video_properly_and_keeps_the_rows() {
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn a_signal_keeps_the_rows_of_a_file_and_of_a_folder() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let video = long_video(parent.path());
     let drawn = parent.path().join("drawn");
@@ -91,10 +87,8 @@ fn a_signal_keeps_the_rows_of_a_file_and_of_a_folder() {
 
 /// Passing over the frames before the start can take long.
 #[test]
+#[ignore = "needs ffmpeg"]
 fn a_signal_before_the_first_row_ends_it_too() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let video = long_video(parent.path());
     let file = parent.path().join("boxes.csv");

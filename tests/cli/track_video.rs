@@ -1,8 +1,6 @@
-//! `bagtrack track` on a video, and videos that it draws. They need ffmpeg, and say so where there is none.
+//! `bagtrack track` on a video, and videos that it draws. Most need ffmpeg.
 
-use crate::command::{
-    about, bagtrack, boxes, clip, fails, folder, has_ffmpeg, rows, succeeds, text, video_of,
-};
+use crate::command::{about, bagtrack, boxes, clip, fails, folder, rows, succeeds, text, video_of};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,10 +17,8 @@ fn small_clip(parent: &Path, name: &str, [width, height]: [&str; 2]) -> (PathBuf
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "even", ["160", "120"]);
     let video = parent.path().join("even.mp4");
@@ -53,10 +49,8 @@ fn a_video_gets_the_boxes_of_its_frames_and_a_drawn_video_has_all_of_them() {
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn each_ending_that_is_offered_becomes_a_video_of_this_kind() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     // Odd sides are made even where the encoder wants that.
     let (dir, target) = small_clip(parent.path(), "odd", ["161", "121"]);
@@ -128,11 +122,9 @@ fn a_name_with_a_slash_at_its_end_is_a_folder_whatever_its_ending() {
 
 #[cfg(unix)]
 #[test]
+#[ignore = "needs ffmpeg"]
 fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
     use std::os::unix::fs::PermissionsExt;
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let programs = parent.path().join("programs");
@@ -161,10 +153,8 @@ fn an_encoder_that_this_ffmpeg_does_not_have_is_told_before_the_first_row() {
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let (dir, _) = small_clip(parent.path(), "clip", ["160", "120"]);
     let truth = fs::read_to_string(dir.join("groundtruth_rect.txt")).expect("it is there");
@@ -237,10 +227,8 @@ fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
 
 /// Frame n of these videos is of the gray 20 + 4 n. Files with an index are entered in the middle.
 #[test]
+#[ignore = "needs ffmpeg"]
 fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     for (name, coded) in [
         // With B-frames, and few frames that stand for themselves.
@@ -300,10 +288,8 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
 
 /// A browser's recording of a screen is like this: frames come when something changes.
 #[test]
+#[ignore = "needs ffmpeg"]
 fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let video = parent.path().join("bursts.mkv");
@@ -335,10 +321,8 @@ fn frames_that_are_closer_than_the_rate_says_are_all_taken() {
 
 /// Frames of a phone come at uneven times.
 #[test]
+#[ignore = "needs ffmpeg"]
 fn times_are_those_of_the_video_also_where_its_rate_changes() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
     let video = parent.path().join("uneven.mp4");
@@ -381,10 +365,8 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
 }
 
 #[test]
+#[ignore = "needs ffmpeg"]
 fn what_is_no_video_is_told_in_one_line() {
-    if !has_ffmpeg() {
-        return;
-    }
     let parent = folder();
     let file = parent.path().join("text.mp4");
     fs::write(&file, "no video").expect("the folder is writable");

@@ -3,7 +3,6 @@
 
 use crate::application::{TestApplication, expect_problem};
 use crate::lines::lines;
-use crate::videos::has_ffmpeg;
 use reqwest::{Method, Response};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -82,10 +81,8 @@ fn check_same(answer: &Value, row: &Value) {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_box_goes_through_a_video_as_with_the_command() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;
@@ -148,10 +145,8 @@ async fn a_box_goes_through_a_video_as_with_the_command() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;
@@ -198,10 +193,8 @@ fn file(video: &Path, format: &str, flags: &[&str]) -> String {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_video_is_answered_by_the_file_that_the_command_writes() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;
@@ -253,10 +246,8 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;
@@ -298,10 +289,8 @@ async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() 
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let size = usize::try_from(video.metadata().unwrap().len()).unwrap();
@@ -325,10 +314,8 @@ async fn frames_that_are_kept_for_the_way_back_are_charged_as_uploads() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_frame_that_is_not_there_and_frames_in_place_of_a_video_are_refused() {
-    if !has_ffmpeg() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;

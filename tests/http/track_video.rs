@@ -3,7 +3,7 @@
 use crate::application::{BOX, TestApplication, expect_problem};
 use crate::heavy;
 use crate::lines::{LINES, lines};
-use crate::videos::{FRAMES, has_ffmpeg, motion_jpeg, video};
+use crate::videos::{FRAMES, motion_jpeg, video};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
@@ -48,10 +48,8 @@ async fn sessions(app: &TestApplication) -> String {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_video_and_a_box_get_a_line_for_each_frame_and_no_session() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     let query = [("box", FIRST), ("seed", "7")];
     for (media_type, video) in [
@@ -82,10 +80,8 @@ async fn a_video_and_a_box_get_a_line_for_each_frame_and_no_session() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn several_targets_are_followed_through_a_video() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     let boxes = format!("{FIRST};60,40,16,12");
     let answer = track(&app, &[("boxes", &boxes)], "video/mp4", video("mp4")).await;
@@ -98,10 +94,8 @@ async fn several_targets_are_followed_through_a_video() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn what_is_wrong_with_the_video_or_the_box_is_told() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start_with(|config| config.limits.max_video_frames = 5).await;
     let (mp4, first) = (video("mp4"), [("box", FIRST)]);
     let mut got = lines(track(&app, &first, "video/mp4", mp4.clone()).await).await;
@@ -143,10 +137,8 @@ async fn without_ffmpeg_a_video_to_track_is_refused() {
 
 /// A client that reads no further holds its one place for a video, and gives it back when it goes.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs ffmpeg"]
 async fn a_client_tracks_one_video_at_a_time_and_its_place_is_free_when_it_goes() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start_with(|config| {
         config.work_timeout = Duration::from_secs(4);
     });

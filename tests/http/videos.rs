@@ -1,4 +1,4 @@
-//! Videos as bodies. Most need ffmpeg, and say so where there is none.
+//! Videos as bodies. Most need ffmpeg.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
@@ -12,14 +12,6 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 pub const FRAMES: u32 = 12;
-
-pub fn has_ffmpeg() -> bool {
-    let found = Command::new("ffmpeg").arg("-version").output().is_ok();
-    if !found {
-        eprintln!("left out: there is no ffmpeg");
-    }
-    found
-}
 
 /// The drawn frames 1 to [`FRAMES`] as a video of this kind.
 pub fn video(extension: &str) -> Vec<u8> {
@@ -81,10 +73,8 @@ async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>)
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_video_is_tracked_and_answered_line_by_line() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     for (media_type, video) in [
         // Its index is at the end.
@@ -129,10 +119,8 @@ async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn a_video_comes_back_frame_by_frame() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     for extension in ["mp4", "webm"] {
         let request = app.request(Method::POST, "/frames", &[]);
@@ -171,10 +159,8 @@ fn times(motion_jpeg: &[u8]) -> Vec<f64> {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     for extension in ["mp4", "webm"] {
         // Of 30 frames a second the first two, and then every third.
@@ -201,10 +187,8 @@ async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_off() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     // Before the damage are more pictures than a pipe holds: ffmpeg waits there until the first ones are taken.
     let mut damaged = pattern("webm", 100);
@@ -242,10 +226,8 @@ async fn a_session_is_opened_with_a_picture() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn what_is_wrong_with_a_video_is_told() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start_with(|config| config.limits.max_video_frames = 5).await;
     let id = app.open().await;
     let whole = video("mp4");
@@ -281,10 +263,8 @@ async fn what_is_wrong_with_a_video_is_told() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs ffmpeg"]
 async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start_with(|config| {
         config.workers = Some(1);
         config.work_timeout = Duration::from_secs(2);
@@ -349,10 +329,8 @@ async fn until_damage(app: &TestApplication, video: Vec<u8>) -> usize {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbered() {
-    if !has_ffmpeg() {
-        return;
-    }
     let app = TestApplication::start().await;
     let whole = video("mkv");
     let at = |part: f64| (whole.len() as f64 * part) as usize;
@@ -420,10 +398,8 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
 }
 
 #[tokio::test]
+#[ignore = "needs ffmpeg"]
 async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
-    if !has_ffmpeg() {
-        return;
-    }
     for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
         let service = Service::start(&["--ffmpeg", program]).await;
         let create = service

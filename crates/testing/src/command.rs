@@ -120,15 +120,6 @@ fn row(line: &str) -> Row {
     }
 }
 
-/// Whether ffmpeg is here; says so where it is not.
-pub fn has_ffmpeg() -> bool {
-    let found = Command::new("ffmpeg").arg("-version").output().is_ok();
-    if !found {
-        eprintln!("left out: there is no ffmpeg");
-    }
-    found
-}
-
 /// A video of a clip's frames, at 30 frames a second, that plays them `times` times.
 pub fn video_of(clip: &Path, video: &Path, times: u32) {
     let frames = clip.join("img/%04d.jpg");
