@@ -3,18 +3,21 @@
 use crate::good::target_box;
 use crate::{Options, Outcome};
 use bagtrack_testing::command::program;
+use bagtrack_testing::memory;
+use bagtrack_testing::service::program::{Program, serve};
 use reqwest::{Client, RequestBuilder};
-use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::process::{Child, Command, Stdio};
 use std::time::Duration;
+
+/// What a server says of its resident memory, before the number.
+const BOUND: &str = "resident memory stays below ";
 
 /// A server.
 pub struct Target {
     pub url: String,
     pub address: SocketAddr,
     pub http: Client,
-    child: Option<Child>,
+    program: Option<Program>,
     /// Bytes of resident memory that it said it stays below.
     pub bound: Option<u64>,
 }
@@ -34,50 +37,35 @@ impl Target {
                 address: address.trim_end_matches('/').parse()?,
                 url: url.trim_end_matches('/').to_owned(),
                 http,
-                child: None,
+                program: None,
                 bound: None,
             });
         }
         let binary = options.server.clone();
         let binary = binary.unwrap_or_else(|| program("bagtrack"));
-        let mut command = Command::new(&binary);
+        let mut command = serve(&binary);
         command
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+            .args(["--log-format", "json"])
             .args(["--trusted-proxies", "127.0.0.0/8"])
             .args(settings);
         if options.short {
             command.args(["--write-timeout", "1s", "--header-timeout", "3s"]);
             command.args(["--body-grace", "1s"]);
         }
-        let mut child = command
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
+        let started = Program::spawn(&mut command);
+        let mut program = started
             .map_err(|error| format!("{}: {error} (cargo build --release)", binary.display()))?;
-        let log = child.stderr.take().ok_or("the log is piped")?;
-        let mut lines = BufReader::new(log).lines();
-        let (mut url, mut bound) = (None, None);
-        while url.is_none() || bound.is_none() {
-            let line = lines.next().ok_or("the server ended at its start")??;
-            let line: serde_json::Value = serde_json::from_str(&line)?;
-            let message = line["fields"]["message"].as_str().unwrap_or("");
-            if let Some(at) = message.strip_prefix("listening on ") {
-                url = Some(at.to_owned());
-            }
-            if let Some(rest) = message.strip_prefix("resident memory stays below ") {
-                let mib: u64 = rest.trim_end_matches(" MiB").parse()?;
-                bound = Some(mib << 20);
-            }
-        }
-        std::thread::spawn(move || lines.for_each(drop));
-        let url = url.ok_or("no address")?;
-        let address = url.strip_prefix("http://").ok_or("no address")?.parse()?;
+        let line: serde_json::Value = serde_json::from_str(&program.logs(BOUND))?;
+        let message = line["fields"]["message"].as_str().unwrap_or("");
+        let bound = message.strip_prefix(BOUND).ok_or("no bound of memory")?;
+        let mib: u64 = bound.trim_end_matches(" MiB").parse()?;
+        program.ignore_log();
         Ok(Self {
-            url,
-            address,
+            url: program.url(""),
+            address: program.address,
             http,
-            child: Some(child),
-            bound,
+            program: Some(program),
+            bound: Some(mib << 20),
         })
     }
 
@@ -87,7 +75,7 @@ impl Target {
             url: self.url.clone(),
             address: self.address,
             http: self.http.clone(),
-            child: None,
+            program: None,
             bound: self.bound,
         }
     }
@@ -131,16 +119,12 @@ impl Target {
 
     /// Whether this program has started the server.
     pub fn is_own(&self) -> bool {
-        self.child.is_some()
+        self.program.is_some()
     }
 
     /// A value of `/proc/PID/status` in bytes, of a server of this program's own.
     pub fn memory(&self, field: &str) -> Option<u64> {
-        let pid = self.child.as_ref()?.id();
-        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-        let line = status.lines().find_map(|line| line.strip_prefix(field));
-        let kib: u64 = line?.split_whitespace().next()?.parse().ok()?;
-        Some(kib << 10)
+        memory::of_process(self.program.as_ref()?.process_id(), field)
     }
 
     /// What the server used at most, against what it said, in words; and whether it kept to that.
@@ -152,16 +136,6 @@ impl Target {
             }
             // That of a server that runs elsewhere cannot be.
             _ => (!self.is_own(), "memory not measured".to_owned()),
-        }
-    }
-}
-
-impl Drop for Target {
-    fn drop(&mut self) {
-        if let Some(child) = &mut self.child {
-            // It may have ended by itself.
-            let _ = child.kill();
-            let _ = child.wait();
         }
     }
 }

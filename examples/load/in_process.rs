@@ -4,7 +4,7 @@ use bagtrack_ingest::Limits;
 use bagtrack_tracker::{Preset, Rect, Tracker};
 
 use crate::Outcome;
-use crate::process::cpu_seconds;
+use bagtrack_testing::cpu_time;
 
 /// The work of a frame without a service.
 pub struct InProcess {
@@ -47,8 +47,8 @@ impl InProcess {
 
     /// Seconds of processor time to decode and track a frame, over so many of them.
     pub fn seconds_a_frame(&mut self, frames: u32) -> Outcome<f64> {
-        let before = cpu_seconds(std::process::id())?;
+        let before = cpu_time::of_process(std::process::id());
         self.run(frames)?;
-        Ok((cpu_seconds(std::process::id())? - before) / f64::from(frames))
+        Ok((cpu_time::of_process(std::process::id()) - before) / f64::from(frames))
     }
 }

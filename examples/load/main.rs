@@ -31,7 +31,7 @@ use bagtrack_tracker::Preset;
 use clap::Parser;
 use drive::{Done, Driver};
 use in_process::InProcess;
-use process::{Server, cpu_seconds};
+use process::Server;
 use tokio::runtime::Runtime;
 
 /// Parts of a measurement.
@@ -115,7 +115,7 @@ fn main() -> Outcome<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
-    let driver = Driver::new(server.url(), pictures.clone(), target, preset);
+    let driver = Driver::new(&server.url(), pictures.clone(), target, preset);
     if options.memory {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
     }
@@ -180,10 +180,10 @@ impl Load {
             if sessions > 1 {
                 in_turns.push(self.several.seconds_a_frame(frames / 2)?);
             }
-            let before = cpu_seconds(self.server.pid())?;
+            let before = self.server.cpu_seconds();
             let run = clients.run(frames, rate, self.limit, &mut done);
             self.runtime.block_on(run)?;
-            used += cpu_seconds(self.server.pid())? - before;
+            used += self.server.cpu_seconds() - before;
         }
         self.runtime.block_on(clients.close())?;
         let sent = done.latencies.len();

@@ -1,40 +1,8 @@
 //! The curl session of docs/QUICKSTART.md, run as it is typed.
 
-use std::io::{BufRead, BufReader};
+use crate::program::Program;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-
-/// The service, ended with the test.
-struct Service {
-    process: Child,
-    url: String,
-}
-
-impl Service {
-    fn start() -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_bagtrack"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--log", "info"])
-            .env("NO_COLOR", "1")
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("cargo has built the binary");
-        let log = process.stderr.take().expect("it is piped");
-        let mut lines = BufReader::new(log).lines().map_while(Result::ok);
-        let url = lines
-            .find_map(|line| Some(line.split_once("listening on ")?.1.trim().to_owned()))
-            .expect("the service says where it listens");
-        // Keep reading, or the service would wait for room to log.
-        std::thread::spawn(move || lines.for_each(drop));
-        Self { process, url }
-    }
-}
-
-impl Drop for Service {
-    fn drop(&mut self) {
-        self.process.kill().expect("it is our own process");
-        self.process.wait().expect("it was killed");
-    }
-}
+use std::process::Command;
 
 /// The first shell block after the heading.
 fn block(text: &str, heading: &str) -> String {
@@ -57,7 +25,7 @@ fn the_whole_curl_session_works_as_typed() {
     let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/QUICKSTART.md");
     let document = std::fs::read_to_string(document).expect("the project has a quickstart");
     let session = block(&document, "## A whole session");
-    let service = Service::start();
+    let service = Program::start(&[], &[]);
     let folder = tempfile::tempdir().expect("the system has a place for temporary folders");
     // Only what differs from a user's machine: where the binary is, and the port; and errors end the script.
     let script = session
@@ -65,13 +33,13 @@ fn the_whole_curl_session_works_as_typed() {
             "bagtrack sample",
             &format!("{} sample", env!("CARGO_BIN_EXE_bagtrack")),
         )
-        .replace("http://127.0.0.1:8080", &service.url)
+        .replace("http://127.0.0.1:8080", &service.url(""))
         .replace(
             "curl ",
             "curl --silent --show-error --fail-with-body --write-out '\\n' ",
         );
     assert!(
-        script.contains(&service.url) && script.contains(env!("CARGO_BIN_EXE_bagtrack")),
+        script.contains(&service.url("")) && script.contains(env!("CARGO_BIN_EXE_bagtrack")),
         "{script}"
     );
     let output = Command::new("bash")

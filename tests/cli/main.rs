@@ -10,4 +10,4 @@ mod track_propagation;
 mod track_signals;
 mod track_video;
 
-use bagtrack_testing::command;
+use bagtrack_testing::{command, service::program};

@@ -1,57 +1,17 @@
 //! `bagtrack serve` beside the other commands: what it says at its start, and that it answers as `track` does.
 
 use crate::command::{clip, folder, succeeds, text};
+use crate::program::Program;
 use serde_json::Value;
 use std::fs;
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
 
-/// A running service, which ends with the test.
-struct Service {
-    process: Child,
-    /// The messages of the start.
-    messages: Vec<String>,
-}
-
-impl Drop for Service {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-impl Service {
-    /// Starts it, and reads its log up to the address for this machine, which is said last.
-    fn start(flags: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
-        command.arg("serve").args(flags).env("NO_COLOR", "1");
-        let mut process = command
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("cargo has built it");
-        let mut log = BufReader::new(process.stderr.take().expect("it is a pipe")).lines();
-        let mut messages = Vec::new();
-        loop {
-            let line = log.next().expect("it starts").expect("text");
-            let is_last = line.contains("in a browser");
-            messages.push(line);
-            if is_last {
-                break;
-            }
-        }
-        // What is not read is dropped.
-        std::thread::spawn(move || log.for_each(drop));
-        Self { process, messages }
-    }
-
-    /// The address in the message with these words before and after it.
-    fn address(&self, before: &str, after: &str) -> Option<String> {
-        self.messages.iter().find_map(|line| {
-            let (_, rest) = line.split_once(before)?;
-            let (address, _) = rest.split_once(after)?;
-            Some(address.to_owned())
-        })
-    }
+/// Starts it, and reads its log up to the address for this machine, which is said last: gives both.
+fn start(flags: &[&str]) -> (Program, String) {
+    let mut service = Program::start(flags, &[]);
+    let line = service.logs("in a browser");
+    let (_, rest) = line.split_once("open ").expect("it is said");
+    let (url, _) = rest.split_once(" in a browser").expect("it is said");
+    (service, url.to_owned())
 }
 
 fn page(url: &str) -> String {
@@ -63,31 +23,18 @@ fn page(url: &str) -> String {
 #[test]
 fn the_start_says_what_to_open_in_a_browser_and_the_page_is_there() {
     for format in ["text", "json"] {
-        let flags = ["--listen", "127.0.0.1:0", "--log-format", format];
-        let service = Service::start(&flags);
-        let url = service.address("open ", " in a browser");
-        let url = url.unwrap_or_else(|| panic!("{:?}", service.messages));
+        let (service, url) = start(&["--log-format", format]);
         assert!(url.starts_with("http://127.0.0.1:"), "{url}");
         assert!(page(&url).contains("<html"), "{url}");
-        let others = service
-            .messages
-            .iter()
-            .any(|line| line.contains("other machines"));
-        assert!(
-            !others,
-            "only this machine reaches it: {:?}",
-            service.messages
-        );
+        let said = service.said();
+        let others = said.iter().any(|line| line.contains("other machines"));
+        assert!(!others, "only this machine reaches it: {said:?}");
     }
 }
 
 #[test]
 fn the_address_has_the_base_path() {
-    let flags = ["--listen", "127.0.0.1:0", "--base-path", "/tracker"];
-    let service = Service::start(&flags);
-    let url = service
-        .address("open ", " in a browser")
-        .expect("it is said");
+    let (_service, url) = start(&["--base-path", "/tracker"]);
     assert!(url.ends_with("/tracker"), "{url}");
     assert!(page(&url).contains("<html"), "{url}");
 }
@@ -95,13 +42,10 @@ fn the_address_has_the_base_path() {
 /// Nobody can open http://0.0.0.0.
 #[test]
 fn for_all_interfaces_it_says_the_address_of_this_machine_in_its_network() {
-    let service = Service::start(&["--listen", "0.0.0.0:0", "--no-auth"]);
-    let here = service
-        .address("open ", " in a browser")
-        .expect("it is said");
+    let (service, here) = start(&["--listen", "0.0.0.0:0", "--no-auth"]);
     assert!(here.starts_with("http://127.0.0.1:"), "{here}");
     assert!(page(&here).contains("<html"), "{here}");
-    let mut elsewhere = service.messages.iter().filter_map(|line| {
+    let mut elsewhere = service.said().iter().filter_map(|line| {
         let (_, url) = line.split_once("on other machines, open ")?;
         Some(url)
     });
@@ -114,11 +58,9 @@ fn for_all_interfaces_it_says_the_address_of_this_machine_in_its_network() {
         .any(|name| url.contains(name));
     assert!(!is_here, "{url}");
     assert!(page(url).contains("<html"), "{url}");
-    let hint = service
-        .messages
-        .iter()
-        .any(|line| line.contains("camera to https only"));
-    assert!(hint, "{:?}", service.messages);
+    let mut said = service.said().iter();
+    let hint = said.any(|line| line.contains("camera to https only"));
+    assert!(hint, "{:?}", service.said());
 }
 
 #[test]
@@ -133,10 +75,7 @@ fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
         .lines()
         .map(|line| serde_json::from_str(line).expect("JSON"))
         .collect();
-    let service = Service::start(&["--listen", "127.0.0.1:0"]);
-    let url = service
-        .address("open ", " in a browser")
-        .expect("it is said");
+    let (_service, url) = start(&[]);
     let client = reqwest::blocking::Client::new();
     let post = |path: &str, index: usize| {
         let frame = fs::read(dir.join(format!("img/{index:04}.jpg"))).expect("it is there");

@@ -3,36 +3,25 @@
 
 use crate::application::BOX;
 use crate::pictures;
+use crate::program::{self, Program};
 use image::ImageFormat;
+use rustix::process::Signal;
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output};
 
 fn bagtrack() -> Command {
     Command::new(env!("CARGO_BIN_EXE_bagtrack"))
 }
 
-/// A running service and its address.
-fn serve() -> (Child, String) {
-    let mut command = bagtrack();
-    command.args(["serve", "--log-format", "json"]);
-    let mut child = command
-        .env("BAGTRACK_LISTEN", "127.0.0.1:0")
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
-    let url = loop {
-        let line = log.next().expect("it says where it listens").unwrap();
-        let line: serde_json::Value = serde_json::from_str(&line).unwrap();
-        let message = line["fields"]["message"].as_str().unwrap_or("").to_owned();
-        if let Some(url) = message.strip_prefix("listening on ") {
-            break url.to_owned();
-        }
-    };
-    // What is not read is dropped, and then said so; nobody needs to see that here.
-    std::thread::spawn(move || log.for_each(drop));
-    (child, url)
+/// The service, with a log in JSON.
+fn serve() -> Program {
+    Program::start(&["--log-format", "json"], &[])
+}
+
+/// The message of a line of the log.
+fn message(line: &str) -> String {
+    let line: Value = serde_json::from_str(line).unwrap();
+    line["fields"]["message"].as_str().unwrap_or("").to_owned()
 }
 
 fn health(url: &str) -> Output {
@@ -42,13 +31,13 @@ fn health(url: &str) -> Output {
 
 #[test]
 fn serves_answers_health_and_ends_on_sigterm() {
-    let (mut child, url) = serve();
+    let service = serve();
+    let url = service.url("");
     let healthy = health(&url);
-    let ended = Command::new("kill").arg(child.id().to_string()).status();
-    let status = child.wait().unwrap();
+    service.signal(Signal::TERM);
+    let (status, _) = service.ends();
     assert!(healthy.status.success(), "{healthy:?}");
-    assert!(ended.unwrap().success());
-    assert!(status.success(), "{status}");
+    assert_eq!(status, Some(0));
     let gone = health(&url);
     assert_eq!(gone.status.code(), Some(1));
     let line = String::from_utf8(gone.stderr).unwrap();
@@ -61,27 +50,16 @@ fn serves_answers_health_and_ends_on_sigterm() {
 
 #[test]
 fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
-    let mut command = bagtrack();
     // Probes are logged at this level.
-    let debug = ["serve", "--log-format", "json", "--log", "bagtrack=debug"];
-    command.args(debug);
-    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-    let log = BufReader::new(child.stderr.take().unwrap()).lines();
-    let mut messages = Vec::new();
-    for line in log {
-        let line: Value = serde_json::from_str(&line.unwrap()).unwrap();
-        let message = line["fields"]["message"].as_str().unwrap_or("").to_owned();
-        if let Some(url) = message.strip_prefix("listening on ") {
-            for _ in 0..3 {
-                assert!(health(url).status.success());
-            }
-            let ended = Command::new("kill").arg(child.id().to_string()).status();
-            assert!(ended.unwrap().success());
-        }
-        messages.push(message);
+    let flags = ["--log-format", "json", "--log", "bagtrack=debug"];
+    let service = Program::start(&flags, &[]);
+    for _ in 0..3 {
+        assert!(health(&service.url("")).status.success());
     }
-    assert!(child.wait().unwrap().success());
+    service.signal(Signal::TERM);
+    let (status, log) = service.ends();
+    assert_eq!(status, Some(0));
+    let messages: Vec<String> = log.iter().map(|line| message(line)).collect();
     let answered = messages.iter().filter(|message| *message == "answered");
     assert_eq!(answered.count(), 3, "{messages:?}");
     assert_eq!(messages.last().unwrap(), "bye");
@@ -89,8 +67,8 @@ fn every_request_has_its_line_in_the_log_when_the_service_has_ended() {
 
 #[tokio::test]
 async fn frames_one_by_one_get_the_answers_of_frames_together() {
-    let (mut child, url) = serve();
-    let client = reqwest::Client::new();
+    let service = serve();
+    let (client, url) = (reqwest::Client::new(), service.url(""));
     let jpeg = |t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg);
     let open = async || {
         let create = format!("{url}/sessions?box={BOX}&seed=7");
@@ -109,29 +87,18 @@ async fn frames_one_by_one_get_the_answers_of_frames_together() {
     }
     let all = client.post(&together).multipart(form).send().await.unwrap();
     let all: Value = all.json().await.unwrap();
-    child.kill().unwrap();
-    child.wait().unwrap();
     assert_eq!(all["answers"], Value::from(answers));
 }
 
 #[tokio::test]
 async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() {
     const REQUESTS: u64 = 3000;
-    let mut command = bagtrack();
-    command.args(["serve", "--log-format", "json"]);
-    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-    let mut log = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    log.read_line(&mut line).unwrap();
-    let started: Value = serde_json::from_str(&line).unwrap();
-    let message = started["fields"]["message"].as_str().unwrap();
-    let url = message.strip_prefix("listening on ").unwrap().to_owned();
+    let service = serve();
 
     // From here on the pipe is open and nobody reads it. Each of these requests has two lines in the log, together
     // many times what the pipe and the service keep.
     let client = reqwest::Client::new();
-    let nowhere = format!("{url}/nowhere");
+    let nowhere = service.url("/nowhere");
     let all = async {
         for _ in 0..REQUESTS / 10 {
             let ask = || async { client.get(&nowhere).send().await.unwrap().status() };
@@ -140,7 +107,7 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
         }
         assert!(
             client
-                .get(format!("{url}/healthz"))
+                .get(service.url("/healthz"))
                 .send()
                 .await
                 .unwrap()
@@ -149,21 +116,15 @@ async fn a_log_that_nobody_reads_stops_nothing_and_its_lost_lines_are_counted() 
         );
     };
     let answered = tokio::time::timeout(std::time::Duration::from_secs(60), all).await;
-    if answered.is_err() {
-        child.kill().unwrap();
-        panic!("requests wait for the log");
-    }
+    answered.expect("requests wait for the log");
 
-    let reader = std::thread::spawn(move || {
-        let lines = log
-            .lines()
-            .map(|line| serde_json::from_str(&line.unwrap()).unwrap());
-        lines.collect::<Vec<Value>>()
-    });
-    let ended = Command::new("kill").arg(child.id().to_string()).status();
-    assert!(ended.unwrap().success());
-    assert!(child.wait().unwrap().success());
-    let lines = reader.join().unwrap();
+    service.signal(Signal::TERM);
+    let (status, log) = service.ends();
+    assert_eq!(status, Some(0));
+    let lines: Vec<Value> = log
+        .iter()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     let dropped = lines
         .iter()
         .filter_map(|line| line["fields"]["total"].as_u64());
@@ -197,43 +158,22 @@ fn a_setting_before_the_command_is_refused_not_dropped() {
 
 #[test]
 fn too_few_open_files_are_said_at_the_start_and_the_service_answers() {
-    let mut command = Command::new("sh");
-    let script = format!(
-        "ulimit -n 128; exec {} serve --log-format json",
-        env!("CARGO_BIN_EXE_bagtrack")
-    );
-    command
-        .args(["-c", &script])
-        .env("BAGTRACK_LISTEN", "127.0.0.1:0");
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
-    let mut warned = None;
-    let url = loop {
-        let line: Value = serde_json::from_str(&log.next().unwrap().unwrap()).unwrap();
+    let mut command = program::serve_after("ulimit -n 128");
+    command.args(["--log-format", "json"]);
+    let mut service = Program::spawn(&mut command).unwrap();
+    let lines = service.said().iter();
+    let mut lines = lines.map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let warned = lines.rfind(|line| line["level"] == "WARN").map(|line| {
         let fields = &line["fields"];
-        if line["level"] == "WARN" {
-            warned = Some((fields["limit"].clone(), fields["connections"].clone()));
-        }
-        let message = fields["message"].as_str().unwrap_or("");
-        if let Some(url) = message.strip_prefix("listening on ") {
-            break url.to_owned();
-        }
-    };
-    let bound: Value = serde_json::from_str(&log.next().unwrap().unwrap()).unwrap();
-    std::thread::spawn(move || log.for_each(drop));
-    let address = url.strip_prefix("http://").unwrap();
+        (fields["limit"].clone(), fields["connections"].clone())
+    });
+    let bound = message(&service.logs(""));
     let silent: Vec<_> = (0..300)
-        .map_while(|_| std::net::TcpStream::connect(address).ok())
+        .map_while(|_| std::net::TcpStream::connect(service.address).ok())
         .collect();
-    let healthy = health(&url);
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let healthy = health(&service.url(""));
     assert_eq!(warned, Some((128.into(), 64.into())));
-    let message = bound["fields"]["message"].as_str().unwrap();
-    assert!(
-        message.starts_with("resident memory stays below "),
-        "{message}"
-    );
+    assert!(bound.starts_with("resident memory stays below "), "{bound}");
     assert_eq!(silent.len(), 300);
     assert!(healthy.status.success(), "{healthy:?}");
 }

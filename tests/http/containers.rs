@@ -1,10 +1,9 @@
 //! The limits of the containers in `docker/`, against what the program says that it takes with their settings.
 #![cfg(unix)]
 
-use serde_json::Value;
-use std::io::{BufRead, BufReader};
+use crate::program::Program;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// The text that stands between these two in a line that has the first.
 fn between<'a>(text: &'a str, before: &str, after: &str) -> &'a str {
@@ -31,22 +30,13 @@ fn settings(text: &str) -> Vec<(String, String)> {
 
 /// The resident memory in MiB that the program promises with these settings.
 fn promised(settings: &[(String, String)], workers: &str) -> u64 {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
-    command.args(["serve", "--log-format", "json"]);
-    command.env("BAGTRACK_LISTEN", "127.0.0.1:0");
-    command.env("BAGTRACK_WORKERS", workers);
-    command.envs(settings.iter().cloned());
-    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-    let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
-    let promised = log.find_map(|line| {
-        let line: Value = serde_json::from_str(&line.unwrap()).unwrap();
-        let message = line["fields"]["message"].as_str()?;
-        let rest = message.strip_prefix("resident memory stays below ")?;
-        rest.trim_end_matches(" MiB").parse().ok()
-    });
-    child.kill().unwrap();
-    child.wait().unwrap();
-    promised.expect("the start says it")
+    let variables = settings.iter().map(|(name, value)| (&**name, &**value));
+    let variables: Vec<_> = variables.chain([("BAGTRACK_WORKERS", workers)]).collect();
+    let mut program = Program::start(&[], &variables);
+    let line = program.logs("resident memory stays below ");
+    between(&line, "resident memory stays below ", " MiB")
+        .parse()
+        .unwrap()
 }
 
 /// The bytes of memory over which an alert is sent.

@@ -2,9 +2,10 @@
 
 use crate::application::BOX;
 use crate::pictures;
-use crate::process::Service;
+use crate::program::Program;
 use axum::body::Bytes;
 use axum::routing::post;
+use reqwest::Client;
 use rustix::process::Signal;
 use std::sync::{Arc, Mutex};
 use tokio::net::TcpListener;
@@ -16,7 +17,8 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|window| window == part)
 }
 
-#[tokio::test]
+// One thread waits for the end while another collects.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_span_of_a_request_is_exported_as_a_child_of_the_clients() {
     let received: Arc<Mutex<Vec<u8>>> = Arc::default();
     let keep = received.clone();
@@ -27,10 +29,10 @@ async fn the_span_of_a_request_is_exported_as_a_child_of_the_clients() {
     tokio::spawn(async move { axum::serve(listener, collector).await.unwrap() });
 
     let variables = [("OTEL_EXPORTER_OTLP_ENDPOINT", endpoint.as_str())];
-    let service = Service::start_in(&["--shutdown-delay", "0s"], &variables).await;
-    let url = service.url(&format!("/sessions?box={BOX}"));
+    let service = Program::start(&["--shutdown-delay", "0s"], &variables);
+    let (client, url) = (Client::new(), service.url(&format!("/sessions?box={BOX}")));
     let parent = format!("00-{TRACE:032x}-{PARENT:016x}-01");
-    let request = service.client.post(&url).header("traceparent", parent);
+    let request = client.post(&url).header("traceparent", parent);
     let answer = request.body(pictures::png(0)).send().await.unwrap();
     let answered = answer.headers()["traceparent"].to_str().unwrap().to_owned();
     assert!(
@@ -40,10 +42,10 @@ async fn the_span_of_a_request_is_exported_as_a_child_of_the_clients() {
     let span = u64::from_str_radix(&answered[36..52], 16).unwrap();
     // A client that does not record its trace decides for the service.
     let unrecorded = "00-aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa-00f067aa0ba902b7-00";
-    let request = service.client.post(&url).header("traceparent", unrecorded);
+    let request = client.post(&url).header("traceparent", unrecorded);
     request.body(pictures::png(0)).send().await.unwrap();
     service.signal(Signal::TERM);
-    assert_eq!(service.ends().await.0, Some(0));
+    assert_eq!(service.ends().0, Some(0));
 
     let received = received.lock().unwrap();
     assert!(contains(&received, &TRACE.to_be_bytes()), "the trace");

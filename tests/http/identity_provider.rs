@@ -2,12 +2,12 @@
 
 use crate::application::{TestApplication, expect, expect_problem};
 use crate::pictures;
-use crate::process::Service;
+use crate::program::Program;
 use crate::stream::problem_slug;
 use crate::stream_client::StreamClient;
 use bagtrack::http::{Config, Secret};
 use bagtrack_testing::issuer::{IssuerKey, key_set};
-use reqwest::{Method, StatusCode};
+use reqwest::{Client, Method, StatusCode};
 use rustix::process::Signal;
 use serde_json::json;
 use std::path::Path;
@@ -116,9 +116,9 @@ async fn the_program_reads_the_keys_of_the_issuer_again_on_a_hangup() {
         "--jwt-keys",
         keys,
     ];
-    let mut service = Service::start(&flags).await;
-    let status = async |service: &Service, token: &str| {
-        let request = service.client.get(service.url("/metrics"));
+    let mut service = Program::start(&flags, &[]);
+    let status = async |service: &Program, token: &str| {
+        let request = Client::new().get(service.url("/metrics"));
         request.bearer_auth(token).send().await.unwrap().status()
     };
     let (of_old, of_new) = (token(&old, "ann"), token(&new, "ann"));
@@ -126,7 +126,7 @@ async fn the_program_reads_the_keys_of_the_issuer_again_on_a_hangup() {
     write_keys(&new, &file);
     assert_eq!(status(&service, &of_new).await, StatusCode::UNAUTHORIZED);
     service.signal(Signal::HUP);
-    service.logs("keys of the issuer read again").await;
+    service.logs("keys of the issuer read again");
     assert_eq!(status(&service, &of_new).await, StatusCode::OK);
     assert_eq!(status(&service, &of_old).await, StatusCode::UNAUTHORIZED);
 }

@@ -2,8 +2,9 @@
 
 use crate::application::BOX;
 use crate::pictures;
-use crate::process::Service;
+use crate::program::Program;
 use image::ImageFormat;
+use reqwest::Client;
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -11,15 +12,13 @@ use serde_json::Value;
 async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
     for format in ["json", "text"] {
         let flags = ["--log-format", format, "--shutdown-delay", "0s"];
-        let service = Service::start(&flags).await;
+        let (service, client) = (Program::start(&flags, &[]), Client::new());
         let url = service.url(&format!("/sessions?box={BOX}"));
-        let created = service.client.post(url).body(pictures::png(0));
+        let created = client.post(url).body(pictures::png(0));
         let created: Value = created.send().await.unwrap().json().await.unwrap();
         let id = created["id"].as_str().unwrap();
         let trace = "4bf92f3577b34da6a3ce929d0e0e4736";
-        let request = service
-            .client
-            .post(service.url(&format!("/sessions/{id}/frames")));
+        let request = client.post(service.url(&format!("/sessions/{id}/frames")));
         let request = request
             .header("x-request-id", "the-request")
             .header("traceparent", format!("00-{trace}-00f067aa0ba902b7-01"));
@@ -28,25 +27,21 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
         let mut jpeg = pictures::encode(pictures::scene(1), ImageFormat::Jpeg);
         let start = jpeg.windows(2).position(|two| two == [0xFF, 0xC0]).unwrap();
         jpeg[start + 5..start + 7].fill(0);
-        let flat = service
-            .client
-            .post(service.url(&format!("/sessions/{id}/frames")));
+        let flat = client.post(service.url(&format!("/sessions/{id}/frames")));
         let flat = flat.body(jpeg).send().await.unwrap();
         assert_eq!(flat.status(), 422);
         // Ids that are written in other ways are served or not, and never logged in full.
         let encoded = format!("/sessions/%{:02x}{}", id.as_bytes()[0], &id[1..]);
         for path in [encoded, format!("/sessions/{id};x=1")] {
-            service.client.get(service.url(&path)).send().await.unwrap();
+            client.get(service.url(&path)).send().await.unwrap();
         }
         for path in ["/healthz", "/readyz", "/metrics"] {
-            service.client.get(service.url(path)).send().await.unwrap();
+            client.get(service.url(path)).send().await.unwrap();
         }
-        let deleted = service
-            .client
-            .delete(service.url(&format!("/sessions/{id}")));
+        let deleted = client.delete(service.url(&format!("/sessions/{id}")));
         deleted.send().await.unwrap();
         service.signal(Signal::TERM);
-        let (_, log) = service.ends().await;
+        let (_, log) = service.ends();
         let text = log.join("\n");
         assert!(!text.contains(&id[9..]), "{text}");
         assert!(
@@ -83,9 +78,9 @@ async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
         "--trusted-proxies",
         "127.0.0.0/8",
     ];
-    let service = Service::start(&flags).await;
+    let (service, client) = (Program::start(&flags, &[]), Client::new());
     let get = async |id: &str, key: &str| {
-        let request = service.client.get(service.url("/sessions/none"));
+        let request = client.get(service.url("/sessions/none"));
         let request = request.header("x-forwarded-for", "203.0.113.9");
         request
             .header("x-request-id", id)
@@ -97,7 +92,7 @@ async fn a_line_tells_the_client_and_the_name_of_its_key_but_not_the_key() {
     get("with-key", KEY).await;
     get("without", "another-key-of-somebody").await;
     service.signal(Signal::TERM);
-    let (_, log) = service.ends().await;
+    let (_, log) = service.ends();
     let of = |id: &str| {
         let mut lines = log.iter().filter(move |line| line.contains(id));
         let line = lines.find(|line| line.contains("answered"));

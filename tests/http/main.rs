@@ -62,4 +62,4 @@ mod uploads;
 mod version;
 mod videos;
 
-use bagtrack_testing::service::{application, pictures};
+use bagtrack_testing::service::{application, pictures, program};

@@ -1,6 +1,6 @@
 //! A fault of multer, and that forms are read without it. See docs/upstream/multer.md.
 
-use crate::process::Service;
+use crate::program::Program;
 use crate::raw::RawConnection;
 use axum::body::Bytes;
 use bagtrack_testing::cpu_time;
@@ -43,7 +43,7 @@ fn multer_alone_looks_through_all_that_it_has_for_each_piece() {
 }
 
 /// Seconds of the service's processor time for a form with a file of so many bytes, in pieces of four.
-async fn cost(service: &Service, bytes: usize) -> f64 {
+async fn cost(service: &Program, bytes: usize) -> f64 {
     let head = "POST /sessions?box=1,1,9,9 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
         Content-Type: multipart/form-data; boundary=b\r\nTransfer-Encoding: chunked\r\n\r\n";
     let part = b"--b\r\nContent-Disposition: form-data; name=\"frame\"; filename=\"a\"\r\n\r\n";
@@ -72,7 +72,7 @@ async fn cost(service: &Service, bytes: usize) -> f64 {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_form_in_pieces_of_four_bytes_takes_time_in_proportion_to_its_size() {
-    let service = Service::start(&[]).await;
+    let service = Program::start(&[], &[]);
     cost(&service, 64 << 10).await;
     let (short, long) = (
         cost(&service, 512 << 10).await,

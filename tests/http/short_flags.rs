@@ -3,19 +3,18 @@
 
 use crate::application::BOX;
 use crate::pictures;
-use crate::process::Service;
-use reqwest::StatusCode;
+use crate::program::Program;
+use reqwest::{Client, StatusCode};
 use serde_json::Value;
 use std::time::SystemTime;
 
 #[tokio::test]
 async fn a_host_name_and_bare_seconds_are_taken() {
-    let flags = ["--session-idle", "10", "--session-first", "10"];
-    let service = Service::start_at("localhost:0", &flags, &[]).await;
+    let times = ["--session-idle", "10", "--session-first", "10"];
+    let flags = [&["--listen", "localhost:0"], &times[..]].concat();
+    let service = Program::start(&flags, &[]);
     assert!(service.address.ip().is_loopback());
-    let request = service
-        .client
-        .post(service.url(&format!("/sessions?box={BOX}")));
+    let request = Client::new().post(service.url(&format!("/sessions?box={BOX}")));
     let created = request.body(pictures::png(0)).send().await.unwrap();
     assert_eq!(created.status(), StatusCode::CREATED);
     let created: Value = created.json().await.unwrap();

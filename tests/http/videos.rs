@@ -4,9 +4,9 @@ use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::lines::lines;
 use crate::pictures;
-use crate::process::Service;
+use crate::program::Program;
 use image::ImageFormat;
-use reqwest::{Method, Response};
+use reqwest::{Client, Method, Response};
 use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -350,20 +350,10 @@ async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbere
 #[cfg(target_os = "linux")]
 #[test]
 fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
-    use std::io::{BufRead, BufReader};
     let program = env!("CARGO_BIN_EXE_bagtrack");
-    let mut service = Command::new(program);
-    service.args(["serve", "--listen", "127.0.0.1:0"]);
-    let mut service = service.stderr(Stdio::piped()).spawn().unwrap();
-    let mut log = BufReader::new(service.stderr.take().unwrap()).lines();
-    let is_missing = log
-        .by_ref()
-        .map(Result::unwrap)
-        .take_while(|line| !line.contains("listening on"))
-        .any(|line| line.contains("Landlock or seccomp is not to be had"));
-    service.kill().unwrap();
-    service.wait().unwrap();
-    if is_missing {
+    let service = Program::start(&[], &[]);
+    let mut said = service.said().iter();
+    if said.any(|line| line.contains("Landlock or seccomp is not to be had")) {
         return eprintln!("left out: this kernel has no Landlock or no seccomp");
     }
     let run = |command: &[&str]| {
@@ -401,15 +391,13 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
 #[ignore = "needs ffmpeg"]
 async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
     for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
-        let service = Service::start(&["--ffmpeg", program]).await;
-        let create = service
-            .client
-            .post(service.url(&format!("/sessions?box={BOX}")));
+        let (service, client) = (Program::start(&["--ffmpeg", program], &[]), Client::new());
+        let create = client.post(service.url(&format!("/sessions?box={BOX}")));
         let created = create.body(pictures::png(0)).send().await.unwrap();
         let created = expect(created, reqwest::StatusCode::CREATED).await;
         let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
         // Its index is at the end, so the decoder goes back in it.
-        let post = service.client.post(service.url(&url)).body(video("mp4"));
+        let post = client.post(service.url(&url)).body(video("mp4"));
         let answer = post.send().await.unwrap();
         assert_eq!(answer.status(), status);
         if status == 200 {

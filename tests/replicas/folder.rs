@@ -3,18 +3,17 @@
 use crate::chaos::{Progress, SECRET, setting, undisturbed};
 use crate::clip::Clip;
 use crate::replica::Replica;
-use crate::server::{Process, free_port, wait_for};
 use crate::tracking_client::Track;
 use bagtrack_testing::command::program;
+use bagtrack_testing::service::program::{Program, serve_after};
 use reqwest::{Client, StatusCode};
 use rustix::fs::statvfs;
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use serde_json::Value;
 use std::fs::File;
 use std::io::Write;
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use tempfile::TempDir;
@@ -140,32 +139,19 @@ fn a_setting_that_names_no_store_is_refused() {
 }
 
 /// A process whose files may grow to a limit that can be moved. Writes above it fail as they do on a full disk.
-struct Limited {
-    process: Process,
-    address: SocketAddr,
-}
+struct Limited(Program);
 
 impl Limited {
     fn start(store: &str) -> Self {
-        let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
-        let mut command = Command::new("sh");
         // A signal that is ignored stays so, and the write returns an error.
-        command.args(["-c", "trap '' XFSZ; exec \"$@\"", "sh"]);
-        command
-            .arg(program("bagtrack"))
-            .args(["serve", "--log", "warn", "--workers", "2"]);
-        command
-            .args(["--listen", &address.to_string(), "--store", store])
-            .args(SECRET);
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        let mut process = Process(command.spawn().expect("there is a shell"));
-        wait_for(address, &mut process.0);
-        Self { process, address }
+        let mut command = serve_after("trap '' XFSZ");
+        command.args(["--workers", "2", "--store", store]);
+        Self(Program::spawn(command.args(SECRET)).expect("there is a shell"))
     }
 
     /// None is no limit.
     fn limit(&self, bytes: Option<u64>) {
-        let pid = Pid::from_raw(i32::try_from(self.process.0.id()).unwrap());
+        let pid = Pid::from_raw(i32::try_from(self.0.process_id()).unwrap());
         let limit = Rlimit {
             current: bytes,
             maximum: None,
@@ -174,26 +160,22 @@ impl Limited {
     }
 
     async fn readiness(&self) -> StatusCode {
-        let answer = reqwest::get(format!("http://{}/readyz", self.address)).await;
+        let answer = reqwest::get(self.0.url("/readyz")).await;
         answer.expect("it listens").status()
     }
 }
 
 /// A process whose store is on a disk of its own, in memory, which nobody else sees.
-fn on_a_disk_of(megabytes: usize, folder: &Path) -> (Process, SocketAddr) {
-    let address = SocketAddr::from(([127, 0, 0, 1], free_port()));
+fn on_a_disk_of(megabytes: usize, folder: &Path) -> Program {
     let mut command = Command::new("unshare");
     command.args(["--map-root-user", "--mount", "sh", "-c"]);
     command.arg("mount -t tmpfs -o size=$1m none \"$2\" && shift 2 && exec \"$@\"");
     command.args(["sh", &megabytes.to_string()]).arg(folder);
     command.arg(program("bagtrack"));
-    command.args(["serve", "--log", "warn", "--listen", &address.to_string()]);
+    command.args(["serve", "--listen", "127.0.0.1:0"]);
     let store = format!("file:{}", folder.join("sessions").display());
     command.args(["--store", &store]).args(SECRET);
-    command.stdout(Stdio::null());
-    let mut process = Process(command.spawn().expect("there is unshare"));
-    wait_for(address, &mut process.0);
-    (process, address)
+    Program::spawn(&mut command).expect("there is unshare")
 }
 
 #[tokio::test]
@@ -201,11 +183,11 @@ fn on_a_disk_of(megabytes: usize, folder: &Path) -> (Process, SocketAddr) {
 async fn on_a_nearly_full_disk_sessions_are_refused_and_frames_are_taken() {
     let clip = Clip::of(0, 8);
     let folder = tempfile::tempdir().expect("a folder");
-    let (process, address) = on_a_disk_of(256, folder.path());
-    let base = format!("http://{address}");
+    let process = on_a_disk_of(256, folder.path());
+    let base = process.url("");
     let mut track = Track::open(base.clone(), Client::new(), 0, clip.clone()).await;
     // The disk, as the process sees it.
-    let disk = PathBuf::from(format!("/proc/{}/root", process.0.id()));
+    let disk = PathBuf::from(format!("/proc/{}/root", process.process_id()));
     let disk = disk.join(folder.path().strip_prefix("/").unwrap());
     let mut filler = File::create(disk.join("filler")).unwrap();
     let is_nearly_full = || {
@@ -255,7 +237,7 @@ async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
     let (answers, state) = undisturbed(std::slice::from_ref(&clip)).await.remove(0);
     let (folder, store) = folder();
     let replica = Limited::start(&store);
-    let base = format!("http://{}", replica.address);
+    let base = replica.0.url("");
     let mut track = Track::open(base, Client::new(), 0, clip.clone()).await;
     for full in [5, 10, 15] {
         while track.answers.len() < full {
@@ -263,7 +245,7 @@ async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
         }
         // One more may fit.
         replica.limit(Some(journal_bytes(&folder) + (48 << 10)));
-        let url = format!("http://{}/sessions/{}/frames", replica.address, track.id());
+        let url = replica.0.url(&format!("/sessions/{}/frames", track.id()));
         let mut refused = None;
         for number in full + 1.. {
             let request = Client::new().post(format!("{url}?frame={number}"));

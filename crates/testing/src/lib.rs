@@ -8,6 +8,7 @@
 //! | [`textbook`] | sections III-B and III-D of the paper as printed: the oracle of the tracker's evaluation |
 //! | [`picture_files`] | JPEG, PNG and WebP files of many forms |
 //! | [`cpu_time`] | times of actions in turns, in processor time of the thread |
+//! | [`memory`] | memory of processes |
 //! | [`issuer`] | an issuer of JSON Web Tokens |
 //! | [`tiny_network`] | a network for the tracker's second opinion, as ONNX files |
 //! | [`command`] | the programs of the workspace, run in folders that go away |
@@ -19,6 +20,7 @@ pub mod command;
 pub mod cpu_time;
 #[cfg(feature = "issuer")]
 pub mod issuer;
+pub mod memory;
 pub mod picture_files;
 pub mod scene;
 #[cfg(feature = "service")]

@@ -1,6 +1,6 @@
 //! Certificates that openssl makes as docs/HTTPS.md says, and curl as the client.
 
-use super::program::Program;
+use super::program::serve;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -55,7 +55,7 @@ async fn the_certificates_of_openssl_serve_curl_whatever_their_key_is() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let (certificate, private) = make(folder.path(), key);
-        let program = Program::start(&certificate, &private).await;
+        let program = serve(&certificate, &private);
         let url = format!("https://localhost:{}", program.address.port());
         let frame = |number: usize| format!("@{}/img/000{number}.jpg", sample.display());
         let session = format!("{url}/sessions/67e55044-10b1-426f-9247-bb680e5fe0c8");

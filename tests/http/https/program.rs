@@ -2,63 +2,26 @@
 
 use super::certificates::{Authority, Files, kinds};
 use super::client::{Client, PATIENCE, trusting};
-use rustix::process::{Pid, Signal, kill_process};
-use std::net::SocketAddr;
+use crate::program::{self, Program};
+use rustix::process::Signal;
 use std::path::Path;
-use std::process::{Output, Stdio};
-use tokio::io::{AsyncBufReadExt, BufReader, Lines};
-use tokio::process::{Child, ChildStderr, Command};
+use std::process::Output;
+use tokio::process::Command;
 use tokio::time::timeout;
 
-/// `bagtrack serve` on a free port.
-pub struct Program {
-    process: Child,
-    log: Lines<BufReader<ChildStderr>>,
-    pub address: SocketAddr,
-}
-
-fn serve(certificate: &Path, key: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
-    command.args(["serve", "--listen", "127.0.0.1:0", "--shutdown-delay", "0s"]);
+fn command(certificate: &Path, key: &Path) -> std::process::Command {
+    let mut command = program::serve(env!("CARGO_BIN_EXE_bagtrack").as_ref());
+    command.args(["--shutdown-delay", "0s"]);
     command.arg("--tls-cert").arg(certificate);
     command.arg("--tls-key").arg(key);
-    command.env("NO_COLOR", "1");
-    command.stderr(Stdio::piped()).kill_on_drop(true);
     command
 }
 
-impl Program {
-    pub async fn start(certificate: &Path, key: &Path) -> Self {
-        let mut process = serve(certificate, key).spawn().expect("cargo has built it");
-        let log = BufReader::new(process.stderr.take().unwrap()).lines();
-        let mut program = Self {
-            process,
-            log,
-            address: "0.0.0.0:0".parse().unwrap(),
-        };
-        let line = program.logs("listening on ").await;
-        let (_, address) = line.split_once("listening on https://").expect("https");
-        let address = address.split_whitespace().next().unwrap();
-        program.address = address.parse().unwrap();
-        program
-    }
-
-    fn signal(&self, signal: Signal) {
-        let id = i32::try_from(self.process.id().expect("it runs")).unwrap();
-        kill_process(Pid::from_raw(id).unwrap(), signal).unwrap();
-    }
-
-    async fn logs(&mut self, text: &str) -> String {
-        let found = async {
-            loop {
-                let line = self.log.next_line().await.unwrap().expect(text);
-                if line.contains(text) {
-                    return line;
-                }
-            }
-        };
-        timeout(PATIENCE, found).await.expect(text)
-    }
+/// `bagtrack serve` with this certificate.
+pub fn serve(certificate: &Path, key: &Path) -> Program {
+    let program = Program::spawn(&mut command(certificate, key)).unwrap();
+    assert!(program.url("").starts_with("https://"));
+    program
 }
 
 /// The certificate of the service, as a new client gets it.
@@ -74,14 +37,14 @@ async fn shown(authority: &Authority, program: &Program) -> Vec<u8> {
 async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     let authority = Authority::new();
     let files = authority.issue(kinds()[0].1);
-    let mut program = Program::start(&files.certificate(), &files.key()).await;
+    let mut program = serve(&files.certificate(), &files.key());
     let first = shown(&authority, &program).await;
     let connector = trusting(&authority.root, &[]);
     let mut old = Client::open(&connector, program.address).await;
 
     authority.issue_into(&files, kinds()[2].1);
     program.signal(Signal::HUP);
-    program.logs("certificate read again").await;
+    program.logs("certificate read again");
     let second = shown(&authority, &program).await;
     assert_ne!(first, second);
     assert_eq!(old.call("GET", "/healthz", b"").await.status(), "200");
@@ -90,7 +53,7 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     let other = authority.issue(kinds()[0].1);
     std::fs::copy(other.certificate(), files.certificate()).unwrap();
     program.signal(Signal::HUP);
-    let line = program.logs("the certificate stays as it was").await;
+    let line = program.logs("the certificate stays as it was");
     assert!(line.contains("--tls-key"), "{line}");
     assert_eq!(shown(&authority, &program).await, second);
 }
@@ -98,7 +61,7 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
 #[tokio::test]
 async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
     let files = Authority::new().issue(kinds()[0].1);
-    let program = Program::start(&files.certificate(), &files.key()).await;
+    let program = serve(&files.certificate(), &files.key());
     let listen = program.address.to_string();
     let health = async |arguments: &[&str], variables: &[(&str, &str)]| -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
@@ -129,7 +92,8 @@ async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
 
 /// What the program says when it does not start.
 async fn refused(certificate: &Path, key: &Path) -> String {
-    let output = timeout(PATIENCE, serve(certificate, key).output()).await;
+    let mut command = Command::from(command(certificate, key));
+    let output = timeout(PATIENCE, command.kill_on_drop(true).output()).await;
     let output = output.expect("it ends").unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     String::from_utf8(output.stderr).unwrap()

@@ -3,5 +3,6 @@
 pub mod application;
 pub mod lossy;
 pub mod pictures;
+pub mod program;
 pub mod replica;
 pub mod server;

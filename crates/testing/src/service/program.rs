@@ -1,0 +1,195 @@
+//! `bagtrack serve` as a process, whose log tells its address.
+
+use super::server::Process;
+use crate::command::program;
+use rustix::process::Signal;
+use std::convert::Infallible;
+use std::io::{self, BufRead, BufReader};
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::{ChildStderr, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// Longer than any test waits for something that does happen.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// `bagtrack serve` on a free port; it ends with this value.
+///
+/// A line of its log is read when somebody waits for it. The others stay in the pipe, as if nobody read it: then the
+/// service drops what has no room.
+pub struct Program {
+    process: Process,
+    log: Log,
+    said: Vec<String>,
+    url: String,
+    pub address: SocketAddr,
+}
+
+impl Program {
+    /// With these flags and variables.
+    pub fn start(flags: &[&str], variables: &[(&str, &str)]) -> Self {
+        let mut command = serve(&program("bagtrack"));
+        command.args(flags).envs(variables.iter().copied());
+        Self::spawn(&mut command).unwrap_or_else(|error| panic!("{command:?}: {error}"))
+    }
+
+    /// By a command that becomes the program, such as one of [`serve`].
+    ///
+    /// # Errors
+    /// It is not there, or ends before it listens.
+    pub fn spawn(command: &mut Command) -> io::Result<Self> {
+        let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut process = Process(command.spawn()?);
+        let mut log = Log::of(process.0.stderr.take().expect("it is a pipe"));
+        let mut said = Vec::new();
+        let told = "listening on ";
+        let Some(line) = log.until(told, &mut said) else {
+            let ended = format!("it ends before it listens: {said:?}");
+            return Err(io::Error::other(ended));
+        };
+        let (_, url) = line.split_once(told).expect("the line has it");
+        // A line of JSON goes on behind it.
+        let url = url.split(['"', ' ']).next().expect("a first part");
+        let (_, address) = url.split_once("://").expect("an address has a scheme");
+        Ok(Self {
+            process,
+            log,
+            said,
+            url: url.to_owned(),
+            address: address.parse().expect("an address with a port"),
+        })
+    }
+
+    /// The URL of this path, which may be empty.
+    pub fn url(&self, path: &str) -> String {
+        format!("{}{path}", self.url)
+    }
+
+    pub fn process_id(&self) -> u32 {
+        self.process.0.id()
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        self.process.signal(signal);
+    }
+
+    /// The lines of its log that have been waited for, and those before them.
+    pub fn said(&self) -> &[String] {
+        &self.said
+    }
+
+    /// The next line of the log with this text.
+    pub fn logs(&mut self, text: &str) -> String {
+        let line = self.log.until(text, &mut self.said);
+        line.unwrap_or_else(|| panic!("the log ends without {text}: {:?}", self.said))
+    }
+
+    /// The rest of the log is read, and dropped.
+    pub fn ignore_log(&mut self) {
+        self.log.lines = None;
+    }
+
+    /// Nobody reads the log any more, also where it was ignored. Its pipe stays open.
+    pub fn stall_log(&self) {
+        self.log.is_stalled.store(true, Ordering::Relaxed);
+    }
+
+    /// Waits until it has ended; the exit status, and the rest of the log.
+    pub fn ends(mut self) -> (Option<i32>, Vec<String>) {
+        let mut rest = Vec::new();
+        while let Some(line) = self.log.next() {
+            rest.push(line);
+        }
+        // The log ends with the process.
+        let status = self.process.0.wait().expect("it was started");
+        (status.code(), rest)
+    }
+}
+
+/// The command that starts a program on a free port, with a log without colours.
+pub fn serve(program: &Path) -> Command {
+    let mut command = Command::new(program);
+    set_up(&mut command);
+    command
+}
+
+/// The same for this workspace's program, after what a shell does before in the same process.
+pub fn serve_after(preparation: &str) -> Command {
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("{preparation}; exec \"$0\" \"$@\"")]);
+    command.arg(program("bagtrack"));
+    set_up(&mut command);
+    command
+}
+
+fn set_up(command: &mut Command) {
+    // A flag may name another address.
+    command.arg("serve").env("BAGTRACK_LISTEN", "127.0.0.1:0");
+    command.env("NO_COLOR", "1");
+}
+
+/// The log of a process, read by a thread: a pipe has no time limit.
+struct Log {
+    /// None where it is ignored. A line is read when the one before it has been taken. Nobody waits for the lock, which
+    /// lets threads share a program.
+    lines: Option<Mutex<Receiver<String>>>,
+    is_stalled: Arc<AtomicBool>,
+    /// Keeps the pipe of a stalled log open.
+    _open: Sender<Infallible>,
+}
+
+impl Log {
+    fn of(pipe: ChildStderr) -> Self {
+        let (sender, lines) = sync_channel(0);
+        let (open, closed) = channel();
+        let is_stalled = Arc::new(AtomicBool::new(false));
+        let stalled = is_stalled.clone();
+        std::thread::spawn(move || read(pipe, &sender, &stalled, &closed));
+        Self {
+            lines: Some(Mutex::new(lines)),
+            is_stalled,
+            _open: open,
+        }
+    }
+
+    /// The next line; none at the end.
+    fn next(&mut self) -> Option<String> {
+        let lines = self.lines.as_mut().expect("it is not ignored");
+        let lines = lines.get_mut().expect("nobody has locked it");
+        match lines.recv_timeout(PATIENCE) {
+            Ok(line) => Some(line),
+            Err(RecvTimeoutError::Disconnected) => None,
+            Err(RecvTimeoutError::Timeout) => panic!("the log says nothing for a minute"),
+        }
+    }
+
+    /// The next line with this text; it and those before it are added to `said`.
+    fn until(&mut self, text: &str, said: &mut Vec<String>) -> Option<String> {
+        loop {
+            let line = self.next()?;
+            said.push(line.clone());
+            if line.contains(text) {
+                return Some(line);
+            }
+        }
+    }
+}
+
+fn read(
+    pipe: ChildStderr,
+    lines: &SyncSender<String>,
+    is_stalled: &AtomicBool,
+    closed: &Receiver<Infallible>,
+) {
+    for line in BufReader::new(pipe).lines() {
+        // Where nobody takes it, it is dropped.
+        let _ = lines.send(line.expect("the log is text"));
+        if is_stalled.load(Ordering::Relaxed) {
+            let _ = closed.recv();
+            return;
+        }
+    }
+}
