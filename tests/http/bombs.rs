@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::metrics::readiness;
 use crate::pictures;
+use bagtrack_testing::within::within;
 use image::{GrayImage, ImageFormat, Luma};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode};
@@ -105,9 +106,7 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     drop(client);
     let ask = || app.post_frame(&id, pictures::png(1));
     let freed = async { while ask().await.status() != StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), freed)
-        .await
-        .unwrap();
+    within(freed, "the place is free again").await;
     let view = expect(app.get(&session).await, StatusCode::OK).await;
     assert_eq!(view["frames"], 1, "what was done is undone");
 }

@@ -5,6 +5,7 @@ use crate::metrics::{metrics, readiness, value};
 use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
+use bagtrack_testing::within::within;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
 use std::time::Duration;
@@ -84,9 +85,7 @@ async fn an_address_has_a_share_of_the_connections_and_what_ends_before_a_handle
             }
         }
     };
-    let refused = tokio::time::timeout(Duration::from_secs(60), counted)
-        .await
-        .unwrap();
+    let refused = within(counted, "the count is told").await;
     assert!(refused >= 1.0, "{refused}");
 }
 

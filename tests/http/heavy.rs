@@ -3,11 +3,11 @@
 use crate::application::{BOX, TestApplication};
 use crate::pictures;
 use crate::raw::RawConnection;
+use bagtrack_testing::within::within;
 use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, RequestBuilder, StatusCode};
 use std::io::Cursor;
-use std::time::Duration;
 use tokio::task::JoinSet;
 
 /// Frames of one request that take the worker some seconds.
@@ -62,9 +62,7 @@ pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
         while let Ok(_answered) = client.post(&url).multipart(form(FRAMES)).send().await {}
     });
     let full = async { while app.get(&format!("{session}/snapshot")).await.status() != 503 {} };
-    tokio::time::timeout(Duration::from_secs(60), full)
-        .await
-        .unwrap();
+    within(full, "the queue is full").await;
     busy
 }
 

@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect};
 use crate::heavy;
 use crate::pictures;
 use crate::raw::RawConnection;
+use bagtrack_testing::within::within;
 use futures_util::future::join_all;
 use reqwest::StatusCode;
 use std::time::Duration;
@@ -30,9 +31,7 @@ async fn clients_that_never_read_lose_their_connections() {
         expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
     };
     let both = async { tokio::join!(refused, other) };
-    tokio::time::timeout(Duration::from_secs(60), both)
-        .await
-        .expect("the connections end");
+    within(both, "the connections end").await;
     expect(app.get("/healthz").await, StatusCode::OK).await;
 }
 
@@ -47,8 +46,7 @@ async fn a_client_that_reads_too_slowly_loses_its_connection() {
     let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(20_000);
     // It reads some bytes of each answer, and never as much as would have been sent meanwhile.
     let trickle = connection.trickle(ask, 64 << 10, Duration::from_millis(20));
-    let ended = tokio::time::timeout(Duration::from_secs(60), trickle).await;
-    let read = ended.expect("the connection ends");
+    let read = within(trickle, "the connection ends").await;
     assert!(
         read > 1 << 20,
         "it was ended for reading nothing: {read} bytes"

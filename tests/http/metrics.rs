@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
 use bagtrack::http::Secret;
+use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
 use std::collections::BTreeSet;
 use std::path::Path;

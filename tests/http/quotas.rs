@@ -4,6 +4,7 @@ use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
 use bagtrack::http::Config;
+use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -162,9 +163,7 @@ async fn what_is_left_of_the_frames_comes_back_and_is_told_by_every_call() {
             }
         }
     };
-    tokio::time::timeout(std::time::Duration::from_secs(60), full)
-        .await
-        .expect("the frames come back");
+    within(full, "the frames come back").await;
     let refused = app.request(Method::POST, "/track", &[]).send().await;
     assert!(refused.unwrap().headers().contains_key("ratelimit"));
 }

@@ -1,13 +1,10 @@
 //! A client that speaks HTTP by hand, to send slowly or not at all.
 
+use bagtrack_testing::within::within;
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
-use tokio::time::timeout;
-
-/// Longer than any test waits for something that does happen.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct RawConnection {
     stream: TcpStream,
@@ -65,7 +62,7 @@ impl RawConnection {
     pub async fn read_some(&mut self) -> String {
         let mut bytes = Vec::new();
         let read = self.stream.read_buf(&mut bytes);
-        let _ = timeout(PATIENCE, read).await.expect("something comes");
+        let _ = within(read, "something comes").await;
         String::from_utf8(bytes).unwrap()
     }
 
@@ -92,7 +89,7 @@ impl RawConnection {
         let expected = b"HTTP/1.1 100 Continue\r\n\r\n";
         let mut got = [0; 25];
         let read = connection.stream.read_exact(&mut got);
-        timeout(PATIENCE, read).await.unwrap().unwrap();
+        within(read, "the body is asked for").await.unwrap();
         assert_eq!(&got, expected);
         connection
     }
@@ -111,7 +108,7 @@ impl RawConnection {
                 }
             }
             let read = self.stream.read_buf(&mut bytes);
-            let read = timeout(PATIENCE, read).await.expect("an answer comes");
+            let read = within(read, "an answer comes").await;
             assert_ne!(read.unwrap(), 0, "it ended early: {bytes:?}");
         }
     }
@@ -121,7 +118,7 @@ impl RawConnection {
         let mut bytes = Vec::new();
         let read = self.stream.read_to_end(&mut bytes);
         // A connection that is cut off counts as closed.
-        let _ = timeout(PATIENCE, read).await.expect("the connection ends");
+        let _ = within(read, "the connection ends").await;
         String::from_utf8(bytes).unwrap()
     }
 }

@@ -7,6 +7,7 @@ use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::Config;
+use bagtrack_testing::within::within;
 use image::{GrayImage, ImageFormat, Luma};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use std::net::IpAddr;
@@ -176,9 +177,7 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
         }
         drop(held);
         let freed = async { while upload_bytes(&app).await > 0 {} };
-        tokio::time::timeout(Duration::from_secs(60), freed)
-            .await
-            .expect("all is given back");
+        within(freed, "all is given back").await;
     }
 }
 
@@ -231,9 +230,7 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     }
     // All of them would take 8 MB.
     let held = async { while upload_bytes(&app).await < UPLOADS / 2 - HELD / 2 {} };
-    tokio::time::timeout(Duration::from_secs(60), held)
-        .await
-        .expect("the messages are charged");
+    within(held, "the messages are charged").await;
     let mut picture = pictures::png(0);
     picture.resize(HELD, 0);
     let request = request_as(&app, MODEST, "/sessions", &[("box", BOX)]);
@@ -258,9 +255,7 @@ async fn half_messages_of_one_network_leave_memory_to_others_and_end_at_their_de
     );
     assert!(took < Duration::from_secs(30), "{took:?}");
     let freed = async { while upload_bytes(&app).await > 0 {} };
-    tokio::time::timeout(Duration::from_secs(60), freed)
-        .await
-        .expect("all is given back");
+    within(freed, "all is given back").await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -280,9 +275,7 @@ async fn clients_that_fill_the_queue_leave_a_place_to_one_that_has_none() {
     }
     let inside =
         async { while value(&metrics(&app).await, "bagtrack_requests_inside", &[]) < 4.0 {} };
-    tokio::time::timeout(Duration::from_secs(60), inside)
-        .await
-        .expect("they take all places");
+    within(inside, "they take all places").await;
     for t in 1..=3 {
         let post = request_as(&app, MODEST, &format!("/sessions/{id}/frames"), &[]);
         let answer = post.body(pictures::png(t)).send().await.unwrap();
@@ -350,9 +343,7 @@ async fn posts_of_two_frames_do_not_wait_until_the_long_posts_of_another_client_
             .all(|line| line != "bagtrack_workers_busy 1")
         {}
     };
-    tokio::time::timeout(Duration::from_secs(60), busy)
-        .await
-        .expect("they begin");
+    within(busy, "they begin").await;
     for _ in 0..3 {
         let post = heavy::post(&app, &format!("/sessions/{id}"), 2);
         let answer = post.header("x-forwarded-for", MODEST).send().await.unwrap();

@@ -1,20 +1,16 @@
 //! A client of a session's stream.
 
 use crate::application::TestApplication;
+use bagtrack_testing::within::within;
 use futures_util::{SinkExt, StreamExt};
 use serde_json::Value;
 use std::net::SocketAddr;
-use std::time::Duration;
 use tokio::net::TcpStream;
-use tokio::time::timeout;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::client_async;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::http::Response;
 use tokio_tungstenite::tungstenite::{Error, Message};
-
-/// Longer than any test waits for something that does happen.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct StreamClient {
     socket: WebSocketStream<TcpStream>,
@@ -86,8 +82,7 @@ impl StreamClient {
     /// What comes next; pings are answered on the way.
     pub async fn receive(&mut self) -> Received {
         loop {
-            let next = timeout(PATIENCE, self.socket.next()).await;
-            match next.expect("something comes") {
+            match within(self.socket.next(), "something comes").await {
                 Some(Ok(Message::Text(text))) => {
                     return Received::Message(serde_json::from_str(&text).unwrap());
                 }
@@ -113,8 +108,8 @@ impl StreamClient {
         use tokio::io::AsyncReadExt;
         let mut stream = self.socket.into_inner();
         let mut bytes = Vec::new();
-        let end = timeout(PATIENCE, stream.read_to_end(&mut bytes)).await;
-        let _ = end.expect("the service closes the connection");
+        let end = stream.read_to_end(&mut bytes);
+        let _ = within(end, "the service closes the connection").await;
         bytes
     }
 

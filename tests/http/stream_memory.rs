@@ -3,6 +3,7 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
 use crate::stream_client::{Received, StreamClient};
+use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
 use std::time::Duration;
 
@@ -53,9 +54,7 @@ async fn a_part_of_a_message_is_charged_until_its_stream_ends() {
     expect(post().await, StatusCode::OK).await;
     stream.send_raw(&[0; 99_000]).await;
     let full = async { while post().await.status() == StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), full)
-        .await
-        .expect("what has arrived is counted");
+    within(full, "what has arrived is counted").await;
     expect_problem(post().await, "quota-exceeded").await;
     // The rest of the message comes, and is answered.
     stream.send_raw(&[0; 1000]).await;
@@ -73,9 +72,7 @@ async fn a_message_waits_until_there_is_memory_for_it() {
     first.send_raw(&HEAD).await;
     first.send_raw(&[0; 99_000]).await;
     let taken = async { while app.post_frame(&id, vec![1; 140_000]).await.status() != 429 {} };
-    tokio::time::timeout(Duration::from_secs(60), taken)
-        .await
-        .expect("what has arrived is counted");
+    within(taken, "what has arrived is counted").await;
     second.send(vec![0; 90_000]).await;
     drop(first);
     let answer = second.message().await;

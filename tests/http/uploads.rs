@@ -4,6 +4,7 @@ use crate::application::{TestApplication, expect, expect_problem};
 use crate::connections::expect_body_timeouts;
 use crate::pictures;
 use crate::raw::RawConnection;
+use bagtrack_testing::within::within;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use reqwest::{Method, StatusCode};
@@ -53,15 +54,11 @@ async fn the_bodies_of_all_requests_together_are_bounded_by_what_has_arrived() {
     held.send([7; 48_000]).await;
     more.send([7; 48_000]).await;
     let full = async { while post().await.status() == StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), full)
-        .await
-        .expect("what has arrived is counted");
+    within(full, "what has arrived is counted").await;
     expect_problem(post().await, "queue-full").await;
     drop((held, more));
     let freed = async { while post().await.status() != StatusCode::OK {} };
-    tokio::time::timeout(Duration::from_secs(60), freed)
-        .await
-        .expect("what has gone is not");
+    within(freed, "what has gone is not").await;
 }
 
 #[tokio::test]

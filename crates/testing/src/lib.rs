@@ -13,6 +13,7 @@
 //! | [`tiny_network`] | a network for the tracker's second opinion, as ONNX files |
 //! | [`command`] | the programs of the workspace, run in folders that go away |
 //! | [`service`] | services under test: in the process, as processes, behind a line that breaks |
+//! | [`within`] | waiting for what does happen, unless what is tested is broken |
 
 pub mod bench_pictures;
 pub mod bench_scene;
@@ -27,3 +28,5 @@ pub mod scene;
 pub mod service;
 pub mod textbook;
 pub mod tiny_network;
+#[cfg(feature = "service")]
+pub mod within;

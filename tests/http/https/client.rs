@@ -1,20 +1,16 @@
 //! A client that speaks HTTP over TLS by hand.
 
+use bagtrack_testing::within::within;
 use rustls::pki_types::{CertificateDer, ServerName};
 use rustls::{ClientConfig, RootCertStore, crypto::ring};
 use serde_json::Value;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
-use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
-
-/// Longer than any test waits for something that does happen.
-pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// What connects with a service whose certificate this root has signed, and offers these protocols.
 pub fn trusting(root: &CertificateDer<'static>, protocols: &[&str]) -> TlsConnector {
@@ -61,8 +57,8 @@ impl Client<TlsStream<TcpStream>> {
     pub async fn try_open(connector: &TlsConnector, address: SocketAddr) -> io::Result<Self> {
         let stream = TcpStream::connect(address).await?;
         let name = ServerName::try_from("localhost").unwrap();
-        let connected = timeout(PATIENCE, connector.connect(name, stream)).await;
-        connected.expect("the handshake ends").map(Self)
+        let connected = within(connector.connect(name, stream), "the handshake ends");
+        connected.await.map(Self)
     }
 
     pub async fn open(connector: &TlsConnector, address: SocketAddr) -> Self {
@@ -80,7 +76,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
         self.0.write_all(head.as_bytes()).await.unwrap();
         self.0.write_all(body).await.unwrap();
         self.0.flush().await.unwrap();
-        timeout(PATIENCE, self.answer()).await.expect("an answer")
+        within(self.answer(), "an answer").await
     }
 
     async fn answer(&mut self) -> Answer {
@@ -107,8 +103,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
     pub async fn ends(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         // A connection that is cut off counts as closed.
-        let read = timeout(PATIENCE, self.0.read_to_end(&mut bytes)).await;
-        let _ = read.expect("the connection ends");
+        let _ = within(self.0.read_to_end(&mut bytes), "the connection ends").await;
         bytes
     }
 }

@@ -1,12 +1,12 @@
 //! Clients that make no handshake, or make it slowly, and clients that do not read.
 
 use super::certificates::{Authority, Files, kinds};
-use super::client::{Client, PATIENCE, trusting};
+use super::client::{Client, trusting};
 use super::service::Service;
+use bagtrack_testing::within::within;
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use tokio::time::timeout;
 
 /// The head of a TLS record of 512 bytes, and the head of the hello in it.
 const HELLO_BEGUN: [u8; 9] = [22, 3, 1, 2, 0, 1, 0, 1, 252];
@@ -37,7 +37,7 @@ async fn a_handshake_has_to_end_in_time() {
             tokio::time::sleep(limit / 20).await;
         }
     };
-    timeout(PATIENCE, trickle).await.expect("it is cut off");
+    within(trickle, "it is cut off").await;
     for client in &mut slow {
         client.ends().await;
     }
@@ -111,8 +111,7 @@ async fn a_handshake_does_not_hold_up_the_end() {
     let service = service.await;
     let mut stream = TcpStream::connect(service.address).await.unwrap();
     stream.write_all(&HELLO_BEGUN).await.unwrap();
-    let ended = timeout(PATIENCE, service.end()).await;
-    assert!(ended.expect("it ends"));
+    assert!(within(service.end(), "it ends").await);
 }
 
 #[tokio::test]
@@ -129,11 +128,9 @@ async fn a_client_that_never_reads_loses_its_connection() {
     let refused = async {
         while client.0.write_all(ask.as_bytes()).await.is_ok() && client.0.flush().await.is_ok() {}
     };
-    timeout(PATIENCE, refused)
-        .await
-        .expect("the connection ends");
+    within(refused, "the connection ends").await;
     let mut client = Client::open(&connector, service.address).await;
     assert_eq!(client.call("GET", "/healthz", b"").await.status(), "200");
     // Its goodbye waits for nobody, either.
-    assert!(timeout(PATIENCE, service.end()).await.expect("it ends"));
+    assert!(within(service.end(), "it ends").await);
 }

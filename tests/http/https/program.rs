@@ -1,13 +1,13 @@
 //! The program with a certificate: its start, its health check, and SIGHUP.
 
 use super::certificates::{Authority, Files, kinds};
-use super::client::{Client, PATIENCE, trusting};
+use super::client::{Client, trusting};
 use crate::program::{self, Program};
+use bagtrack_testing::within::within;
 use rustix::process::Signal;
 use std::path::Path;
 use std::process::Output;
 use tokio::process::Command;
-use tokio::time::timeout;
 
 fn command(certificate: &Path, key: &Path) -> std::process::Command {
     let mut command = program::serve(env!("CARGO_BIN_EXE_bagtrack").as_ref());
@@ -93,8 +93,8 @@ async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
 /// What the program says when it does not start.
 async fn refused(certificate: &Path, key: &Path) -> String {
     let mut command = Command::from(command(certificate, key));
-    let output = timeout(PATIENCE, command.kill_on_drop(true).output()).await;
-    let output = output.expect("it ends").unwrap();
+    let output = within(command.kill_on_drop(true).output(), "it ends").await;
+    let output = output.unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     String::from_utf8(output.stderr).unwrap()
 }
@@ -180,8 +180,8 @@ async fn a_certificate_needs_its_key() {
         command
             .args(["serve", "--listen", "127.0.0.1:0", flag])
             .arg(file);
-        let output = timeout(PATIENCE, command.kill_on_drop(true).output()).await;
-        let output = output.expect("it ends").unwrap();
+        let output = within(command.kill_on_drop(true).output(), "it ends").await;
+        let output = output.unwrap();
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(
             !output.status.success() && message.contains(other),

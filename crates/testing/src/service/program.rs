@@ -2,6 +2,7 @@
 
 use super::server::Process;
 use crate::command::program;
+use crate::within::PATIENCE;
 use rustix::process::Signal;
 use std::convert::Infallible;
 use std::io::{self, BufRead, BufReader};
@@ -11,10 +12,6 @@ use std::process::{ChildStderr, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
-
-/// Longer than any test waits for something that does happen.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// `bagtrack serve` on a free port; it ends with this value.
 ///
