@@ -1,10 +1,10 @@
 //! The service below a path of a host that it shares with others.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::lines::{LINES, lines};
 use crate::pictures;
 use bagtrack::http::BasePath;
-use reqwest::multipart::{Form, Part};
 use reqwest::{Client, Method, StatusCode, redirect};
 
 async fn start() -> TestApplication {
@@ -54,9 +54,7 @@ async fn a_session_goes_on_where_its_location_says() {
 async fn the_problem_of_a_later_line_names_the_whole_path() {
     let app = start().await;
     let path = format!("/video/tracker/sessions/{}/frames", app.open().await);
-    let file = |bytes: Vec<u8>| Part::bytes(bytes).file_name("frame.png");
-    let form = Form::new().part("frame", file(pictures::png(1)));
-    let form = form.part("frame", file(b"no picture".to_vec()));
+    let form = form([pictures::png(1), b"no picture".to_vec()]);
     let request = app.request(Method::POST, &path, &[]);
     let answer = request.header("accept", LINES).multipart(form).send().await;
     let lines = lines(answer.unwrap()).await;

@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use crate::application::BOX;
+use crate::forms::form;
 use crate::pictures;
 use crate::program::{self, Program};
 use bagtrack_testing::within::within;
@@ -79,14 +80,13 @@ async fn frames_one_by_one_get_the_answers_of_frames_together() {
     };
     let (one_by_one, together) = (open().await, open().await);
     let mut answers = Vec::new();
-    let mut form = reqwest::multipart::Form::new();
     for t in 1..=20 {
         let answer = client.post(&one_by_one).body(jpeg(t)).send().await.unwrap();
         answers.push(answer.json::<Value>().await.unwrap());
-        let part = reqwest::multipart::Part::bytes(jpeg(t)).file_name("frame.jpg");
-        form = form.part("frame", part);
     }
-    let all = client.post(&together).multipart(form).send().await.unwrap();
+    let frames = form((1..=20).map(jpeg));
+    let all = client.post(&together).multipart(frames).send().await;
+    let all = all.unwrap();
     let all: Value = all.json().await.unwrap();
     assert_eq!(all["answers"], Value::from(answers));
 }

@@ -1,12 +1,11 @@
 //! Requests that cost far more to answer than to send.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::heavy;
 use crate::metrics::readiness;
 use crate::pictures;
 use bagtrack_testing::within::within;
-use image::{GrayImage, ImageFormat, Luma};
-use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode};
 use std::time::{Duration, Instant};
 
@@ -19,13 +18,9 @@ async fn sixty_four_bombs_of_another_size_hold_no_worker() {
     let bomb = heavy::bomb();
     assert!(bomb.len() < 20_000, "{}", bomb.len());
     let (id, other) = (app.open().await, app.open().await);
-    let form = || {
-        let part = || Part::bytes(bomb.clone()).file_name("frame.webp");
-        (0..64).fold(Form::new(), |form, _| form.part("frame", part()))
-    };
     let attack = |id: &str| {
         let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
-        request.multipart(form()).send()
+        request.multipart(form(vec![bomb.clone(); 64])).send()
     };
     let sent = Instant::now();
     let (first, second) = tokio::join!(attack(&id), attack(&other));
@@ -50,10 +45,7 @@ async fn the_size_of_the_last_frame_is_checked_before_the_first_is_decoded() {
     let mut damaged = pictures::png(1);
     let middle = damaged.len() / 2;
     damaged[middle] ^= 0xFF;
-    let part = |bytes: Vec<u8>| Part::bytes(bytes).file_name("frame.png");
-    let form = Form::new()
-        .part("frame", part(damaged))
-        .part("frame", part(pictures::png_of(64, 48)));
+    let form = form([damaged, pictures::png_of(64, 48)]);
     let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &[]);
     let refused = request.multipart(form).send().await.unwrap();
     let problem = expect_problem(refused, "frame-size-mismatch").await;
@@ -114,13 +106,7 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_threads() {
     let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
-    let large = |value: u8| {
-        let picture = GrayImage::from_fn(8000, 5000, |x, y| {
-            Luma([value + ((x / 80) ^ (y / 50)) as u8 % 90])
-        });
-        pictures::encode(picture, ImageFormat::Png)
-    };
-    let (first, next) = (large(10), large(20));
+    let (first, next) = (heavy::large(10), heavy::large(20));
     let response = app.create(first.clone(), &[("box", LARGE_BOX)]).await;
     let created = expect(response, StatusCode::CREATED).await;
     let id = created["id"].as_str().unwrap();

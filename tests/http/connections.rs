@@ -1,6 +1,7 @@
 //! Slow clients, large bodies, and the end of the service.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::metrics::readiness;
 use crate::pictures;
 use crate::raw::RawConnection;
@@ -67,8 +68,7 @@ async fn a_body_that_is_too_large_is_413_in_every_form() {
     let path = format!("/sessions/{id}/frames");
     let large = || vec![b'A'; 3_000_000];
     let request = || app.request(Method::POST, &path, &[]);
-    let form = reqwest::multipart::Part::bytes(large()).file_name("frame.png");
-    let form = reqwest::multipart::Form::new().part("frame", form);
+    let form = form([large()]);
     let text = String::from_utf8(large()).unwrap();
     let endless = futures_util::stream::repeat_with(|| Ok::<_, std::io::Error>(vec![0; 10_000]));
     let endless = futures_util::StreamExt::take(endless, 15);

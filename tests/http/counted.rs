@@ -1,6 +1,7 @@
 //! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::metrics::{metrics, readiness, value};
 use crate::pictures;
 use crate::raw::RawConnection;
@@ -15,11 +16,7 @@ async fn lines_and_messages_count_as_sent() {
     let app = TestApplication::start().await;
     let id = app.open().await;
     let sent = async || value(&metrics(&app).await, "bagtrack_sent_bytes_total", &[]);
-    let mut frames = reqwest::multipart::Form::new();
-    for t in 1..=60 {
-        let part = reqwest::multipart::Part::bytes(pictures::png(t % 20));
-        frames = frames.part("frame", part.file_name("frame.png"));
-    }
+    let frames = form((1..=60).map(|t| pictures::png(t % 20)));
     // Its own answer is the only other one between two of these.
     let own = metrics(&app).await.len();
     let before = sent().await;

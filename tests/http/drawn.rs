@@ -1,10 +1,10 @@
 //! Answers as pictures.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::pictures;
 use crate::targets::{BOXES, open_with};
 use image::RgbImage;
-use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
 
@@ -108,10 +108,9 @@ async fn what_cannot_be_drawn_is_not_tracked() {
     let app = TestApplication::start().await;
     let id = app.open().await;
     let path = format!("/sessions/{id}/frames");
-    let part = |t| Part::bytes(pictures::png(t)).file_name("frame.png");
-    let form = Form::new().part("frame", part(1)).part("frame", part(2));
     let request = app.request(Method::POST, &path, &[("draw", "true")]);
-    let several = request.multipart(form).send().await.unwrap();
+    let several = form([1, 2].map(pictures::png));
+    let several = request.multipart(several).send().await.unwrap();
     let problem = expect_problem(several, "malformed-request").await;
     assert!(
         problem["detail"].as_str().unwrap().contains("one frame"),

@@ -22,8 +22,15 @@ async fn post_json(app: &TestApplication, method: Method, path: &str, body: &Val
         .unwrap()
 }
 
-fn part(frame: Vec<u8>) -> Part {
+/// A frame in a form.
+pub fn part(frame: Vec<u8>) -> Part {
     Part::bytes(frame).file_name("frame.png")
+}
+
+/// A form with these frames.
+pub fn form(frames: impl IntoIterator<Item = Vec<u8>>) -> Form {
+    let add = |form: Form, frame| form.part("frame", part(frame));
+    frames.into_iter().fold(Form::new(), add)
 }
 
 fn base64(frame: Vec<u8>) -> String {
@@ -92,10 +99,8 @@ async fn the_three_forms_give_the_same_answers() {
     for t in 3..6 {
         singly.push(expect(app.post_frame(&raw, pictures::png(t)).await, StatusCode::OK).await);
     }
-    let form = (3..6).fold(Form::new(), |form, t| {
-        form.part("frame", part(pictures::png(t)))
-    });
-    let b = post_form(&app, Method::POST, &frames(&multipart), form).await;
+    let three = self::form((3..6).map(pictures::png));
+    let b = post_form(&app, Method::POST, &frames(&multipart), three).await;
     let body = json!({"frames": (3..6).map(|t| base64(pictures::png(t))).collect::<Vec<_>>()});
     let c = post_json(&app, Method::POST, &frames(&as_json), &body).await;
     let mut answers = singly[2].clone();

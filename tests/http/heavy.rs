@@ -1,11 +1,12 @@
 //! Requests that keep a worker busy: many frames, for sessions with the most expensive parameters there are.
 
 use crate::application::{BOX, TestApplication};
+use crate::forms::form;
 use crate::pictures;
 use crate::raw::RawConnection;
 use bagtrack_testing::within::within;
-use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
-use reqwest::multipart::{Form, Part};
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
+use reqwest::multipart::Form;
 use reqwest::{Method, RequestBuilder, StatusCode};
 use std::io::Cursor;
 use tokio::task::JoinSet;
@@ -26,6 +27,14 @@ pub fn bomb() -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// A picture of 40 megapixels.
+pub fn large(value: u8) -> Vec<u8> {
+    let picture = GrayImage::from_fn(8000, 5000, |x, y| {
+        Luma([value + ((x / 80) ^ (y / 50)) as u8 % 90])
+    });
+    pictures::encode(picture, ImageFormat::Png)
+}
+
 /// Opens a session whose frames take long; gives its path.
 pub async fn open(app: &TestApplication) -> String {
     let query = [("box", BOX), ("preset", "paper"), ("parameters", PARAMS)];
@@ -41,12 +50,11 @@ pub async fn open(app: &TestApplication) -> String {
 /// The request with so many frames for this session.
 pub fn post(app: &TestApplication, session: &str, frames: usize) -> RequestBuilder {
     let request = app.request(Method::POST, &format!("{session}/frames"), &[]);
-    request.multipart(form(frames))
+    request.multipart(same_frames(frames))
 }
 
-fn form(frames: usize) -> Form {
-    let part = || Part::bytes(pictures::png(1)).file_name("frame.png");
-    (0..frames).fold(Form::new(), |form, _| form.part("frame", part()))
+fn same_frames(count: usize) -> Form {
+    form(vec![pictures::png(1); count])
 }
 
 /// Keeps the only place in the queue taken until the returned value is dropped.
@@ -59,7 +67,12 @@ pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
     );
     busy.spawn(async move {
         // The place may be the other request's below when this one comes.
-        while let Ok(_answered) = client.post(&url).multipart(form(FRAMES)).send().await {}
+        while let Ok(_answered) = client
+            .post(&url)
+            .multipart(same_frames(FRAMES))
+            .send()
+            .await
+        {}
     });
     let full = async { while app.get(&format!("{session}/snapshot")).await.status() != 503 {} };
     within(full, "the queue is full").await;

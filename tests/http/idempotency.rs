@@ -1,6 +1,7 @@
 //! A request to open a session that is sent again with its `Idempotency-Key`.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::metrics::{metrics, value};
 use crate::pictures;
 use bagtrack::http::Secret;
 use reqwest::multipart::{Form, Part};
@@ -20,13 +21,8 @@ async fn id_of(response: Response) -> String {
     created["id"].as_str().unwrap().to_owned()
 }
 
-/// The value of a metric without labels.
-async fn sessions(app: &TestApplication) -> String {
-    let text = app.get("/metrics").await.text().await.unwrap();
-    let line = text
-        .lines()
-        .find(|line| line.starts_with("bagtrack_sessions "));
-    line.unwrap().to_owned()
+async fn sessions(app: &TestApplication) -> f64 {
+    value(&metrics(app).await, "bagtrack_sessions", &[])
 }
 
 #[tokio::test]
@@ -57,12 +53,12 @@ async fn the_same_request_gets_the_same_answer_and_opens_no_second_session() {
         .await
         .unwrap();
     assert_eq!(again.bytes().await.unwrap(), body);
-    assert_eq!(sessions(&app).await, "bagtrack_sessions 1");
+    assert_eq!(sessions(&app).await, 1.0);
 
     let other = opening(&app, "key-1", 1).send().await.unwrap();
     expect_problem(other, "idempotency-key-reused").await;
     opening(&app, "key-2", 1).send().await.unwrap();
-    assert_eq!(sessions(&app).await, "bagtrack_sessions 2");
+    assert_eq!(sessions(&app).await, 2.0);
 }
 
 #[tokio::test]
@@ -76,7 +72,7 @@ async fn requests_at_the_same_time_open_one_session() {
     }
     ids.dedup();
     assert_eq!(ids.len(), 1);
-    assert_eq!(sessions(&app).await, "bagtrack_sessions 1");
+    assert_eq!(sessions(&app).await, 1.0);
 }
 
 #[tokio::test]

@@ -1,9 +1,9 @@
 //! Answers as lines of JSON.
 
 use crate::application::{TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::heavy;
 use crate::pictures;
-use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
 use std::time::Duration;
@@ -30,12 +30,9 @@ async fn post(
     frames: Vec<Vec<u8>>,
 ) -> Response {
     let path = format!("/sessions/{id}/frames");
-    let form = frames.into_iter().fold(Form::new(), |form, frame| {
-        form.part("frame", Part::bytes(frame).file_name("frame.png"))
-    });
     let request = app.request(Method::POST, &path, query);
     let request = request.header("accept", LINES);
-    request.multipart(form).send().await.unwrap()
+    request.multipart(form(frames)).send().await.unwrap()
 }
 
 fn frames(numbers: std::ops::RangeInclusive<u32>) -> Vec<Vec<u8>> {
@@ -43,7 +40,7 @@ fn frames(numbers: std::ops::RangeInclusive<u32>) -> Vec<Vec<u8>> {
 }
 
 /// The answers of plain posts to the frames 1 to `last`.
-async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
+pub async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
     let id = app.open().await;
     let mut answers = Vec::new();
     for t in 1..=last {

@@ -1,13 +1,14 @@
 //! How each problem is provoked: a request that would succeed, with one thing wrong.
 
 use crate::application::{BOX, TestApplication, expect};
+use crate::forms::form;
 use crate::heavy;
 use crate::metrics::readiness;
 use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::StreamClient;
 use bagtrack::http::{Config, SNAPSHOT_MEDIA_TYPE, Secret};
-use reqwest::multipart::{Form, Part};
+use reqwest::multipart::Part;
 use reqwest::{Method, Response, StatusCode};
 use std::time::Duration;
 use tokio::task::JoinSet;
@@ -247,10 +248,9 @@ impl Attempt {
             request = request.header("idempotency-key", key);
         }
         let request = if self.frames > 1 || self.snapshot.is_some() {
-            let part = || Part::bytes(self.body.clone()).file_name("frame.png");
-            let form = (0..self.frames).fold(Form::new(), |form, _| form.part("frame", part()));
+            let frames = form(vec![self.body.clone(); self.frames]);
             let snapshot = self.snapshot.iter();
-            request.multipart(snapshot.fold(form, |form, snapshot| {
+            request.multipart(snapshot.fold(frames, |form, snapshot| {
                 form.part("snapshot", Part::bytes(snapshot.clone()))
             }))
         } else {

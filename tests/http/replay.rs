@@ -1,8 +1,8 @@
 //! Numbered frames.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::pictures;
-use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
 
@@ -10,13 +10,8 @@ async fn batch(app: &TestApplication, id: &str, number: u64, frames: &[u32]) -> 
     let number = number.to_string();
     let path = format!("/sessions/{id}/frames");
     let request = app.request(Method::POST, &path, &[("frame", &number)]);
-    let form = frames.iter().fold(Form::new(), |form, t| {
-        form.part(
-            "frame",
-            Part::bytes(pictures::png(*t)).file_name("frame.png"),
-        )
-    });
-    request.multipart(form).send().await.unwrap()
+    let frames = frames.iter().map(|t| pictures::png(*t));
+    request.multipart(form(frames)).send().await.unwrap()
 }
 
 async fn expect_answer(response: Response, replayed: bool) -> Value {

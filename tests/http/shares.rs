@@ -8,7 +8,6 @@ use crate::raw::RawConnection;
 use crate::stream_client::{Received, StreamClient};
 use bagtrack::http::Config;
 use bagtrack_testing::within::within;
-use image::{GrayImage, ImageFormat, Luma};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -352,14 +351,6 @@ async fn posts_of_two_frames_do_not_wait_until_the_long_posts_of_another_client_
     assert!(long.try_join_next().is_none(), "the long posts go on");
 }
 
-/// A picture of 40 megapixels.
-fn large(value: u8) -> Vec<u8> {
-    let picture = GrayImage::from_fn(8000, 5000, |x, y| {
-        Luma([value + ((x / 80) ^ (y / 50)) as u8 % 90])
-    });
-    pictures::encode(picture, ImageFormat::Png)
-}
-
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
     let app = TestApplication::start_with(|config| {
@@ -368,7 +359,7 @@ async fn slow_frames_among_cheap_refused_posts_hold_not_all_quick_workers() {
     });
     let app = Arc::new(app.await);
     let query = [("box", "2000,1500,1600,1200")];
-    let picture = large(10);
+    let picture = heavy::large(10);
     let slow = async |count: usize| {
         let requests = (0..count).map(|_| {
             let request = request_as(&app, GREEDY, "/sessions", &query);

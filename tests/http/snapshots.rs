@@ -1,6 +1,7 @@
 //! A session carried to another instance.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::form;
 use crate::{forged, pictures};
 use bagtrack::http::Secret;
 use bagtrack_sessions::{Fingerprint, SNAPSHOT_MAGIC};
@@ -219,17 +220,17 @@ async fn a_forged_length_takes_no_memory_and_is_refused() {
 async fn only_as_many_stored_answers_are_kept_as_a_request_may_have() {
     let (here, there) = (unsigned(64).await, unsigned(2).await);
     let id = here.open().await;
-    let form = (1..5).fold(reqwest::multipart::Form::new(), |form, t| {
-        let part = reqwest::multipart::Part::bytes(pictures::png(t)).file_name("frame.png");
-        form.part("frame", part)
-    });
     let request = here.request(
         reqwest::Method::POST,
         &format!("/sessions/{id}/frames"),
         &[],
     );
     expect(
-        request.multipart(form).send().await.unwrap(),
+        request
+            .multipart(form((1..5).map(pictures::png)))
+            .send()
+            .await
+            .unwrap(),
         StatusCode::OK,
     )
     .await;

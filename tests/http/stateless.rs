@@ -1,6 +1,7 @@
 //! `POST /track`: tracking without a session.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::{form, part};
 use crate::pictures;
 use bagtrack::http::Secret;
 use base64::Engine;
@@ -67,8 +68,7 @@ async fn snapshots_between_two_services_give_the_boxes_of_a_session() {
 #[tokio::test]
 async fn a_form_takes_several_frames_and_a_box_corrects_one() {
     let app = start().await;
-    let part = |t| Part::bytes(pictures::png(t)).file_name("frame.png");
-    let form = (0..4).fold(Form::new(), |form, t| form.part("frame", part(t)));
+    let form = form((0..4).map(pictures::png));
     let query = [("box", BOX), ("seed", "7")];
     let batch = track(&app, &query).multipart(form).send().await.unwrap();
     let batch = expect(batch, StatusCode::OK).await;
@@ -84,7 +84,7 @@ async fn a_form_takes_several_frames_and_a_box_corrects_one() {
         .decode(batch["snapshot"].as_str().unwrap())
         .unwrap();
     let form = || {
-        let form = Form::new().part("frame", part(4));
+        let form = Form::new().part("frame", part(pictures::png(4)));
         form.part("snapshot", Part::bytes(snapshot.clone()))
     };
     let corrected = track(&app, &[("box", "22,17,16,12")]).multipart(form());

@@ -1,6 +1,7 @@
 //! Sessions over a WebSocket.
 
 use crate::application::{TestApplication, expect};
+use crate::lines::posted;
 use crate::pictures;
 use crate::slow_line::SlowLine;
 use crate::stream_client::{Received, StreamClient};
@@ -9,17 +10,6 @@ use image::ImageFormat;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
 use std::time::{Duration, Instant};
-
-/// The answers of plain posts to the frames 1 to `last`.
-async fn posted(app: &TestApplication, last: u32) -> Vec<Value> {
-    let id = app.open().await;
-    let mut answers = Vec::new();
-    for t in 1..=last {
-        let response = app.post_frame(&id, pictures::png(t)).await;
-        answers.push(expect(response, StatusCode::OK).await);
-    }
-    answers
-}
 
 pub fn problem_slug(message: &Value) -> &str {
     let kind = message["type"].as_str();

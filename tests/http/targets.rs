@@ -1,10 +1,11 @@
 //! Sessions with several targets.
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::forms::{form, part};
 use crate::pictures;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use reqwest::multipart::{Form, Part};
+use reqwest::multipart::Form;
 use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 
@@ -71,9 +72,8 @@ async fn boxes_come_in_the_query_in_a_form_and_in_json() {
     let app = TestApplication::start().await;
     let id = open_with(&app, BOXES).await;
     let expected = post(&app, &id, 1).await;
-    let frame = Part::bytes(pictures::png(0)).file_name("frame.png");
     let form = Form::new()
-        .part("frame", frame)
+        .part("frame", part(pictures::png(0)))
         .text("boxes", BOXES)
         .text("seed", "7");
     let form = app.request(Method::POST, "/sessions", &[]).multipart(form);
@@ -190,13 +190,9 @@ async fn of_several_frames_all_targets_take_all_or_none() {
     let app = TestApplication::start().await;
     let (id, other) = (open_with(&app, BOXES).await, open_with(&app, BOXES).await);
     let batch = async |frames: [Vec<u8>; 2]| -> Response {
-        let parts = frames.map(|frame| Part::bytes(frame).file_name("frame.png"));
-        let form = parts
-            .into_iter()
-            .fold(Form::new(), |form, part| form.part("frame", part));
         let path = format!("/sessions/{id}/frames");
         let request = app.request(Method::POST, &path, &[("frame", "1")]);
-        request.multipart(form).send().await.unwrap()
+        request.multipart(form(frames)).send().await.unwrap()
     };
     let bad = batch([pictures::png(1), b"no image".to_vec()]).await;
     expect_problem(bad, "unsupported-image").await;

@@ -3,7 +3,8 @@
 use crate::application::{BOX, TestApplication, expect_problem};
 use crate::heavy;
 use crate::lines::{LINES, lines};
-use crate::videos::{FRAMES, motion_jpeg, video};
+use crate::metrics::{metrics, value};
+use crate::videos::{FRAMES, empty_mp4, motion_jpeg, video};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::Value;
@@ -39,14 +40,6 @@ fn check(lines: &[Value], name: &str) {
     }
 }
 
-/// The number of live sessions, as `/metrics` tells it.
-async fn sessions(app: &TestApplication) -> String {
-    let metrics = app.get("/metrics").await.text().await.unwrap();
-    let mut lines = metrics.lines();
-    let line = lines.find(|line| line.starts_with("bagtrack_sessions "));
-    line.unwrap_or_else(|| panic!("{metrics}")).to_owned()
-}
-
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_video_and_a_box_get_a_line_for_each_frame_and_no_session() {
@@ -76,7 +69,8 @@ async fn a_video_and_a_box_get_a_line_for_each_frame_and_no_session() {
         &lines(request.multipart(form).send().await.unwrap()).await,
         "form",
     );
-    assert!(sessions(&app).await.ends_with(" 0"));
+    let sessions = value(&metrics(&app).await, "bagtrack_sessions", &[]);
+    assert_eq!(sessions, 0.0);
 }
 
 #[tokio::test]
@@ -128,9 +122,8 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
 
 #[tokio::test]
 async fn without_ffmpeg_a_video_to_track_is_refused() {
-    let mp4 = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
     let app = TestApplication::start_with(|config| config.limits.ffmpeg = "off".to_owned()).await;
-    let refused = track(&app, &[("box", BOX)], "video/mp4", mp4).await;
+    let refused = track(&app, &[("box", BOX)], "video/mp4", empty_mp4()).await;
     let problem = expect_problem(refused, "unsupported-image").await;
     assert!(problem["detail"].as_str().unwrap().contains("ffmpeg"));
 }

@@ -65,6 +65,11 @@ pub fn motion_jpeg() -> Vec<u8> {
     frames.flatten().collect()
 }
 
+/// What begins as an MP4 file does, and has nothing in it.
+pub fn empty_mp4() -> Vec<u8> {
+    [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat()
+}
+
 async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>) -> Response {
     let path = format!("/sessions/{id}/frames");
     let request = app.request(Method::POST, &path, &[]);
@@ -102,12 +107,11 @@ async fn a_video_is_tracked_and_answered_line_by_line() {
 
 #[tokio::test]
 async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
-    let mp4 = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
     for program in ["off", "/nowhere/ffmpeg"] {
         let app = TestApplication::start_with(|config| config.limits.ffmpeg = program.to_owned());
         let app = app.await;
         let id = app.open().await;
-        let refused = post(&app, &id, "video/mp4", mp4.clone()).await;
+        let refused = post(&app, &id, "video/mp4", empty_mp4()).await;
         let problem = expect_problem(refused, "unsupported-image").await;
         assert_eq!(problem["status"], 415);
         assert!(
@@ -141,9 +145,12 @@ async fn a_video_comes_back_frame_by_frame() {
     let refused = request.body(pictures::png(1)).send().await.unwrap();
     let problem = expect_problem(refused, "unsupported-image").await;
     assert!(problem["detail"].as_str().unwrap().contains("Send a video"));
-    let nothing = [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat();
     let request = app.request(Method::POST, "/frames", &[]);
-    expect_problem(request.body(nothing).send().await.unwrap(), "frame-damaged").await;
+    expect_problem(
+        request.body(empty_mp4()).send().await.unwrap(),
+        "frame-damaged",
+    )
+    .await;
 }
 
 /// The times that JPEG files which follow each other tell in their first comments.
