@@ -29,7 +29,7 @@ async fn lines_and_messages_count_as_sent() {
         all >= (lines + own / 2) as f64 && lines > 2 * own / 3,
         "{all} {lines} {own}"
     );
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     let before = sent().await;
     let mut messages = 0;
     for t in 2..400 {

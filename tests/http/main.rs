@@ -53,7 +53,6 @@ mod slow_line;
 mod snapshots;
 mod stateless;
 mod stream;
-mod stream_client;
 mod stream_memory;
 mod targets;
 mod targets_carried;
@@ -62,4 +61,4 @@ mod uploads;
 mod version;
 mod videos;
 
-use bagtrack_testing::service::{application, pictures, program};
+use bagtrack_testing::service::{application, pictures, program, stream_client};

@@ -124,7 +124,7 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
     let request = app.request(Method::POST, "/track", &far);
     let track = request.body(pictures::png(0)).send().await.unwrap();
     has_warning(&expect(track, StatusCode::OK).await);
-    let mut stream = StreamClient::open(&app, id, "").await;
+    let mut stream = StreamClient::open(app.address, id, "").await;
     stream.say(r#"{"box": [90, 20, 20, 12]}"#).await;
     stream.send(pictures::png(2)).await;
     has_warning(&stream.message().await);

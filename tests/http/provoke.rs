@@ -202,7 +202,7 @@ impl Attempt {
             "request-too-costly" => self.frames = 2,
             "quota-exceeded" if template.ends_with("/stream") => {
                 let id = self.id.as_ref().unwrap();
-                self._stream = Some(StreamClient::open(&self.app, id, "").await);
+                self._stream = Some(StreamClient::open(self.app.address, id, "").await);
             }
             "session-busy" | "quota-exceeded" | "not-in-order" => {
                 let id = self.id.as_ref().unwrap();

@@ -22,7 +22,7 @@ async fn frames_sent_ahead_get_the_answers_of_plain_posts_in_order() {
     let app = TestApplication::start().await;
     let expected = posted(&app, 20).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     assert_eq!(stream.next, 1);
     for t in 1..=20 {
         if t % 2 == 0 {
@@ -41,7 +41,7 @@ async fn frames_sent_ahead_get_the_answers_of_plain_posts_in_order() {
 async fn a_box_before_a_frame_corrects_the_target() {
     let app = TestApplication::start().await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.say(r#"{"box": [22, 16, 16, 12]}"#).await;
     stream.send(pictures::png(1)).await;
     stream.send(pictures::png(2)).await;
@@ -59,7 +59,7 @@ async fn what_the_tracker_saw_is_told_where_it_is_asked_for() {
     let app = TestApplication::start().await;
     let expected = posted(&app, 2).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.say(r#"{"see": true}"#).await;
     stream.send(pictures::png(1)).await;
     stream.send(pictures::png(2)).await;
@@ -90,7 +90,7 @@ async fn a_refused_frame_gets_its_problem_in_its_place_and_changes_nothing() {
     let app = TestApplication::start().await;
     let expected = posted(&app, 2).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.send(pictures::png(1)).await;
     stream.send(b"no image".to_vec()).await;
     stream.say(r#"{"frame": 9}"#).await;
@@ -132,7 +132,7 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
     }
     let from = answers.len() as u64 + 1;
     let query = format!("?from={from}");
-    let mut stream = StreamClient::open(&app, &id, &query).await;
+    let mut stream = StreamClient::open(app.address, &id, &query).await;
     assert!(stream.next >= from);
     for _ in from..stream.next {
         let mut answer = stream.message().await;
@@ -161,10 +161,10 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
 async fn a_newer_stream_ends_the_older_one() {
     let app = TestApplication::start().await;
     let id = app.open().await;
-    let mut old = StreamClient::open(&app, &id, "").await;
+    let mut old = StreamClient::open(app.address, &id, "").await;
     old.send(pictures::png(1)).await;
     assert_eq!(old.message().await["frame"], 1);
-    let mut new = StreamClient::open(&app, &id, "?from=2").await;
+    let mut new = StreamClient::open(app.address, &id, "?from=2").await;
     assert_eq!(new.next, 2);
     assert_eq!(old.close_code().await, 4409);
     new.send(pictures::png(2)).await;
@@ -176,7 +176,7 @@ async fn the_newest_frame_wins_where_that_is_asked_for() {
     // One worker, and frames that take it some time.
     let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "?drop").await;
+    let mut stream = StreamClient::open(app.address, &id, "?drop").await;
     let frames: Vec<Vec<u8>> = (1..=60).map(pictures::png).collect();
     for frame in frames {
         stream.send(frame).await;
@@ -250,8 +250,8 @@ async fn a_page_opens_a_stream_with_its_token_as_a_protocol() {
 async fn a_stream_ends_with_its_session() {
     let app = TestApplication::start().await;
     let (id, other) = (app.open().await, app.open().await);
-    let mut deleted = StreamClient::open(&app, &id, "").await;
-    let mut expired = StreamClient::open(&app, &other, "").await;
+    let mut deleted = StreamClient::open(app.address, &id, "").await;
+    let mut expired = StreamClient::open(app.address, &other, "").await;
     app.delete_session(&id).await;
     deleted.send(pictures::png(1)).await;
     assert_eq!(problem_slug(&deleted.message().await), "session-not-found");
@@ -267,12 +267,12 @@ async fn an_idle_stream_is_pinged_and_a_silent_one_closed() {
     let ping = Duration::from_millis(300);
     let app = TestApplication::start_with(|config| config.limits.ping_interval = ping).await;
     let id = app.open().await;
-    let silent = StreamClient::open(&app, &id, "").await;
+    let silent = StreamClient::open(app.address, &id, "").await;
     let bytes = silent.ignore_pings().await;
     // An unmasked ping without content.
     assert!(bytes.starts_with(&[0x89, 0]), "{bytes:?}");
     // A stream that sends nothing sees its session end at the next ping.
-    let mut idle = StreamClient::open(&app, &id, "").await;
+    let mut idle = StreamClient::open(app.address, &id, "").await;
     app.clock.advance(Duration::from_secs(600));
     assert_eq!(problem_slug(&idle.message().await), "session-expired");
 }
@@ -281,7 +281,7 @@ async fn an_idle_stream_is_pinged_and_a_silent_one_closed() {
 async fn a_stream_has_the_quotas_and_limits_of_posts() {
     let app = TestApplication::start_with(|config| config.limits.client_frame_rate = 100).await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     // More than the 100 that may come at once, the first one included: the others wait until they may.
     let started = Instant::now();
     for t in 1..=130 {
@@ -295,7 +295,7 @@ async fn a_stream_has_the_quotas_and_limits_of_posts() {
 
     let app = TestApplication::start().await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.send(vec![0; 400 << 10]).await;
     let refused = stream.message().await;
     assert_eq!(problem_slug(&refused), "malformed-request", "{refused}");
@@ -307,7 +307,7 @@ async fn a_stream_has_the_quotas_and_limits_of_posts() {
 async fn a_service_that_ends_answers_what_has_come_and_closes_its_streams() {
     let mut app = TestApplication::start().await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.send(pictures::png(1)).await;
     assert_eq!(stream.message().await["frame"], 1);
     app.shut_down();
@@ -366,7 +366,7 @@ async fn twenty_five_frames_a_second_over_a_round_trip_of_80_ms() {
 async fn messages_without_a_frame_have_a_rate_and_a_frame_after_them_its_answer() {
     let app = TestApplication::start().await;
     let id = app.open().await;
-    let mut client = StreamClient::open(&app, &id, "").await;
+    let mut client = StreamClient::open(app.address, &id, "").await;
     // Unmasked by a mask of zeros: `{}` as text, 22,000 times. The client may send 2,000 at once and 10,000 a second.
     let text = [0x81, 0x82, 0, 0, 0, 0, b'{', b'}'];
     let sent = Instant::now();
@@ -399,7 +399,7 @@ async fn a_message_has_the_time_of_a_body_however_fast_its_bytes_come() {
     let app = TestApplication::start_with(|config| config.body_timeout = Duration::from_secs(1));
     let app = app.await;
     let id = app.open().await;
-    let mut client = StreamClient::open(&app, &id, "").await;
+    let mut client = StreamClient::open(app.address, &id, "").await;
     // 200 kB, ten times as fast as the least rate: it once could last for minutes.
     client
         .send_raw(&[0x82, 0xFF, 0, 0, 0, 0, 0, 3, 0x0D, 0x40, 0, 0, 0, 0])

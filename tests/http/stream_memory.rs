@@ -25,7 +25,7 @@ async fn idle_streams_take_no_memory_of_uploads() {
     let mut streams = Vec::new();
     for _ in 0..20 {
         let id = app.open().await;
-        streams.push((StreamClient::open(&app, &id, "").await, id));
+        streams.push((StreamClient::open(app.address, &id, "").await, id));
     }
     // Nor do those over which a message has come.
     for (stream, id) in &mut streams {
@@ -44,7 +44,7 @@ async fn idle_streams_take_no_memory_of_uploads() {
 async fn a_part_of_a_message_is_charged_until_its_stream_ends() {
     let app = small_memory().await;
     let (id, other) = (app.open().await, app.open().await);
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.send_raw(&HEAD).await;
     let post = || {
         let mut padded = pictures::png(1);
@@ -67,8 +67,8 @@ async fn a_part_of_a_message_is_charged_until_its_stream_ends() {
 async fn a_message_waits_until_there_is_memory_for_it() {
     let app = small_memory().await;
     let (id, other) = (app.open().await, app.open().await);
-    let mut first = StreamClient::open(&app, &id, "").await;
-    let mut second = StreamClient::open(&app, &other, "").await;
+    let mut first = StreamClient::open(app.address, &id, "").await;
+    let mut second = StreamClient::open(app.address, &other, "").await;
     first.send_raw(&HEAD).await;
     first.send_raw(&[0; 99_000]).await;
     let taken = async { while app.post_frame(&id, vec![1; 140_000]).await.status() != 429 {} };
@@ -86,7 +86,7 @@ async fn a_message_that_does_not_end_ends_its_stream() {
     });
     let app = app.await;
     let id = app.open().await;
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     // Between messages there is no hurry.
     tokio::time::sleep(Duration::from_millis(300)).await;
     stream.send(pictures::png(1)).await;

@@ -67,7 +67,7 @@ async fn a_forged_number_of_targets_is_refused() {
 async fn a_stream_answers_for_all_targets_and_corrects_one() {
     let app = TestApplication::start().await;
     let (id, posted) = (open_with(&app, BOXES).await, open_with(&app, BOXES).await);
-    let mut stream = StreamClient::open(&app, &id, "").await;
+    let mut stream = StreamClient::open(app.address, &id, "").await;
     for t in 1..=2 {
         stream.send(pictures::png(t)).await;
         assert_eq!(stream.message().await, post(&app, &posted, t).await);
@@ -97,7 +97,7 @@ async fn a_stream_answers_for_all_targets_and_corrects_one() {
     assert_eq!(corrected["frame"], 4);
     stream.close().await;
     // After a broken line the stored answers come again.
-    let mut stream = StreamClient::open(&app, &id, "?from=4").await;
+    let mut stream = StreamClient::open(app.address, &id, "?from=4").await;
     let mut again = stream.message().await;
     assert_eq!(again["replayed"].take(), true);
     again.as_object_mut().unwrap().remove("replayed");

@@ -2,7 +2,7 @@
 //! frame. They are gone then, and say so; clients open them again from a snapshot.
 
 use crate::pair::{Pair, json};
-use crate::stream_client::StreamClient;
+use crate::stream_client::{Received, StreamClient};
 use reqwest::{Response, StatusCode};
 
 async fn must_be_lost(answer: Response) {
@@ -68,11 +68,11 @@ async fn a_session_that_was_ended_does_not_come_back() {
 #[ignore = "needs redis"]
 async fn the_stream_of_a_lost_session_ends_and_says_why() {
     let pair = Pair::open(&[], 4).await;
-    let mut stream = StreamClient::open(pair.replicas[0].address, pair.id, "").await;
+    let mut stream = StreamClient::open_in_time(pair.replicas[0].address, pair.id, "").await;
     assert_eq!(stream.track(&pair.clip.frames[1]).await["checkpoint"], 1);
     pair.redis.ask(&["flushall"]);
     stream.send(&pair.clip.frames[2]).await;
     let problem = stream.message().await;
     assert_eq!(problem["type"], "/docs/problems#session-not-found");
-    assert_eq!(stream.receive().await, Err(4404));
+    assert_eq!(stream.receive().await, Received::Closed(4404));
 }

@@ -13,10 +13,9 @@ mod prefix;
 mod refusing;
 mod shares;
 mod sharing;
-mod stream_client;
 mod streams;
 mod tracking_client;
 mod trouble;
 mod upgrade;
 
-use bagtrack_testing::service::{lossy, replica, server};
+use bagtrack_testing::service::{lossy, replica, server, stream_client};

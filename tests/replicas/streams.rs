@@ -1,7 +1,7 @@
 //! Streams of a session at several replicas.
 
 use crate::pair::{Pair, json};
-use crate::stream_client::StreamClient;
+use crate::stream_client::{Received, StreamClient};
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::time::Duration;
@@ -24,7 +24,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
     let pair = Pair::open(&[], 20).await;
     let expected = pair.undisturbed().await;
     let frames = &pair.clip.frames;
-    let mut old = StreamClient::open(pair.replicas[0].address, pair.id, "").await;
+    let mut old = StreamClient::open_in_time(pair.replicas[0].address, pair.id, "").await;
     assert_eq!(old.next, 1);
     for number in 1..6 {
         let answer = old.track(&frames[number]).await;
@@ -32,7 +32,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
         assert_eq!(answer_of(&answer), expected[number - 1]);
     }
     // A client whose line broke before it had the answers to frames 3 to 5.
-    let mut new = StreamClient::open(pair.replicas[1].address, pair.id, "?from=3").await;
+    let mut new = StreamClient::open_in_time(pair.replicas[1].address, pair.id, "?from=3").await;
     assert_eq!(new.next, 6);
     for number in 3..6 {
         let answer = new.message().await;
@@ -42,7 +42,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
     }
     // What comes over the old line is not tracked.
     old.send(&frames[6]).await;
-    assert_eq!(old.receive().await, Err(REPLACED));
+    assert_eq!(old.receive().await, Received::Closed(REPLACED));
     for number in 6..12 {
         let answer = new.track(&frames[number]).await;
         assert_eq!(answer_of(&answer), expected[number - 1]);
@@ -52,7 +52,7 @@ async fn a_stream_goes_on_at_another_replica_and_the_old_one_tracks_nothing_more
     assert_eq!(posted, expected[11]);
     let answer = new.track(&frames[13]).await;
     assert_eq!(answer_of(&answer), expected[12]);
-    let mut third = StreamClient::open(pair.replicas[0].address, pair.id, "?from=13").await;
+    let mut third = StreamClient::open_in_time(pair.replicas[0].address, pair.id, "?from=13").await;
     assert_eq!(third.next, 14);
     assert_eq!(answer_of(&third.message().await), expected[12]);
     assert_eq!(answer_of(&third.track(&frames[14]).await), expected[13]);
@@ -67,7 +67,7 @@ async fn a_stream_goes_on_that_is_pinged_while_the_store_takes_its_frame() {
     let pair = Pair::open(&flags, 6).await;
     let expected = pair.undisturbed().await;
     let address = pair.replicas[0].address;
-    let mut stream = StreamClient::open(address, pair.id, "").await;
+    let mut stream = StreamClient::open_in_time(address, pair.id, "").await;
     for number in 1..6 {
         // What comes to the store meanwhile is done in order: the frame first, then what a ping asks.
         pair.redis.pause();
@@ -86,7 +86,7 @@ async fn a_frame_of_a_stream_waits_while_the_store_is_away() {
     let mut pair = Pair::open(&[], 10).await;
     let expected = pair.undisturbed().await;
     let address = pair.replicas[0].address;
-    let mut stream = StreamClient::open(address, pair.id, "").await;
+    let mut stream = StreamClient::open_in_time(address, pair.id, "").await;
     for number in 1..10 {
         if number % 3 == 0 {
             pair.redis.stop();
@@ -108,25 +108,25 @@ async fn a_stream_that_says_nothing_ends_with_its_session_and_with_a_newer_strea
     let flags = ["--ping-interval", "1s"];
     let pair = Pair::open(&flags, 2).await;
     let open = async |replica: usize| {
-        StreamClient::open(pair.replicas[replica].address, pair.id, "").await
+        StreamClient::open_in_time(pair.replicas[replica].address, pair.id, "").await
     };
     let mut old = open(0).await;
     let mut new = open(1).await;
     // Both answer pings meanwhile.
     tokio::select! {
-        end = old.receive() => assert_eq!(end, Err(REPLACED)),
+        end = old.receive() => assert_eq!(end, Received::Closed(REPLACED)),
         end = new.receive() => panic!("{end:?}"),
     }
     let mut other = open(0).await;
     tokio::select! {
-        end = new.receive() => assert_eq!(end, Err(REPLACED)),
+        end = new.receive() => assert_eq!(end, Received::Closed(REPLACED)),
         end = other.receive() => panic!("{end:?}"),
     }
     let deleted = pair.client.delete(pair.url(1, "")).send().await.unwrap();
     assert_eq!(deleted.status(), StatusCode::NO_CONTENT);
     let problem = other.message().await;
     assert_eq!(problem["type"], "/docs/problems#session-not-found");
-    assert_eq!(other.receive().await, Err(4404));
+    assert_eq!(other.receive().await, Received::Closed(4404));
 }
 
 #[tokio::test]

@@ -117,13 +117,13 @@ async fn a_stream_passes(balance: fn(&[std::net::SocketAddr]) -> Balancer) {
     let expected = pair.undisturbed().await;
     let [first, second] = pair.replicas.each_ref().map(|replica| replica.address);
     let front = balance(&[first, second, first]);
-    let mut stream = StreamClient::open(front.address, pair.id, "").await;
+    let mut stream = StreamClient::open_in_time(front.address, pair.id, "").await;
     for number in 1..10 {
         let answer = stream.track(&pair.clip.frames[number]).await;
         assert_eq!(answer["box"], expected[number - 1]["box"]);
         assert_eq!(answer["checkpoint"], number);
     }
-    let mut again = StreamClient::open(front.address, pair.id, "?from=9").await;
+    let mut again = StreamClient::open_in_time(front.address, pair.id, "?from=9").await;
     assert_eq!(again.message().await["frame"], 9);
     let answer = again.track(&pair.clip.frames[10]).await;
     assert_eq!(answer["box"], expected[9]["box"]);

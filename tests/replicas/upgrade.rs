@@ -301,9 +301,9 @@ async fn what_one_version_has_made_the_other_takes() {
         assert_eq!(again.headers()["replayed"], "true");
         assert_eq!(json(again, StatusCode::OK).await["box"], first["box"]);
 
-        let mut stream = StreamClient::open(pair.replicas[0].address, pair.id, "").await;
+        let mut stream = StreamClient::open_in_time(pair.replicas[0].address, pair.id, "").await;
         assert_eq!(stream.track(&pair.clip.frames[2]).await["frame"], 2);
-        let mut other = StreamClient::open(pair.replicas[1].address, pair.id, "").await;
+        let mut other = StreamClient::open_in_time(pair.replicas[1].address, pair.id, "").await;
         assert_eq!(other.track(&pair.clip.frames[3]).await["frame"], 3);
 
         let snapshot = pair.client.get(pair.url(0, "/snapshot")).send().await;

@@ -6,3 +6,4 @@ pub mod pictures;
 pub mod program;
 pub mod replica;
 pub mod server;
+pub mod stream_client;

@@ -1,9 +1,9 @@
 //! A client of a session's stream.
 
-use crate::application::TestApplication;
-use bagtrack_testing::within::within;
+use crate::within::within;
 use futures_util::{SinkExt, StreamExt};
 use serde_json::Value;
+use std::fmt::Display;
 use std::net::SocketAddr;
 use tokio::net::TcpStream;
 use tokio_tungstenite::WebSocketStream;
@@ -19,7 +19,7 @@ pub struct StreamClient {
 }
 
 /// What comes from the service.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub enum Received {
     Message(Value),
     Closed(u16),
@@ -30,7 +30,7 @@ impl StreamClient {
     /// Opens the stream of a session at `address`.
     pub async fn try_open(
         address: SocketAddr,
-        id: &str,
+        id: impl Display,
         query: &str,
         headers: &[(&'static str, &str)],
     ) -> Result<Self, Response<Option<Vec<u8>>>> {
@@ -52,16 +52,31 @@ impl StreamClient {
         Ok(client)
     }
 
-    pub async fn open(app: &TestApplication, id: &str, query: &str) -> Self {
-        let opened = Self::try_open(app.address, id, query, &[]).await;
+    pub async fn open(address: SocketAddr, id: impl Display, query: &str) -> Self {
+        let opened = Self::try_open(address, id, query, &[]).await;
         opened.unwrap_or_else(|response| panic!("{response:?}"))
     }
 
-    pub async fn send(&mut self, frame: Vec<u8>) {
-        self.socket
-            .send(Message::binary(frame))
-            .await
-            .expect("the stream is open");
+    /// Opens the stream as soon as the service has the time for it.
+    pub async fn open_in_time(address: SocketAddr, id: impl Display, query: &str) -> Self {
+        loop {
+            match Self::try_open(address, &id, query, &[]).await {
+                Ok(client) => return client,
+                Err(response) if response.status() == 503 => {}
+                Err(response) => panic!("{response:?}"),
+            }
+        }
+    }
+
+    pub async fn send(&mut self, frame: impl AsRef<[u8]>) {
+        let message = Message::binary(frame.as_ref().to_vec());
+        self.socket.send(message).await.expect("the stream is open");
+    }
+
+    /// The answer to a frame that is sent now.
+    pub async fn track(&mut self, frame: impl AsRef<[u8]>) -> Value {
+        self.send(frame).await;
+        self.message().await
     }
 
     pub async fn say(&mut self, text: impl Into<String>) {
