@@ -21,6 +21,13 @@ impl Clip {
         }
     }
 
+    /// The clips of so many clients, each with so many frames after the first.
+    pub fn of_each(clients: usize, frames: usize) -> Vec<Self> {
+        (0..clients)
+            .map(|client| Self::of(client, frames + 1))
+            .collect()
+    }
+
     fn video(root: &Path, client: usize, frames: usize) -> Self {
         let folders = std::fs::read_dir(root).expect("BAGTRACK_SEQUENCES names a folder");
         let mut folders: Vec<PathBuf> = folders

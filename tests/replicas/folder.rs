@@ -1,9 +1,10 @@
 //! One process with its store in a folder: killed, on a full disk, and beside another one.
 
-use crate::chaos::{Progress, SECRET, setting, undisturbed};
+use crate::chaos::setting;
 use crate::clip::Clip;
 use crate::replica::Replica;
 use crate::tracking_client::Track;
+use crate::tracks::{SECRET, Tracks, undisturbed};
 use bagtrack_testing::command::program;
 use bagtrack_testing::service::program::{Program, serve_after};
 use reqwest::{Client, StatusCode};
@@ -14,10 +15,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use tempfile::TempDir;
-use tokio::task::JoinSet;
 
 /// A folder, and the setting that names it.
 fn folder() -> (TempDir, String) {
@@ -32,55 +30,21 @@ const KILLS: usize = 6;
 /// Clients go on through `kill -9`: no track and no answered frame is lost, and all boxes are those of an undisturbed
 /// run.
 async fn goes_on_when_killed(durability: &str, (clients, frames): (usize, usize)) {
-    let clips: Vec<Clip> = (0..clients)
-        .map(|client| Clip::of(client, frames + 1))
-        .collect();
+    let clips = Clip::of_each(clients, frames);
     let expected = undisturbed(&clips).await;
     let (_folder, store) = folder();
     let flags = [&["--durability", durability], &SECRET[..]].concat();
     let mut replica = Replica::with_store(&store, &flags);
-    let progress = Arc::new(Progress::default());
-    let mut tracks = JoinSet::new();
-    for (number, clip) in clips.into_iter().enumerate() {
-        let (base, progress) = (replica.url(""), progress.clone());
-        tracks.spawn(async move {
-            let mut track = Track::open(base, Client::new(), number, clip).await;
-            while track.advance().await {
-                progress.frames.fetch_add(1, Ordering::AcqRel);
-                progress.moved.notify_waiters();
-            }
-            let state = track.snapshot().await;
-            (number, track, state)
+    let mut tracks = Tracks::start(&replica.url(""), &clips, true);
+    for kill in 1..=KILLS {
+        let frames = kill * clients * frames / (KILLS + 1);
+        tracks.reach_together(frames).await;
+        tokio::task::block_in_place(|| {
+            replica.kill();
+            replica.start_again();
         });
     }
-    let kill = async {
-        for kill in 1..=KILLS {
-            progress
-                .reaches(kill * clients * frames / (KILLS + 1))
-                .await;
-            tokio::task::block_in_place(|| {
-                replica.kill();
-                replica.start_again();
-            });
-        }
-    };
-    let mut done = 0;
-    let finish = async {
-        while let Some(track) = tracks.join_next().await {
-            let (number, track, state) = track.expect("a track was lost");
-            assert!(
-                !track.went_back(),
-                "client {number}: an answered frame was lost"
-            );
-            let (answers, last) = &expected[number];
-            assert_eq!(track.answers.len(), frames, "client {number}");
-            assert_eq!(&track.answers, answers, "client {number}");
-            assert!(state == *last, "client {number}: another state");
-            done += 1;
-        }
-    };
-    tokio::join!(finish, kill);
-    assert_eq!(done, clients);
+    tracks.end_as(&expected).await;
     println!(
         "{clients} clients, {frames} frames each, killed {KILLS} times, durability {durability}"
     );

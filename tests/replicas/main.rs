@@ -15,6 +15,7 @@ mod shares;
 mod sharing;
 mod streams;
 mod tracking_client;
+mod tracks;
 mod trouble;
 mod upgrade;
 

@@ -4,21 +4,20 @@
 //! Replicas are replaced one by one, forth and back, while clients go on: no track and no answered frame is lost.
 
 use crate::balancers::haproxy;
-use crate::chaos::{SECRET, setting};
+use crate::chaos::setting;
 use crate::clip::Clip;
 use crate::lossy::Lossy;
 use crate::pair::{Pair, json};
 use crate::replica::Replica;
 use crate::server::Redis;
 use crate::stream_client::StreamClient;
-use crate::tracking_client::{Answer, Track};
+use crate::tracking_client::Answer;
+use crate::tracks::{SECRET, Tracks, check, undisturbed_by};
 use bagtrack_testing::command::program;
-use reqwest::{Client, StatusCode};
+use reqwest::StatusCode;
 use serde_json::Value;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use tokio::sync::watch;
-use tokio::task::JoinSet;
 
 /// The program of the release before, and this one.
 fn programs() -> [PathBuf; 2] {
@@ -41,19 +40,6 @@ async fn answered(replica: &Replica) -> u64 {
         rest.split_once("} ")?.1.parse::<u64>().ok()
     });
     counts.sum()
-}
-
-/// What each client gets from one process of a program: the answers, and the state that they lead to.
-async fn alone(program: &Path, clips: &[Clip]) -> Vec<(Vec<Answer>, Vec<u8>)> {
-    let replica = Replica::start_program(program, &[], &SECRET);
-    let mut tracks = Vec::new();
-    for (number, clip) in clips.iter().enumerate() {
-        let mut track = Track::open(replica.url(""), Client::new(), number, clip.clone()).await;
-        while track.advance().await {}
-        let state = track.snapshot().await;
-        tracks.push((track.answers, state));
-    }
-    tracks
 }
 
 /// How far two boxes overlap, of the area that they cover.
@@ -84,53 +70,6 @@ const ROLL: [(usize, bool); 7] = [
     (1, true),
 ];
 
-/// Clients that go on in phases: in the first half of each all replicas run, in the second one of them is replaced.
-struct Clients {
-    tracks: JoinSet<(usize, Track, Vec<u8>)>,
-    /// How many frames each client may send.
-    allowed: watch::Sender<usize>,
-    /// How many each has answers to.
-    reached: Vec<watch::Receiver<usize>>,
-}
-
-impl Clients {
-    fn start(base: &str, clips: &[Clip], keeps_connections: bool) -> Self {
-        let (allowed, allows) = watch::channel(0);
-        let (mut tracks, mut reached) = (JoinSet::new(), Vec::new());
-        for (number, clip) in clips.iter().cloned().enumerate() {
-            let idle = if keeps_connections { 1 } else { 0 };
-            let client = Client::builder().pool_max_idle_per_host(idle).build();
-            let (base, mut allows) = (base.to_owned(), allows.clone());
-            let (tell, told) = watch::channel(0);
-            reached.push(told);
-            tracks.spawn(async move {
-                let mut track = Track::open(base, client.unwrap(), number, clip.clone()).await;
-                while track.answers.len() + 1 < clip.frames.len() {
-                    let count = track.answers.len();
-                    allows.wait_for(|allowed| *allowed > count).await.unwrap();
-                    assert!(track.advance().await);
-                    tell.send_replace(track.answers.len());
-                }
-                let state = track.snapshot().await;
-                (number, track, state)
-            });
-        }
-        Self {
-            tracks,
-            allowed,
-            reached,
-        }
-    }
-
-    /// Waits until all have so many answers, or one has failed.
-    async fn reach(&mut self, frames: usize) {
-        for reached in &mut self.reached {
-            let reached = reached.wait_for(|count| *count >= frames).await;
-            reached.expect("a track was lost");
-        }
-    }
-}
-
 /// The documented restart of a replica, with another program: it drains, ends with status 0, and the next one is
 /// waited for.
 async fn replace(replica: &mut Replica, program: &Path) {
@@ -143,9 +82,10 @@ async fn replace(replica: &mut Replica, program: &Path) {
     while replica.readiness().await != StatusCode::OK {}
 }
 
-/// Replaces replicas while clients go on. Gives how many frames each program has answered.
+/// Replaces replicas while clients go on in phases: in the first half of each all replicas run, in the second one of
+/// them is replaced. Gives how many frames each program has answered.
 async fn roll(
-    (clients, frames): (&mut Clients, usize),
+    (tracks, frames): (&mut Tracks, usize),
     (replicas, programs): (&mut [Replica], &[PathBuf; 2]),
     steps: &Steps,
 ) -> [u64; 2] {
@@ -154,15 +94,15 @@ async fn roll(
     let phase = frames / (steps.len() + 1);
     assert!(phase >= 2, "too few frames");
     for (number, (at, new)) in steps.iter().enumerate() {
-        clients.allowed.send_replace(number * phase + phase / 2);
-        clients.reach(number * phase + phase / 2).await;
+        tracks.allow(number * phase + phase / 2);
+        tracks.reach(number * phase + phase / 2).await;
         counts[usize::from(news[*at])] += answered(&replicas[*at]).await;
-        clients.allowed.send_replace((number + 1) * phase);
+        tracks.allow((number + 1) * phase);
         replace(&mut replicas[*at], &programs[usize::from(*new)]).await;
         news[*at] = *new;
     }
-    clients.allowed.send_replace(frames);
-    clients.reach(frames).await;
+    tracks.allow(frames);
+    tracks.reach(frames).await;
     for (replica, new) in replicas.iter().zip(news) {
         counts[usize::from(new)] += answered(replica).await;
     }
@@ -170,15 +110,13 @@ async fn roll(
 }
 
 /// What clients got, against what each program alone gives.
-async fn compare(clients: Clients, programs: &[PathBuf; 2], clips: &[Clip], every: u64) {
+async fn compare(tracks: Tracks, programs: &[PathBuf; 2], clips: &[Clip], every: u64) {
     let frames = clips[0].frames.len() - 1;
     let [old, new] = [
-        alone(&programs[0], clips).await,
-        alone(&programs[1], clips).await,
+        undisturbed_by(&programs[0], clips).await,
+        undisturbed_by(&programs[1], clips).await,
     ];
-    let done = clients.tracks.join_all().await;
-    assert_eq!(done.len(), clips.len());
-    for (number, track, state) in done {
+    for (number, (track, state)) in tracks.end().await.into_iter().enumerate() {
         assert!(!track.was_lost(), "client {number}: a track was lost");
         // Between two checkpoints, a replica that takes over asks for frames again.
         assert!(
@@ -187,8 +125,7 @@ async fn compare(clients: Clients, programs: &[PathBuf; 2], clips: &[Clip], ever
         );
         assert_eq!(track.answers.len(), frames, "client {number}");
         if old[number] == new[number] {
-            assert_eq!(track.answers, new[number].0, "client {number}");
-            assert!(state == new[number].1, "client {number}: another state");
+            check(number, (&track, &state), &new[number]);
             continue;
         }
         // Trackers that differ make a track that is that of neither.
@@ -212,9 +149,7 @@ enum Front {
 fn clips() -> Vec<Clip> {
     let clients = setting("BAGTRACK_REPLICAS_CLIENTS", 6);
     let frames = setting("BAGTRACK_REPLICAS_FRAMES", 48);
-    (0..clients)
-        .map(|client| Clip::of(client, frames + 1))
-        .collect()
+    Clip::of_each(clients, frames)
 }
 
 async fn upgrade(front: Front, every: u64) {
@@ -239,13 +174,13 @@ async fn upgrade(front: Front, every: u64) {
         }
     };
     let base = format!("http://{address}");
-    let mut clients = Clients::start(&base, &clips, front == Front::Haproxy);
-    let counts = roll((&mut clients, frames), (&mut replicas, &programs), &ROLL);
+    let mut tracks = Tracks::start_with(0, &base, &clips, front == Front::Haproxy);
+    let counts = roll((&mut tracks, frames), (&mut replicas, &programs), &ROLL);
     let counts = counts.await;
     // All replicas had the one program at first, and the other at last.
     let least = (clips.len() * (frames / (ROLL.len() + 1) / 2)) as u64;
     assert!(counts.iter().all(|count| *count >= least), "{counts:?}");
-    compare(clients, &programs, &clips, every).await;
+    compare(tracks, &programs, &clips, every).await;
     println!("frames answered by the program before, and by this one: {counts:?}");
 }
 
@@ -276,12 +211,12 @@ async fn a_folder_goes_from_one_version_to_the_other_and_back() {
     let store = format!("file:{}", folder.path().join("sessions").display());
     let flags = [&["--store", &store], &SECRET[..]].concat();
     let mut replicas = [Replica::start_program(&programs[0], &[], &flags)];
-    let mut clients = Clients::start(&replicas[0].url(""), &clips, true);
+    let mut tracks = Tracks::start_with(0, &replicas[0].url(""), &clips, true);
     let steps = [(0, true), (0, false), (0, true)];
-    let counts = roll((&mut clients, frames), (&mut replicas, &programs), &steps);
+    let counts = roll((&mut tracks, frames), (&mut replicas, &programs), &steps);
     let counts = counts.await;
     assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
-    compare(clients, &programs, &clips, 1).await;
+    compare(tracks, &programs, &clips, 1).await;
 }
 
 /// What passes between versions beside frames: sessions that are opened again, stored answers, snapshots, tokens,
