@@ -2,6 +2,8 @@
 //! waiting takes no time where the test's time is paused.
 
 mod away;
+#[path = "../common/mod.rs"]
+mod common;
 mod frames;
 mod opening;
 mod renewal;

@@ -1,32 +1,23 @@
 //! A service without a store, its client, and pictures.
 
+use crate::common::{self, png};
 use bagtrack_sessions::{
-    Admission, Boxes, Clock, CreationKey, Executor, Flow, FrameBatch, FramesError,
-    IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Opened, Owner,
-    QueuePermit, QuotaExhausted, Registry, Reservation, ServiceParts, ServiceSettings, Session,
-    SessionQuota, SessionService, Start, StoreShare, Tracked, TrackingMetrics,
+    Admission, Boxes, Clock, CreationKey, Executor, FrameBatch, FramesError, Lease, OpenError,
+    OpenRequest, Opened, QuotaExhausted, Registry, Reservation, ServiceParts, Session,
+    SessionQuota, SessionService, Start, StoreShare, Tracked,
 };
-use bagtrack_tracker::{Params, Preset, Rect};
+use bagtrack_tracker::Rect;
 use bytes::Bytes;
-use image::{DynamicImage, GrayImage, ImageFormat, Luma};
-use metrics::Histogram;
-use std::io::Cursor;
+use image::{GrayImage, Luma};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-pub const FLOW: Flow = Flow(0);
+pub use crate::common::{FIRST, FLOW, params, place};
+
 /// Width and height of the pictures.
 pub const SIZE: (u32, u32) = (96, 72);
 pub const PIXELS: u64 = 96 * 72;
-/// The target in the first picture.
-pub const FIRST: Rect = Rect {
-    x: 20.0,
-    y: 15.0,
-    width: 16.0,
-    height: 12.0,
-};
-/// Another one, which stands.
+/// Another target, which stands.
 pub const SECOND: Rect = Rect {
     x: 60.0,
     y: 40.0,
@@ -93,10 +84,7 @@ pub fn picture(number: u32) -> Bytes {
         let target = first.or_else(|| patch(x, y, 60, 40, 20, 16));
         Luma([target.unwrap_or(40 + ((x * 3) ^ (y * 7)) as u8 % 60)])
     });
-    let mut bytes = Cursor::new(Vec::new());
-    let scene = DynamicImage::ImageLuma8(scene);
-    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
-    bytes.into_inner().into()
+    png(scene).into()
 }
 
 /// Pictures of these numbers.
@@ -106,49 +94,19 @@ pub fn pictures(numbers: std::ops::Range<u32>) -> Vec<Bytes> {
 
 /// A picture of another size.
 pub fn small_picture() -> Bytes {
-    let mut bytes = Cursor::new(Vec::new());
-    let scene = DynamicImage::ImageLuma8(GrayImage::new(48, 48));
-    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
-    bytes.into_inner().into()
-}
-
-pub fn params() -> Params {
-    let mut params = Preset::Paper.params();
-    params.particles = 20;
-    params
+    png(GrayImage::new(48, 48)).into()
 }
 
 /// The parts of a service whose work is done at once, on the thread that asks for it.
 pub fn parts(clock: &Clock) -> ServiceParts {
     let at_once = Executor::on_one_thread(|work| work()());
-    ServiceParts {
-        settings: ServiceSettings {
-            work_timeout: WORK_TIMEOUT,
-            max_request_cpu: WORK_TIMEOUT,
-            frame: bagtrack_ingest::Limits::default(),
-            max_request_pixels: u64::MAX,
-            max_frames: 64,
-            store_every: 1,
-        },
-        registry: Registry::new(SESSIONS, 4, LEASE, clock.clone()),
-        store: None,
-        admission: Admission::on(at_once, 8, 1, Duration::ZERO),
-        streams: OpenStreams::default(),
-        opened: IdempotencyStore::new(64),
-        keys: Arc::new(MacKeys::new("bagtrack tests of acts", &["secret"])),
-        expert: None,
-        tracking: TrackingMetrics::noop(),
-        queue_wait: Histogram::noop(),
-        draining: AtomicBool::new(false),
-    }
+    let registry = Registry::new(SESSIONS, 4, LEASE, clock.clone());
+    let admission = Admission::on(at_once, 8, 1, Duration::ZERO);
+    common::parts(registry, admission, WORK_TIMEOUT)
 }
 
 pub fn service(clock: &Clock) -> SessionService {
     SessionService::new(parts(clock))
-}
-
-pub fn place(service: &SessionService) -> QueuePermit {
-    service.admission.enter(FLOW, Box::new(())).unwrap()
 }
 
 /// A session begins in the first picture, with a box or a list of them.
@@ -167,14 +125,7 @@ pub fn request(
     digest: u8,
     start: Start,
 ) -> OpenRequest {
-    OpenRequest {
-        key,
-        owner: Owner::default(),
-        digest: [digest; 32],
-        start,
-        quota: Arc::new(FREE),
-        queue: place(service),
-    }
+    common::request(service, Arc::new(FREE), (key, digest), start)
 }
 
 pub async fn open(service: &SessionService, boxes: Boxes) -> Arc<Session> {

@@ -1,31 +1,22 @@
 //! What one replica makes of a session that another has, in a store that works.
 
+use crate::common::{FLOW, place};
 use crate::formats::{open, post};
 use crate::memory::MemoryStore;
-use crate::pictures::{FIRST, FRAMES, params, picture};
-use crate::world::{ID, LONG, parts, service, service_by};
+use crate::pictures::{FRAMES, picture};
+use crate::world::{ID, LONG, parts, service, service_by, start};
 use bagtrack_sessions::{
-    ActError, Boxes, Clock, Durability, FileStore, Flow, FrameBatch, FramesError, NoSession, Owner,
-    ReplayError, Session, SessionService, SessionStore, Start, Stopped, Tracked, clock,
+    ActError, Clock, Durability, FileStore, FrameBatch, FramesError, NoSession, Owner, ReplayError,
+    Session, SessionService, SessionStore, Start, Stopped, Tracked, clock,
 };
 use std::sync::Arc;
 use std::time::Duration;
-
-const FLOW: Flow = Flow(0);
-
-fn start() -> Start {
-    Start::Frame {
-        file: picture(0, 0).into(),
-        boxes: Boxes::One(FIRST),
-        params: Box::new(params(1)),
-    }
-}
 
 /// Two replicas, the first of which has opened a session.
 async fn two() -> [SessionService; 2] {
     let store: Arc<dyn SessionStore> = Arc::new(MemoryStore::default());
     let replicas = [0, 1].map(|_| service(Some(store.clone()), 1));
-    open(&replicas[0], ID, start()).await;
+    open(&replicas[0], ID, start(1)).await;
     replicas
 }
 
@@ -62,7 +53,7 @@ async fn an_early_frame_waits_for_those_that_another_replica_takes() {
     let [first, other] = two().await;
     let session = first.find(ID, &Owner::default(), FLOW).await.unwrap();
     let early = session.enter().unwrap();
-    let place = || first.admission.enter(FLOW, Box::new(())).unwrap();
+    let place = || place(&first);
     let waiting = first.wait_for_turn(&early, place(), Some(2));
     let elsewhere = post(&other, ID, (1, picture(0, 1).into()));
     let (turn, posted) = tokio::join!(waiting, elsewhere);
@@ -89,7 +80,7 @@ async fn send(
     picture: Vec<u8>,
 ) -> Result<Tracked, FramesError> {
     let session = cached(replica).await;
-    let place = replica.admission.enter(FLOW, Box::new(())).unwrap();
+    let place = place(replica);
     let batch = FrameBatch::posted(number, vec![picture.into()], None);
     let permit = session.enter().unwrap();
     replica.advance(permit, place, batch).await
@@ -100,7 +91,7 @@ async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
     for is_numbered in [true, false] {
         let replicas = two().await;
         let alone = service(None, 1);
-        open(&alone, ID, start()).await;
+        open(&alone, ID, start(1)).await;
         for number in 1..=FRAMES {
             let told = is_numbered.then_some(number);
             let expected = send(&alone, told, picture(0, number)).await.unwrap();
@@ -120,7 +111,7 @@ async fn frames_in_turns_at_two_replicas_have_the_answers_of_one() {
 async fn the_state_is_written_at_every_third_frame_and_at_each_before_the_end() {
     let store: Arc<dyn SessionStore> = Arc::new(MemoryStore::default());
     let replica = service(Some(store.clone()), 3);
-    open(&replica, ID, start()).await;
+    open(&replica, ID, start(1)).await;
     for (number, checkpoint) in [(1, 0), (2, 0), (3, 3), (4, 3)] {
         let tracked = send(&replica, Some(number), picture(0, number)).await;
         assert_eq!(tracked.unwrap().checkpoint, Some(checkpoint));
@@ -189,7 +180,7 @@ async fn a_look_at_a_replica_that_lacks_frames_tells_the_newest() {
     first.refresh(&session, None, FLOW).await.unwrap();
     assert_eq!(session.latest_frame(), 1);
     send(&other, Some(2), picture(0, 2)).await.unwrap();
-    let place = first.admission.enter(FLOW, Box::new(())).unwrap();
+    let place = place(&first);
     let snapshot = first.snapshot(session.read_permit().unwrap(), place).await;
     let alone = service(None, 1);
     open(&alone, ID, Start::Snapshot(snapshot.unwrap().into())).await;
@@ -215,7 +206,7 @@ async fn two_by(clock: &Clock, folder: &std::path::Path) -> ([SessionService; 2]
     let first = service_by(clock.clone(), Some(store.clone()), 1);
     let mut of = parts(clock.clone(), Some(store.clone()), 1);
     of.settings.work_timeout = Duration::from_millis(50);
-    open(&first, ID, start()).await;
+    open(&first, ID, start(1)).await;
     ([first, SessionService::new(of)], store)
 }
 

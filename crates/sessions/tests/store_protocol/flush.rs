@@ -1,9 +1,9 @@
 //! What a replica writes when it ends.
 
 use crate::formats::{open, post};
-use crate::pictures::{FIRST, params, picture};
-use crate::world::{ID, LONG, service, service_by};
-use bagtrack_sessions::{Boxes, Clock, Durability, FileStore, SessionStore, Start};
+use crate::pictures::picture;
+use crate::world::{ID, LONG, service, service_by, start};
+use bagtrack_sessions::{Clock, Durability, FileStore, SessionStore};
 use std::sync::Arc;
 
 /// Seeds 3419 and 13250 of the simulation: the last state was written with the time that was left of the session by the
@@ -15,12 +15,7 @@ async fn a_session_outlives_a_jump_of_the_clock_of_a_replica_that_ends() {
     let store: Arc<dyn SessionStore> = Arc::new(store.unwrap());
     let clock = Clock::default();
     let ending = service_by(clock.clone(), Some(store.clone()), 3);
-    let start = Start::Frame {
-        file: picture(0, 0).into(),
-        boxes: Boxes::One(FIRST),
-        params: Box::new(params(1)),
-    };
-    open(&ending, ID, start).await;
+    open(&ending, ID, start(1)).await;
     // Its state is not in the store yet.
     post(&ending, ID, (1, picture(0, 1).into())).await.unwrap();
     clock.advance(2 * LONG);

@@ -5,14 +5,14 @@
 //! its own: `BAGTRACK_FIXTURES=tests/fixtures/vX.Y.Z cargo test -p bagtrack-sessions --features redis --test
 //! store_protocol formats`.
 
+use crate::common::{FIRST, FLOW, keys, place};
 use crate::folder::copy;
-use crate::pictures::{FIRST, params, picture};
+use crate::pictures::{params, picture};
 use crate::redis::Redis;
-use crate::world::{NoQuota, keys, service};
+use crate::world::{request, service};
 use bagtrack_sessions::{
-    Boxes, Clock, CreationKey, Durability, Estimates, FileStore, Flow, FrameBatch, OpenRequest,
-    Owner, PerTarget, RedisAddress, RedisStore, SNAPSHOT_MAGIC, SessionService, SessionStore,
-    Start, Version,
+    Boxes, Clock, CreationKey, Durability, Estimates, FileStore, FrameBatch, Owner, PerTarget,
+    RedisAddress, RedisStore, SNAPSHOT_MAGIC, SessionService, SessionStore, Start, Version,
 };
 use bagtrack_tracker::{Params, Preset, Rect};
 use bytes::Bytes;
@@ -24,7 +24,6 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
 
-const FLOW: Flow = Flow(0);
 const LONG: Duration = Duration::from_secs(60);
 /// The frame at which the sessions of a release stand, and the last one.
 const AT: u64 = 2;
@@ -78,14 +77,7 @@ impl Kind {
 }
 
 pub async fn open(service: &SessionService, id: Uuid, start: Start) {
-    let request = OpenRequest {
-        key: Some(CreationKey::Id(id)),
-        owner: Owner::default(),
-        digest: [0; 32],
-        start,
-        quota: Arc::new(NoQuota),
-        queue: service.admission.enter(FLOW, Box::new(())).unwrap(),
-    };
+    let request = request(service, Some(CreationKey::Id(id)), 0, start);
     let opened = service.open(request).await.unwrap();
     assert!(!opened.replayed);
 }
@@ -98,9 +90,8 @@ pub async fn post(
 ) -> Result<Estimates, String> {
     let found = service.find(id, &Owner::default(), FLOW).await;
     let session = found.map_err(|error| error.to_string())?;
-    let queue = service.admission.enter(FLOW, Box::new(())).unwrap();
     let batch = FrameBatch::posted(Some(number), vec![file], None);
-    let tracked = service.advance(session.enter().unwrap(), queue, batch);
+    let tracked = service.advance(session.enter().unwrap(), place(service), batch);
     let mut tracked = tracked.await.map_err(|error| error.to_string())?;
     Ok(tracked.estimates.remove(0))
 }
@@ -301,14 +292,7 @@ async fn a_snapshot_of_a_later_version_is_refused() {
         let mut snapshot = release.snapshot(kind);
         snapshot[SNAPSHOT_MAGIC.len()] = LATER;
         let here = service(None, 1);
-        let request = OpenRequest {
-            key: None,
-            owner: Owner::default(),
-            digest: [0; 32],
-            start: Start::Snapshot(snapshot.into()),
-            quota: Arc::new(NoQuota),
-            queue: here.admission.enter(FLOW, Box::new(())).unwrap(),
-        };
+        let request = request(&here, None, 0, Start::Snapshot(snapshot.into()));
         let refused = here.open(request).await.unwrap_err().to_string();
         let told = "it has format version 99, and this service reads 4 and 5";
         assert!(refused.contains(told), "{refused}");

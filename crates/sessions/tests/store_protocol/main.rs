@@ -4,6 +4,8 @@
 //! delays, drops, repeats and forgets.
 
 mod cached;
+#[path = "../common/mod.rs"]
+mod common;
 mod expiry;
 mod flush;
 mod folder;

@@ -1,22 +1,15 @@
 //! The frames that a client and its rival send, and the boxes that each history of them has.
 
+use crate::common::{self, FIRST, png};
 use bagtrack_ingest::{Limits, decode_to};
 use bagtrack_sessions::Estimates;
-use bagtrack_tracker::{Frame, Params, Preset, Rect, Tracker};
-use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+use bagtrack_tracker::{Frame, Params, Tracker};
+use image::{GrayImage, Luma};
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::sync::{Mutex, OnceLock};
 
 /// The last frame that is sent.
 pub const FRAMES: u64 = 6;
-/// The target in the first frame.
-pub const FIRST: Rect = Rect {
-    x: 20.0,
-    y: 15.0,
-    width: 16.0,
-    height: 12.0,
-};
 
 /// Who sent each frame after the first: the client (0) or its rival (1).
 pub type History = Vec<u8>;
@@ -36,17 +29,14 @@ pub fn picture(sender: u8, number: u64) -> Vec<u8> {
             40 + ((x * 3) ^ (y * 7)) as u8 % 60
         }])
     });
-    let mut bytes = Cursor::new(Vec::new());
-    let scene = DynamicImage::ImageLuma8(scene);
-    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
-    bytes.into_inner()
+    png(scene)
 }
 
 pub fn params(seed: u64) -> Params {
-    let mut params = Preset::Paper.params();
-    params.particles = 20;
-    params.seed = seed;
-    params
+    Params {
+        seed,
+        ..common::params()
+    }
 }
 
 fn frame(sender: u8, number: u64) -> Frame {

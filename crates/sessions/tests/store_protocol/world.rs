@@ -1,22 +1,19 @@
 //! Two replicas with one store, a client, and its rival that sends other frames under the same numbers.
 
+use crate::common::{self, FIRST, FLOW, place};
 use crate::hostile::HostileStore;
-use crate::pictures::{FIRST, params, picture};
+use crate::pictures::{params, picture};
 use bagtrack_sessions::{
-    ActError, Admission, Boxes, Clock, CreationKey, Estimates, Flow, FrameBatch, FramesError,
-    IdempotencyStore, Lease, MacKeys, OpenError, OpenRequest, OpenStreams, Owner, Registry,
-    ReplayError, Reservation, ServiceParts, ServiceSettings, Session, SessionQuota, SessionService,
-    SessionStore, Start, StoreShare, StreamPlace, TrackingMetrics,
+    ActError, Admission, Boxes, Clock, CreationKey, Estimates, FrameBatch, FramesError, Lease,
+    OpenError, OpenRequest, Owner, Registry, ReplayError, Reservation, ServiceParts, Session,
+    SessionQuota, SessionService, SessionStore, Start, StoreShare, StreamPlace,
 };
-use metrics::Histogram;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 use uuid::Uuid;
 
 pub const LONG: Duration = Duration::from_secs(3600);
-const FLOW: Flow = Flow(0);
 pub const ID: Uuid = Uuid::from_u128(1);
 
 /// What is asked of a replica.
@@ -55,11 +52,6 @@ pub enum Answer {
     Ended,
     /// Why there is none.
     Nothing(String),
-}
-
-/// The keys of snapshots.
-pub fn keys() -> MacKeys {
-    MacKeys::new("bagtrack tests of stores", &["secret"])
 }
 
 #[derive(Debug)]
@@ -111,26 +103,30 @@ pub fn parts(clock: Clock, store: Option<Arc<dyn SessionStore>>, store_every: u6
         first: LONG,
         idle: LONG,
     };
-    ServiceParts {
-        settings: ServiceSettings {
-            work_timeout: LONG,
-            max_request_cpu: LONG,
-            frame: bagtrack_ingest::Limits::default(),
-            max_request_pixels: u64::MAX,
-            max_frames: 64,
-            store_every,
-        },
-        registry: Registry::new(8, 8, lease, clock).with_eviction(),
-        store,
-        admission: Admission::new(64, 1, Duration::ZERO).unwrap(),
-        streams: OpenStreams::default(),
-        opened: IdempotencyStore::new(64),
-        expert: None,
-        keys: Arc::new(keys()),
-        tracking: TrackingMetrics::noop(),
-        queue_wait: Histogram::noop(),
-        draining: AtomicBool::new(false),
+    let registry = Registry::new(8, 8, lease, clock).with_eviction();
+    let admission = Admission::new(64, 1, Duration::ZERO).unwrap();
+    let mut parts = common::parts(registry, admission, LONG);
+    (parts.store, parts.settings.store_every) = (store, store_every);
+    parts
+}
+
+/// A session with this seed begins in the client's first frame.
+pub fn start(seed: u64) -> Start {
+    Start::Frame {
+        file: picture(0, 0).into(),
+        boxes: Boxes::One(FIRST),
+        params: Box::new(params(seed)),
     }
+}
+
+/// A request for a session, with the digest that is this byte again and again.
+pub fn request(
+    service: &SessionService,
+    key: Option<CreationKey>,
+    digest: u8,
+    start: Start,
+) -> OpenRequest {
+    common::request(service, Arc::new(NoQuota), (key, digest), start)
 }
 
 impl Replica {
@@ -185,18 +181,8 @@ pub async fn answer(service: &SessionService, asked: &Asked) -> Answer {
             opened.unwrap_or_else(|error| Answer::Nothing(error.to_string()))
         }
         Asked::Open(seed) => {
-            let request = OpenRequest {
-                key: Some(CreationKey::Id(ID)),
-                owner: Owner::default(),
-                digest: [u8::try_from(*seed).unwrap(); 32],
-                start: Start::Frame {
-                    file: picture(0, 0).into(),
-                    boxes: Boxes::One(FIRST),
-                    params: Box::new(params(*seed)),
-                },
-                quota: Arc::new(NoQuota),
-                queue: service.admission.enter(FLOW, Box::new(())).unwrap(),
-            };
+            let digest = u8::try_from(*seed).unwrap();
+            let request = request(service, Some(CreationKey::Id(ID)), digest, start(*seed));
             match service.open(request).await {
                 Ok(opened) => Answer::Born(seed_of(&opened.session)),
                 Err(error) => Answer::Nothing(error.to_string()),
@@ -219,8 +205,7 @@ async fn track(service: &SessionService, batch: FrameBatch) -> Answer {
         Ok(permit) => permit,
         Err(error) => return Answer::Nothing(error.to_string()),
     };
-    let queue = service.admission.enter(FLOW, Box::new(())).unwrap();
-    match service.advance(permit, queue, batch).await {
+    match service.advance(permit, place(service), batch).await {
         Ok(mut tracked) => {
             let checkpoint = tracked.checkpoint.expect("there is a store");
             Answer::Tracked(seed, tracked.estimates.remove(0), checkpoint)

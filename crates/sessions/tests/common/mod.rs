@@ -1,0 +1,87 @@
+//! What the tests of acts and those of stores share: a service, its requests, and pictures.
+
+use bagtrack_sessions::{
+    Admission, CreationKey, Flow, IdempotencyStore, MacKeys, OpenRequest, OpenStreams, Owner,
+    QueuePermit, Registry, ServiceParts, ServiceSettings, SessionQuota, SessionService, Start,
+    TrackingMetrics,
+};
+use bagtrack_tracker::{Params, Preset, Rect};
+use image::{DynamicImage, GrayImage, ImageFormat};
+use metrics::Histogram;
+use std::io::Cursor;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+pub const FLOW: Flow = Flow(0);
+/// The target in the first picture.
+pub const FIRST: Rect = Rect {
+    x: 20.0,
+    y: 15.0,
+    width: 16.0,
+    height: 12.0,
+};
+
+pub fn png(scene: GrayImage) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let scene = DynamicImage::ImageLuma8(scene);
+    scene.write_to(&mut bytes, ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// Parameters with which a frame takes little time.
+pub fn params() -> Params {
+    let mut params = Preset::Paper.params();
+    params.particles = 20;
+    params
+}
+
+/// The parts of a service without a store, where a request may take so long.
+pub fn parts(registry: Registry, admission: Admission, limit: Duration) -> ServiceParts {
+    ServiceParts {
+        settings: ServiceSettings {
+            work_timeout: limit,
+            max_request_cpu: limit,
+            frame: bagtrack_ingest::Limits::default(),
+            max_request_pixels: u64::MAX,
+            max_frames: 64,
+            store_every: 1,
+        },
+        registry,
+        store: None,
+        admission,
+        streams: OpenStreams::default(),
+        opened: IdempotencyStore::new(64),
+        keys: Arc::new(keys()),
+        expert: None,
+        tracking: TrackingMetrics::noop(),
+        queue_wait: Histogram::noop(),
+        draining: AtomicBool::new(false),
+    }
+}
+
+/// The keys of snapshots.
+pub fn keys() -> MacKeys {
+    MacKeys::new("bagtrack tests of stores", &["secret"])
+}
+
+pub fn place(service: &SessionService) -> QueuePermit {
+    service.admission.enter(FLOW, Box::new(())).unwrap()
+}
+
+/// A request for a session, with the digest that is this byte again and again.
+pub fn request(
+    service: &SessionService,
+    quota: Arc<dyn SessionQuota>,
+    (key, digest): (Option<CreationKey>, u8),
+    start: Start,
+) -> OpenRequest {
+    OpenRequest {
+        key,
+        owner: Owner::default(),
+        digest: [digest; 32],
+        start,
+        quota,
+        queue: place(service),
+    }
+}
