@@ -1,8 +1,9 @@
 //! A request to open a session that is sent again gets the same answer, and opens no second one: it has an
 //! `Idempotency-Key`, or an id that its client made.
 //!
-//! A name is kept as long as its session ttl, so there are never more of them than sessions. Requests with one name
-//! are served one after the other. Problems are not stored: the request can be sent again after them.
+//! In memory a name is kept as long as its session, so there are never more of them than sessions. In a store none is
+//! kept: the [id follows](id_of) from the key, and the store takes the first of two sessions of one id. Requests with one
+//! name are served one after the other. Problems are not stored: the request can be sent again after them.
 
 use crate::Owner;
 use crate::sync::{Mutex, MutexGuard, PoisonError};
@@ -18,6 +19,15 @@ pub enum CreationKey {
     Key(Owner, String),
     /// The session's id, which the client has made.
     Id(Uuid),
+}
+
+/// The id of the session that an owner's idempotency key names, for a store with this secret. Nothing has to be kept of
+/// the key, and whoever does not know the secret cannot tell the id.
+pub(super) fn id_of(secret: &[u8; 32], owner: &Owner, key: &str) -> Uuid {
+    let owned = serde_json::json!([owner.name(), key]).to_string();
+    let hash = blake3::keyed_hash(secret, owned.as_bytes());
+    let (bytes, _) = hash.as_bytes().split_first_chunk().expect("it has 32");
+    uuid::Builder::from_random_bytes(*bytes).into_uuid()
 }
 
 /// The session that a request of one name opened, once there is one. Whoever holds the lock is about to open it.
@@ -68,6 +78,21 @@ impl IdempotencyStore {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_id_follows_from_the_secret_the_owner_and_the_key_and_from_all_of_them() {
+        let (ann, nobody) = (Owner::named("ann"), Owner::default());
+        let id = id_of(&[1; 32], &ann, "a");
+        assert_eq!(id, id_of(&[1; 32], &ann, "a"));
+        assert_eq!(id.get_version_num(), 4);
+        for other in [
+            id_of(&[2; 32], &ann, "a"),
+            id_of(&[1; 32], &ann, "b"),
+            id_of(&[1; 32], &nobody, "a"),
+        ] {
+            assert_ne!(other, id);
+        }
+    }
 
     #[tokio::test]
     async fn answers_go_with_their_sessions_and_entries_in_use_stay() {

@@ -1,11 +1,11 @@
 //! Opens sessions: once for each name, so that a request that comes again gets the same answer.
 
 use super::error::{OpenError, QuotaExhausted};
-use super::idempotency::CreationKey;
+use super::idempotency::{CreationKey, id_of};
 use super::service::SessionService;
 use super::start::Start;
 use crate::clock::timeout;
-use crate::random::new_id;
+use crate::random::{new_id, random};
 use crate::store::{Counted, Outcome, Record, SessionName, StoreShare, Version};
 use crate::{
     ActError, NewSession, Owner, QueuePermit, Reservation, Session, SessionState, Stopped,
@@ -127,7 +127,7 @@ impl SessionService {
     }
 
     /// The id of the session that an idempotency key names: of the one that is open, or a new one. With a store, all
-    /// replicas find the same.
+    /// replicas find the same, and a request that opens nothing leaves nothing there.
     async fn id_of_key(
         &self,
         owner: &Owner,
@@ -137,10 +137,9 @@ impl SessionService {
         if let Some(live) = opened.filter(|id| self.registry.is_live(*id)) {
             return Ok(live);
         }
-        let new = new_id();
         match &self.store {
-            None => Ok(new),
-            Some(store) => Ok(store.claim(owner, key, new).await?),
+            None => Ok(new_id()),
+            Some(store) => Ok(id_of(&store.secret(random()).await?, owner, key)),
         }
     }
 

@@ -1,7 +1,6 @@
 //! What a store of sessions does, whatever keeps them.
 
 use super::record::{Record, SessionName, Version};
-use crate::opening::Owner;
 use futures_util::future::BoxFuture;
 use std::fmt::Debug;
 use std::time::Duration;
@@ -107,8 +106,8 @@ pub trait SessionStore: Debug + Send + Sync {
     /// Ends a session, and remembers for `ttl` that it was ended. False where it had ended before.
     fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool>;
 
-    /// The id that an owner's idempotency key names: `id`, if it names none yet.
-    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid>;
+    /// A random number that all who use the store have in common and clients do not know: `new`, if there is none yet.
+    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]>;
 
     /// Whether the store answers and takes writes.
     fn is_ready(&self) -> bool;

@@ -1,7 +1,7 @@
 //! How long the store in a folder keeps what it has, by a clock that is moved.
 
 use crate::folder::{Known, open_by};
-use bagtrack_sessions::{Clock, FileStore, Outcome, Owner, SessionStore};
+use bagtrack_sessions::{Clock, FileStore, Outcome, SessionStore};
 use std::time::{Duration, SystemTime};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -73,17 +73,13 @@ async fn an_ended_session_is_known_as_ended_for_its_time() {
 }
 
 #[tokio::test]
-async fn a_key_names_its_session_for_a_day() {
+async fn the_secret_outlives_sessions() {
     let (folder, clock) = (TempDir::new().unwrap(), Clock::default());
     let mut store = open_by(folder.path(), &clock);
-    let (ann, first, second) = (Owner::named("ann"), Uuid::new_v4(), Uuid::new_v4());
-    assert_eq!(store.claim(&ann, "key", first).await.unwrap(), first);
-    clock.advance(23 * HOUR + ALMOST);
+    assert_eq!(store.secret([1; 32]).await.unwrap(), [1; 32]);
+    clock.advance(1000 * 24 * HOUR);
     store = swept(store, &folder, &clock).await;
-    assert_eq!(store.claim(&ann, "key", second).await.unwrap(), first);
-    clock.advance(2 * MINUTE);
-    assert_eq!(store.claim(&ann, "key", second).await.unwrap(), second);
-    assert_eq!(store.claim(&ann, "key", first).await.unwrap(), second);
+    assert_eq!(store.secret([2; 32]).await.unwrap(), [1; 32]);
 }
 
 #[tokio::test]

@@ -2,8 +2,7 @@
 
 use crate::records::Backend;
 use bagtrack_sessions::{
-    Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, StoreUnavailable,
-    Version,
+    Commit, Outcome, Record, SessionName, SessionStore, StoreFuture, StoreUnavailable, Version,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -281,9 +280,8 @@ impl SessionStore for HostileStore {
         self.call(false, move |records| records.end(name))
     }
 
-    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
-        let (owner, key) = (owner.clone(), key.to_owned());
-        self.call(false, move |records| records.claim(&owner, &key, id))
+    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
+        self.call(false, move |records| records.secret(new))
     }
 
     fn is_ready(&self) -> bool {

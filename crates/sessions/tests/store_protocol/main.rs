@@ -11,6 +11,7 @@ mod flush;
 mod folder;
 mod formats;
 mod hostile;
+mod keys;
 mod memory;
 mod pictures;
 mod records;

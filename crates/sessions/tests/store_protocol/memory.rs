@@ -1,9 +1,7 @@
 //! A store in memory, with the rules of the scripts that Redis runs.
 
 use crate::records::Backend;
-use bagtrack_sessions::{
-    Commit, Outcome, Owner, Record, SessionName, SessionStore, StoreFuture, Version,
-};
+use bagtrack_sessions::{Commit, Outcome, Record, SessionName, SessionStore, StoreFuture, Version};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
@@ -22,7 +20,7 @@ struct Kept {
 pub struct Records {
     kept: HashMap<Uuid, Kept>,
     ended: BTreeSet<SessionName>,
-    claimed: HashMap<(Option<String>, String), Uuid>,
+    secret: Option<[u8; 32]>,
 }
 
 impl Kept {
@@ -133,9 +131,8 @@ impl Backend for Records {
         is_here
     }
 
-    fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid {
-        let name = (owner.name().map(str::to_owned), key.to_owned());
-        *self.claimed.entry(name).or_insert(id)
+    fn secret(&mut self, new: [u8; 32]) -> [u8; 32] {
+        *self.secret.get_or_insert(new)
     }
 
     /// Loses all records.
@@ -197,8 +194,8 @@ impl SessionStore for MemoryStore {
         at_once(self.records().end(name))
     }
 
-    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
-        at_once(self.records().claim(owner, key, id))
+    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
+        at_once(self.records().secret(new))
     }
 
     fn is_ready(&self) -> bool {

@@ -1,8 +1,7 @@
 //! What keeps the records of a store that misbehaves: memory, or a folder.
 
 use bagtrack_sessions::{
-    Clock, Commit, Durability, FileStore, Outcome, Owner, Record, SessionName, SessionStore,
-    Version,
+    Clock, Commit, Durability, FileStore, Outcome, Record, SessionName, SessionStore, Version,
 };
 use futures_util::future::FutureExt;
 use std::time::Duration;
@@ -20,7 +19,7 @@ pub trait Backend: Send {
     fn check(&mut self, name: SessionName, version: Version, takes_over: bool) -> Outcome;
     fn fence(&mut self, name: SessionName, version: Version) -> Outcome;
     fn end(&mut self, name: SessionName) -> bool;
-    fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid;
+    fn secret(&mut self, new: [u8; 32]) -> [u8; 32];
     /// Loses all records.
     fn forget(&mut self);
     /// Ends, and begins again with what was kept.
@@ -93,8 +92,8 @@ impl Backend for InFolder {
         Self::wait(self.store().end(name, LONG))
     }
 
-    fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Uuid {
-        Self::wait(self.store().claim(owner, key, id))
+    fn secret(&mut self, new: [u8; 32]) -> [u8; 32] {
+        Self::wait(self.store().secret(new))
     }
 
     fn forget(&mut self) {

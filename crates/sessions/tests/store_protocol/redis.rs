@@ -3,8 +3,7 @@
 use crate::folder::Known;
 use crate::suite::{TTL, holds_for, is_committed, record, told};
 use bagtrack_sessions::{
-    Commit, Counted, Outcome, Owner, RedisAddress, RedisStore, SessionName, SessionStore,
-    StoreShare,
+    Commit, Counted, Outcome, RedisAddress, RedisStore, SessionName, SessionStore, StoreShare,
 };
 use redis::FromRedisValue;
 use std::io::{Read, Write};
@@ -44,12 +43,12 @@ impl Redis {
         Self { process, port }
     }
 
-    async fn store(&self, timeout: Duration) -> RedisStore {
+    pub async fn store(&self, timeout: Duration) -> RedisStore {
         store_at(self.port, timeout).await
     }
 
     /// What a command answers.
-    fn ask<T: FromRedisValue>(&self, words: &[&str]) -> T {
+    pub fn ask<T: FromRedisValue>(&self, words: &[&str]) -> T {
         let client = redis::Client::open(format!("redis://127.0.0.1:{}", self.port)).unwrap();
         let mut command = redis::cmd(words[0]);
         command.arg(&words[1..]);
@@ -190,8 +189,7 @@ async fn all_that_is_in_redis_goes_by_itself() {
     session.advance_for(&store, TTL).await;
     let ended = Known::create(&store, 2, TTL).await;
     assert!(store.end(ended.name, 2 * TTL).await.unwrap());
-    let owner = Owner::named("ann");
-    store.claim(&owner, "key", session.name.id).await.unwrap();
+    store.secret([1; 32]).await.unwrap();
     let keys: Vec<String> = redis.ask(&["KEYS", "*"]);
     let day = Duration::from_secs(24 * 3600);
     let mut kinds = Vec::new();
@@ -202,7 +200,7 @@ async fn all_that_is_in_redis_goes_by_itself() {
             "probe" => (Duration::ZERO, Duration::from_secs(1)),
             "session" => (TTL / 2, TTL),
             "ended" => (TTL, 2 * TTL),
-            "key" => (day - TTL, day),
+            "secret" => (30 * day - TTL, 30 * day),
             "client" => (7 * day - TTL, 7 * day),
             _ => panic!("{key}"),
         };
@@ -214,7 +212,7 @@ async fn all_that_is_in_redis_goes_by_itself() {
     }
     kinds.retain(|kind| kind != "probe");
     kinds.sort();
-    assert_eq!(kinds, ["client", "ended", "key", "session"]);
+    assert_eq!(kinds, ["client", "ended", "secret", "session"]);
 }
 
 #[tokio::test]

@@ -10,7 +10,6 @@ use super::rules::{Fault, OwnedCommit};
 use super::shares::Shares;
 use super::writer::{Call, Health, Ruled, Writer};
 use crate::clock::{Clock, timeout};
-use crate::opening::Owner;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -151,9 +150,8 @@ impl SessionStore for FileStore {
         })
     }
 
-    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
-        let (owner, key) = (owner.clone(), key.to_owned());
-        self.call(move |transaction| transaction.claim(&owner, &key, id))
+    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
+        self.call(move |transaction| transaction.secret(new))
     }
 
     fn is_ready(&self) -> bool {

@@ -100,13 +100,14 @@ pub(super) struct Tables {
     pub(super) states: SingleWriterTxKeyspace,
     /// Until when it is known that a session was ended, by its name.
     pub(super) ended: SingleWriterTxKeyspace,
-    /// Until when an idempotency key names a session, and the session's id.
-    pub(super) claims: SingleWriterTxKeyspace,
+    /// What the store notes of itself, by name, each with the moment until which it holds. v0.1.0 had idempotency keys
+    /// here.
+    pub(super) notes: SingleWriterTxKeyspace,
 }
 
 impl Tables {
     fn all(&self) -> [&SingleWriterTxKeyspace; 4] {
-        [&self.rows, &self.states, &self.ended, &self.claims]
+        [&self.rows, &self.states, &self.ended, &self.notes]
     }
 }
 
@@ -184,7 +185,7 @@ impl Database {
                 rows: inner.keyspace("rows", options)?,
                 states: inner.keyspace("states", options)?,
                 ended: inner.keyspace("ended", options)?,
-                claims: inner.keyspace("claims", options)?,
+                notes: inner.keyspace("claims", options)?,
             },
             compaction: None,
             is_closing: Arc::default(),
@@ -253,7 +254,7 @@ impl Database {
                 break;
             }
         }
-        for table in [&self.tables.ended, &self.tables.claims] {
+        for table in [&self.tables.ended, &self.tables.notes] {
             for entry in snapshot.iter(table) {
                 let (key, until) = entry.into_inner()?;
                 if moment(&until).is_none_or(|until| until <= now) {

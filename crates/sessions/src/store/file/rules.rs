@@ -4,13 +4,14 @@ use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
 use super::database::{Transaction, moment};
 use super::row::{Row, with_frame};
-use crate::opening::Owner;
 use fjall::Readable;
 use std::time::Duration;
 use uuid::Uuid;
 
-/// How long an idempotency key names its session.
-const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+/// The note of the store's secret.
+const SECRET: &str = "secret";
+/// The moment at which a note is over.
+const NEVER: u64 = u64::MAX;
 
 /// Why a call did nothing.
 #[derive(Debug, thiserror::Error)]
@@ -278,21 +279,25 @@ impl Transaction<'_> {
         Ok(is_here)
     }
 
-    pub(super) fn claim(&mut self, owner: &Owner, key: &str, id: Uuid) -> Result<Uuid, Fault> {
-        let owned = serde_json::json!([owner.name(), key]).to_string();
-        let name = *blake3::hash(owned.as_bytes()).as_bytes();
-        let claimed = self.inner.get(&self.tables.claims, name)?;
-        let until = claimed.as_ref().and_then(|bytes| moment(bytes));
-        if until.is_some_and(|until| until > self.now)
-            && let Some(first) = claimed.and_then(|bytes| Uuid::from_slice(bytes.get(8..)?).ok())
-        {
-            return Ok(first);
+    pub(super) fn secret(&mut self, new: [u8; 32]) -> Result<[u8; 32], Fault> {
+        if let Some(secret) = self.note(SECRET)? {
+            return Ok(secret);
         }
-        let mut value = [0; 24];
-        value[..8].copy_from_slice(&self.expiry(CLAIMED).to_be_bytes());
-        value[8..].copy_from_slice(id.as_bytes());
-        self.inner.insert(&self.tables.claims, name, value);
+        self.put_note(SECRET, &new);
+        Ok(new)
+    }
+
+    /// What the store has noted of itself under this name.
+    fn note<const N: usize>(&self, name: &str) -> Result<Option<[u8; N]>, Fault> {
+        let note = self.inner.get(&self.tables.notes, name)?;
+        Ok(note.and_then(|bytes| bytes.get(8..)?.try_into().ok()))
+    }
+
+    fn put_note(&mut self, name: &str, value: &[u8]) {
+        let bytes = [&NEVER.to_be_bytes(), value].concat();
+        self.written_bytes += bytes.len() as u64;
+        self.inner
+            .insert(&self.tables.notes, name.as_bytes(), bytes);
         self.promises = true;
-        Ok(id)
     }
 }

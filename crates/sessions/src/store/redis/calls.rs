@@ -9,7 +9,6 @@ use super::connection::{Call, Connection};
 use super::script::{NewHash, Script, ScriptCall, ScriptServer};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
-use crate::opening::Owner;
 use crate::random::random;
 use redis::FromRedisValue;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,8 +18,8 @@ use uuid::Uuid;
 
 /// How long a state stays in the server where the script that commits it did not run.
 const UNCOMMITTED: Duration = Duration::from_secs(10);
-/// How long an idempotency key names its session.
-const CLAIMED: Duration = Duration::from_secs(24 * 3600);
+/// How long the secret stays after a session was last opened with an idempotency key.
+const SECRET: Duration = Duration::from_secs(30 * 24 * 3600);
 /// How long a client's sessions are counted after it opened the last one.
 const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
 /// Most sessions of a client that are looked at together, where it has no room for another.
@@ -313,15 +312,14 @@ impl SessionStore for RedisStore {
         Box::pin(self.0.connection.call(Call::Script(script)))
     }
 
-    fn claim<'a>(&'a self, owner: &'a Owner, key: &'a str, id: Uuid) -> StoreFuture<'a, Uuid> {
-        let owned = serde_json::json!([owner.name(), key]).to_string();
-        let name = blake3::hash(owned.as_bytes()).to_hex();
-        let name = format!("{}:key:{name}", self.0.prefix);
-        let mut script = self.0.scripts.claim.key(&name);
-        script.arg(id.to_string()).arg(milliseconds(CLAIMED));
+    fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
+        let key = format!("{}:secret", self.0.prefix);
+        let mut script = self.0.scripts.secret.key(key);
+        script.arg(&new[..]).arg(milliseconds(SECRET));
         Box::pin(async move {
-            let claimed: String = self.0.connection.call(Call::Script(script)).await?;
-            Ok(claimed.parse().unwrap_or(id))
+            let secret: Vec<u8> = self.0.connection.call(Call::Script(script)).await?;
+            let secret = <[u8; 32]>::try_from(secret);
+            secret.map_err(|_| StoreUnavailable("its secret is damaged".to_owned()))
         })
     }
 

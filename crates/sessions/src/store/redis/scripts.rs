@@ -116,10 +116,13 @@ redis.call('HINCRBY', key, 'generation', 1)
 return {1, redis.call('PTTL', key)}
 ";
 
-/// ARGV: an id, milliseconds to live. Answers the id that came first under this key.
-const CLAIM: &str = r"
-local id = redis.call('GET', KEYS[1])
-if id then return id end
+/// ARGV: a secret, milliseconds to live after it was asked for last. Answers the secret that came first.
+const SECRET: &str = r"
+local secret = redis.call('GET', KEYS[1])
+if secret then
+  redis.call('PEXPIRE', KEYS[1], ARGV[2])
+  return secret
+end
 redis.call('SET', KEYS[1], ARGV[1], 'PX', ARGV[2])
 return ARGV[1]
 ";
@@ -166,7 +169,7 @@ pub(super) struct Scripts {
     pub(super) commit: Script,
     pub(super) check: Script,
     pub(super) fence: Script,
-    pub(super) claim: Script,
+    pub(super) secret: Script,
     pub(super) end: Script,
     pub(super) probe: Script,
     pub(super) admit: Script,
@@ -183,7 +186,7 @@ impl Scripts {
             commit: telling(&commit),
             check: telling(CHECK),
             fence: telling(FENCE),
-            claim: Script::new(CLAIM),
+            secret: Script::new(SECRET),
             end: Script::new(END),
             probe: Script::new(PROBE),
             admit: Script::new(ADMIT),
