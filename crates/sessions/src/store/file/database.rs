@@ -26,8 +26,10 @@ const COMPACTED_BYTES: u64 = 8 << 20;
 /// of the sessions that are there need it, and the tables when they are rewritten.
 const RESERVE: u64 = 10;
 const MAX_RESERVE: u64 = 1 << 30;
-/// Most rows that are dropped in one transaction.
+/// Most rows, and most marks of ended sessions, that are dropped in one transaction.
 const SWEPT_ROWS: usize = 1024;
+/// Of an entry without a state in memory, with what the map has beside it.
+pub(super) const ENTRY_BYTES: u64 = 128;
 
 /// A key that is no session's id.
 const NO_SESSION: [u8; 1] = [0];
@@ -248,17 +250,24 @@ impl Database {
                 sweep.dropped_bytes += row.state_bytes;
                 sweep.inner.remove(&self.tables.rows, id.clone());
                 sweep.inner.remove(&self.tables.states, id);
+                sweep.written_bytes += 2 * ENTRY_BYTES;
                 rows += 1;
             }
             if rows == SWEPT_ROWS {
                 break;
             }
         }
+        let mut marks = 0;
         for table in [&self.tables.ended, &self.tables.notes] {
             for entry in snapshot.iter(table) {
+                if marks == SWEPT_ROWS {
+                    break;
+                }
                 let (key, until) = entry.into_inner()?;
                 if moment(&until).is_none_or(|until| until <= now) {
                     sweep.inner.remove(table, key);
+                    sweep.written_bytes += ENTRY_BYTES;
+                    marks += 1;
                 }
             }
         }
@@ -269,7 +278,7 @@ impl Database {
             tracing::debug!(rows, bytes, "sessions in the store have expired");
         }
         self.account(&written)?;
-        Ok(rows == SWEPT_ROWS)
+        Ok(rows == SWEPT_ROWS || marks == SWEPT_ROWS)
     }
 
     /// Counts what was written. What is much goes to tables, and space that is not used is given back.

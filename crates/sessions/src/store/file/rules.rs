@@ -2,7 +2,7 @@
 
 use super::super::record::{Record, SessionName, UnreadableRecord, Version};
 use super::super::session_store::{Commit, Outcome};
-use super::database::{Transaction, moment};
+use super::database::{ENTRY_BYTES, Transaction, moment};
 use super::row::{Row, with_frame};
 use fjall::Readable;
 use std::time::Duration;
@@ -273,6 +273,7 @@ impl Transaction<'_> {
             self.drop_session(name.id);
         }
         let until = self.expiry(ttl).to_be_bytes();
+        self.written_bytes += ENTRY_BYTES;
         self.inner
             .insert(&self.tables.ended, ended_key(name), until);
         self.promises = true;
@@ -299,5 +300,36 @@ impl Transaction<'_> {
         self.inner
             .insert(&self.tables.notes, name.as_bytes(), bytes);
         self.promises = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::file::database::Database;
+    use fjall::PersistMode;
+
+    /// They were not counted, so the journal that has them stayed however many they were.
+    #[test]
+    fn marks_of_ended_sessions_count_as_written_and_are_dropped_in_parts() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut database = Database::open(folder.path()).unwrap();
+        let mut transaction = database.begin(1);
+        let ttl = Duration::from_millis(9);
+        for incarnation in 0..1500 {
+            let id = Uuid::from_u128(incarnation.into());
+            let name = SessionName { id, incarnation };
+            assert!(transaction.end(name, ttl).unwrap());
+        }
+        let written = transaction.write(PersistMode::Buffer).unwrap();
+        assert!(written.written_bytes > 1500 * 32);
+        assert!(!database.sweep(9).unwrap(), "their time is not over");
+        assert!(database.sweep(10).unwrap(), "there are more");
+        assert!(!database.sweep(10).unwrap());
+        let name = SessionName {
+            id: Uuid::from_u128(1499),
+            incarnation: 1499,
+        };
+        assert!(!database.begin(9).has_ended(name).unwrap());
     }
 }
