@@ -81,6 +81,9 @@ impl FileStore {
                 Ok(answer) => answer.map_err(|_| ended())?,
                 Err(_) => {
                     self.health.failures.fetch_add(1, Ordering::Relaxed);
+                    if !self.health.is_late.swap(true, Ordering::AcqRel) {
+                        tracing::error!("the store gives no answer in time");
+                    }
                     Err(StoreUnavailable("time is over".to_owned()))
                 }
             }
@@ -155,7 +158,8 @@ impl SessionStore for FileStore {
     }
 
     fn is_ready(&self) -> bool {
-        self.health.is_up.load(Ordering::Acquire)
+        let Health { is_up, is_late, .. } = &*self.health;
+        is_up.load(Ordering::Acquire) && !is_late.load(Ordering::Acquire)
     }
 
     fn is_full(&self) -> bool {
@@ -164,5 +168,50 @@ impl SessionStore for FileStore {
 
     fn failures(&self) -> u64 {
         self.health.failures.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clock::{now, sleep};
+    use crate::store::record::tests::record;
+
+    const LONG: Duration = Duration::from_secs(60);
+
+    /// A call that waited behind one that hung was written later, though its client had been told that it does not count;
+    /// and the store was called ready all the while.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_call_that_was_told_to_have_no_answer_is_not_done_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = |timeout| {
+            let clock = Clock::default();
+            FileStore::open(folder.path(), Durability::default(), timeout, clock).unwrap()
+        };
+        let store = open(Duration::from_millis(100));
+        let (release, released) = channel::<()>();
+        let (begin, begun) = channel();
+        let hangs = store.call(move |_| {
+            let _ = (begin.send(()), released.recv());
+            Ok(())
+        });
+        let (id, written) = (Uuid::from_u128(1), record(7, 3));
+        let late = async {
+            // The other one is at work, so this is of the next group.
+            tokio::task::block_in_place(|| begun.recv()).unwrap();
+            store.create(id, &written).await
+        };
+        let (hangs, late) = tokio::join!(hangs, late);
+        assert!(hangs.is_err() && late.is_err());
+        assert!(!store.is_ready());
+        release.send(()).unwrap();
+        let waits = now();
+        // Without any call.
+        while !store.is_ready() && waits.elapsed() < LONG {
+            sleep(Duration::from_millis(5)).await;
+        }
+        assert!(store.is_ready());
+        drop(store);
+        assert_eq!(open(LONG).load(id).await.unwrap(), None);
     }
 }

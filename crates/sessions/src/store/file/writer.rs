@@ -25,6 +25,8 @@ const REOPEN: (Duration, Duration) = (Duration::from_millis(250), Duration::from
 #[derive(Debug, Default)]
 pub(super) struct Health {
     pub(super) is_up: AtomicBool,
+    /// Whether a call got no answer in time, and nothing was written since.
+    pub(super) is_late: AtomicBool,
     /// Whether the disk was nearly full when it was looked at last.
     pub(super) is_full: AtomicBool,
     pub(super) failures: AtomicU64,
@@ -34,6 +36,8 @@ pub(super) struct Health {
 pub(super) trait Call: Send {
     /// Does it in a transaction, and keeps what comes of it. False where it could not be done.
     fn run(&mut self, transaction: &mut Transaction<'_>) -> bool;
+    /// Whether nobody waits for its answer any more: who asked was told that there is none.
+    fn is_given_up(&self) -> bool;
     /// Answers, when the transaction is written or nothing of it is.
     fn answer(self: Box<Self>, written: Result<(), StoreUnavailable>);
 }
@@ -56,6 +60,10 @@ where
             tracing::error!(%error, "a session in the store cannot be read");
         }
         found.is_ok()
+    }
+
+    fn is_given_up(&self) -> bool {
+        self.sender.is_closed()
     }
 
     fn answer(self: Box<Self>, written: Result<(), StoreUnavailable>) {
@@ -161,6 +169,11 @@ impl Writer {
     }
 
     fn do_group(&mut self, mut group: Vec<Box<dyn Call>>) {
+        // A frame that its client was told is not counted must not be committed later.
+        group.retain(|call| !call.is_given_up());
+        if group.is_empty() {
+            return;
+        }
         let written = self.write(&mut group);
         let unavailable = written.err().map(StoreUnavailable);
         if let Some(unavailable) = &unavailable {
@@ -200,6 +213,7 @@ impl Writer {
                 if let (Durability::Every(pause), true) = (durability, promises) {
                     self.sync_due.get_or_insert_with(|| now() + pause);
                 }
+                self.health.is_late.store(false, Ordering::Release);
                 Ok(())
             }
             Ok(Err(error)) => Err(self.fail(&error.to_string())),
@@ -234,6 +248,14 @@ impl Writer {
                 self.fail(&error.to_string());
                 return;
             }
+        }
+        if self.health.is_late.load(Ordering::Acquire) {
+            // No call may come before the store is known to answer again.
+            if let Err(error) = database.probe() {
+                self.fail(&error.to_string());
+                return;
+            }
+            self.health.is_late.store(false, Ordering::Release);
         }
         if begun >= self.sweep_due {
             let is_full = database.is_nearly_full();
