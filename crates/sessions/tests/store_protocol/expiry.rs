@@ -2,6 +2,7 @@
 
 use crate::folder::{Known, open_by};
 use bagtrack_sessions::{Clock, FileStore, Outcome, SessionStore};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 use tempfile::TempDir;
 use uuid::Uuid;
@@ -95,4 +96,55 @@ async fn the_time_in_which_the_store_is_closed_counts() {
     assert!(store.load(short.name.id).await.unwrap().is_none());
     let left = store.load(long.name.id).await.unwrap().unwrap().ttl;
     assert!(left > MINUTE / 2 && left < 2 * MINUTE, "{left:?}");
+}
+
+/// Hours since 1970 by the wall clock of the test below.
+static HOURS: AtomicU64 = AtomicU64::new(0);
+
+/// Boards without a battery set their clock soon after the start, and a machine that was suspended does: that ended all
+/// sessions with the next restart.
+#[tokio::test]
+async fn a_wall_clock_that_is_set_ends_no_session_and_lets_none_live_on() {
+    let clock = || {
+        let wall = || SystemTime::UNIX_EPOCH + HOUR * HOURS.load(Ordering::Relaxed) as u32;
+        Clock::with_wall(wall)
+    };
+    const DAY: u64 = 24;
+    let folder = TempDir::new().unwrap();
+    let mut seed = 0;
+    // Set forward and back while the store is open.
+    for (begins, then) in [(1, 56 * 365 * DAY), (56 * 365 * DAY, 55 * 365 * DAY)] {
+        HOURS.store(begins, Ordering::Relaxed);
+        let store = open_by(folder.path(), &clock());
+        seed += 1;
+        let session = Known::create(&store, seed, HOUR + 2 * MINUTE).await;
+        let left = async |store: &FileStore| {
+            let record = store.load(session.name.id).await.unwrap();
+            record.map(|record| record.ttl.as_secs() / 60)
+        };
+        HOURS.store(then, Ordering::Relaxed);
+        assert!(left(&store).await.is_some_and(|left| left >= 60));
+        drop(store);
+        let store = open_by(folder.path(), &clock());
+        assert!(left(&store).await.is_some_and(|left| left >= 60));
+        drop(store);
+        // The time in which it is closed counts, as the wall clock has it.
+        HOURS.store(then + 1, Ordering::Relaxed);
+        let store = open_by(folder.path(), &clock());
+        assert!(left(&store).await.is_some_and(|left| left <= 2));
+        drop(store);
+        HOURS.store(then + 2, Ordering::Relaxed);
+        assert_eq!(left(&open_by(folder.path(), &clock())).await, None);
+    }
+    // A board that begins in 1970 each time: what it has expires, and the time goes on.
+    HOURS.store(56 * 365 * DAY, Ordering::Relaxed);
+    let store = open_by(folder.path(), &clock());
+    let session = Known::create(&store, 9, HOUR).await;
+    drop(store);
+    HOURS.store(1, Ordering::Relaxed);
+    let of_board = clock();
+    let store = open_by(folder.path(), &of_board);
+    assert!(store.load(session.name.id).await.unwrap().is_some());
+    of_board.advance(HOUR);
+    assert_eq!(store.load(session.name.id).await.unwrap(), None);
 }

@@ -1,6 +1,8 @@
 //! The database in its folder: opened, written in transactions, repaired, swept, and given back to the disk.
 
 use super::row::Row;
+use super::rules::CLOCK;
+use super::time::Noted;
 use fjall::{
     Keyspace, KeyspaceCreateOptions, PersistMode, Readable, SingleWriterTxDatabase,
     SingleWriterTxKeyspace, SingleWriterWriteTx,
@@ -67,7 +69,7 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    fn of(folder: &Path, error: fjall::Error) -> Self {
+    pub(super) fn of(folder: &Path, error: fjall::Error) -> Self {
         let folder = folder.to_owned();
         match error {
             fjall::Error::Locked => Self::Locked(folder),
@@ -219,6 +221,20 @@ impl Database {
         }
     }
 
+    /// What was noted of the time.
+    pub(super) fn noted_time(&self) -> fjall::Result<Noted> {
+        let noted = self.begin(0).note(CLOCK)?;
+        Ok(noted.map_or_else(Noted::default, Noted::from_bytes))
+    }
+
+    /// Notes the time.
+    pub(super) fn note_time(&mut self, noted: Noted) -> fjall::Result<()> {
+        let mut transaction = self.begin(0);
+        transaction.put_note(CLOCK, &noted.to_bytes());
+        let written = transaction.write(PersistMode::Buffer)?;
+        self.account(&written)
+    }
+
     /// Syncs what was written.
     pub(super) fn sync(&self) -> fjall::Result<()> {
         self.inner.persist(PersistMode::SyncData)
@@ -323,7 +339,7 @@ pub(super) struct Transaction<'a> {
     pub(super) inner: SingleWriterWriteTx<'a>,
     pub(super) database: &'a Database,
     pub(super) tables: &'a Tables,
-    /// Milliseconds since 1970.
+    /// Milliseconds of the folder's time.
     pub(super) now: u64,
     /// Whether an answer promises something that is written here.
     pub(super) promises: bool,

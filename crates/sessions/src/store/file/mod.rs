@@ -17,6 +17,7 @@
 //! - The disk hangs. A call has no answer when its time is over: it is not done later unless it is being written just then,
 //!   and the store is not ready until a write succeeds.
 //! - Nobody ends a session. Rows whose time is over are swept, and their space is given back.
+//! - The wall clock is set. [What is in the folder](time) expires by the monotonic one.
 //! - Two processes have the same folder. The second is refused: the database locks it.
 
 mod calls;
@@ -25,6 +26,7 @@ mod durability;
 mod row;
 mod rules;
 mod shares;
+mod time;
 mod writer;
 
 pub use calls::FileStore;

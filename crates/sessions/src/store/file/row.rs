@@ -16,7 +16,7 @@ pub(super) struct Row {
     /// The last frame whose state was written.
     pub(super) checkpoint: u64,
     pub(super) incarnation: u64,
-    /// When the time to live is over, in milliseconds since 1970.
+    /// When the time to live is over, in milliseconds of the folder's time.
     pub(super) expires: u64,
     /// Of the state.
     pub(super) state_bytes: u64,

@@ -10,6 +10,8 @@ use uuid::Uuid;
 
 /// The note of the store's secret.
 const SECRET: &str = "secret";
+/// The note of the folder's time.
+pub(super) const CLOCK: &str = "clock";
 /// The moment at which a note is over.
 const NEVER: u64 = u64::MAX;
 
@@ -289,12 +291,12 @@ impl Transaction<'_> {
     }
 
     /// What the store has noted of itself under this name.
-    fn note<const N: usize>(&self, name: &str) -> Result<Option<[u8; N]>, Fault> {
+    pub(super) fn note<const N: usize>(&self, name: &str) -> fjall::Result<Option<[u8; N]>> {
         let note = self.inner.get(&self.tables.notes, name)?;
         Ok(note.and_then(|bytes| bytes.get(8..)?.try_into().ok()))
     }
 
-    fn put_note(&mut self, name: &str, value: &[u8]) {
+    pub(super) fn put_note(&mut self, name: &str, value: &[u8]) {
         let bytes = [&NEVER.to_be_bytes(), value].concat();
         self.written_bytes += bytes.len() as u64;
         self.inner

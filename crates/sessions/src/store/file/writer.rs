@@ -3,6 +3,7 @@
 use super::database::{Database, OpenError, Transaction};
 use super::durability::Durability;
 use super::rules::Fault;
+use super::time::{Noted, Time};
 use crate::clock::{Clock, Instant, now};
 use crate::store::session_store::StoreUnavailable;
 use fjall::PersistMode;
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 use tokio::sync::oneshot;
 
 /// Most calls that are written together.
@@ -76,28 +77,6 @@ where
     }
 }
 
-/// The time by which rows expire: the wall clock when the process began, and from then on a monotonic one.
-struct Time {
-    clock: Clock,
-    /// Milliseconds since 1970 at the clock's beginning.
-    start: u64,
-}
-
-impl Time {
-    fn new(clock: Clock) -> Self {
-        let since = clock
-            .wall(Duration::ZERO)
-            .duration_since(SystemTime::UNIX_EPOCH);
-        let start = u64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(0);
-        Self { clock, start }
-    }
-
-    fn now(&self) -> u64 {
-        let passed = u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX);
-        self.start.saturating_add(passed)
-    }
-}
-
 /// The state of the thread.
 pub(super) struct Writer {
     folder: PathBuf,
@@ -125,12 +104,15 @@ impl Writer {
         health: Arc<Health>,
     ) -> Result<Self, OpenError> {
         let database = Database::open(&folder)?;
+        let noted = database
+            .noted_time()
+            .map_err(|error| OpenError::of(&folder, error))?;
         health.is_up.store(true, Ordering::Release);
         let begun = now();
         Ok(Self {
             folder,
             durability,
-            time: Time::new(clock),
+            time: Time::new(clock, noted),
             health,
             database: Some(database),
             sync_due: None,
@@ -153,7 +135,9 @@ impl Writer {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             self.maintain();
+            self.note_time(self.time.due());
         }
+        self.note_time(self.time.due());
         if let Some(Err(error)) = self.database.as_ref().map(Database::sync) {
             tracing::error!(%error, "the store cannot be synced");
         }
@@ -269,6 +253,17 @@ impl Writer {
                 Ok(Err(error)) => drop(self.fail(&error.to_string())),
                 Err(_) => drop(self.fail("the database could not make sense of its files")),
             }
+        }
+    }
+
+    /// Writes what is to be noted of the time, if anything is.
+    fn note_time(&mut self, due: Option<Noted>) {
+        let (Some(database), Some(noted)) = (&mut self.database, due) else {
+            return;
+        };
+        match database.note_time(noted) {
+            Ok(()) => self.time.note(noted),
+            Err(error) => drop(self.fail(&error.to_string())),
         }
     }
 

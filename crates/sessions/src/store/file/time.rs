@@ -1,0 +1,96 @@
+//! The time by which what is in a folder expires.
+//!
+//! It passes as the monotonic clock does, so that no session ends because the wall clock is set: as that of a small board
+//! without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that after a
+//! restart it goes on by the wall clock, and the time between counts.
+
+use crate::clock::Clock;
+use std::time::{Duration, SystemTime};
+
+/// Where the wall clock goes away from the monotonic one by so much, it was set, or the machine was suspended.
+const SET_MS: i64 = 1000;
+/// The time is noted so often at least.
+const NOTED_MS: u64 = 60_000;
+
+/// What a folder has of its time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Noted {
+    /// How far the wall clock is ahead.
+    ahead: i64,
+    /// The time itself. It never goes back, also where a clock begins in 1970 each time.
+    now: u64,
+}
+
+impl Noted {
+    pub(super) fn to_bytes(self) -> [u8; 16] {
+        let mut bytes = [0; 16];
+        bytes[..8].copy_from_slice(&self.ahead.to_be_bytes());
+        bytes[8..].copy_from_slice(&self.now.to_be_bytes());
+        bytes
+    }
+
+    pub(super) fn from_bytes(bytes: [u8; 16]) -> Self {
+        let (ahead, now) = bytes.split_at(8);
+        Self {
+            ahead: i64::from_be_bytes(ahead.try_into().expect("it has 8 bytes")),
+            now: u64::from_be_bytes(now.try_into().expect("it has 8 bytes")),
+        }
+    }
+}
+
+/// The time of a folder, in milliseconds: since 1970, where the wall clock was never set.
+pub(super) struct Time {
+    clock: Clock,
+    /// At the clock's beginning.
+    start: i64,
+    noted: Noted,
+}
+
+impl Time {
+    /// Goes on from what a folder has noted.
+    pub(super) fn new(clock: Clock, noted: Noted) -> Self {
+        let last = i64::try_from(noted.now).unwrap_or(i64::MAX);
+        let now = wall(&clock).saturating_sub(noted.ahead).max(last);
+        let start = now.saturating_sub(passed(&clock));
+        Self {
+            clock,
+            start,
+            noted,
+        }
+    }
+
+    pub(super) fn now(&self) -> u64 {
+        u64::try_from(self.start.saturating_add(passed(&self.clock))).unwrap_or(0)
+    }
+
+    /// What is to be noted, where the clock was set, or nothing was noted for long.
+    pub(super) fn due(&self) -> Option<Noted> {
+        let (now, last) = (self.now(), self.noted);
+        let ahead = wall(&self.clock).saturating_sub_unsigned(now);
+        let is_set = ahead.saturating_sub(last.ahead).saturating_abs() >= SET_MS;
+        let is_old = now.saturating_sub(last.now) >= NOTED_MS;
+        (is_set || is_old).then_some(Noted { ahead, now })
+    }
+
+    /// This was noted.
+    pub(super) fn note(&mut self, noted: Noted) {
+        self.noted = noted;
+    }
+}
+
+/// Milliseconds since 1970 by the wall clock.
+fn wall(clock: &Clock) -> i64 {
+    let since = clock
+        .wall(clock.now())
+        .duration_since(SystemTime::UNIX_EPOCH);
+    milliseconds(since.unwrap_or_default())
+}
+
+/// Milliseconds since the clock's beginning.
+fn passed(clock: &Clock) -> i64 {
+    milliseconds(clock.now())
+}
+
+fn milliseconds(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
+}
