@@ -174,6 +174,42 @@ async fn in_redis_a_client_has_so_many_places_and_bytes_until_its_sessions_end()
     assert!(!admit("one", 80, 4000, 44).await);
 }
 
+/// Each of them took 263 calls of Redis.
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn refusals_of_one_client_do_not_look_for_room_each_time() {
+    let redis = Redis::start();
+    let store = redis.store(LONG).await;
+    let share = share("one", 80, 4000);
+    let admit = async |seed| store.admit(&share, counted(seed)).await.unwrap();
+    for seed in 1..=40 {
+        assert!(admit(seed).await, "{seed}");
+        Known::create(&store, seed, TTL).await;
+    }
+    let scripts = || {
+        let stats: String = redis.ask(&["INFO", "commandstats"]);
+        let line = stats.lines().find(|line| line.contains("_evalsha:"));
+        let calls = line.and_then(|line| line.split(['=', ',']).nth(1)).unwrap();
+        calls.parse::<u64>().unwrap()
+    };
+    let before = scripts();
+    assert!(!admit(41).await);
+    let once = scripts() - before;
+    assert!(once > 80, "it looks at 40 sessions: {once}");
+    let begun = bagtrack_sessions::clock::now();
+    for _ in 0..10 {
+        assert!(!admit(41).await);
+    }
+    if begun.elapsed() < Duration::from_millis(500) {
+        assert_eq!(scripts() - before - once, 10);
+    }
+    // It looks again a moment later. In the test above a session ends, and there is room at once.
+    bagtrack_sessions::clock::sleep(Duration::from_millis(1100)).await;
+    let before = scripts();
+    assert!(!admit(41).await);
+    assert!(scripts() - before > 80);
+}
+
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn all_that_is_in_redis_goes_by_itself() {

@@ -11,8 +11,9 @@ use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
 use crate::random::random;
 use redis::FromRedisValue;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, SystemTime};
 use uuid::Uuid;
 
@@ -26,6 +27,8 @@ const COUNTED: Duration = Duration::from_secs(7 * 24 * 3600);
 const LOOKED_AT: usize = 32;
 /// How often so many are looked at for one that is to be counted.
 const MAX_LOOKS: usize = 4;
+/// How long a client for which no room was found in this way is refused without looking again.
+const REFUSED: Duration = Duration::from_secs(1);
 /// How often the store is asked whether it is there.
 const PROBE: Duration = Duration::from_millis(250);
 
@@ -43,9 +46,16 @@ struct Shared {
     clock: Clock,
     /// Whether it refused the last new session for want of room.
     is_full: AtomicBool,
+    /// Until when, by the clock, clients are refused without looking for room again.
+    refused: Mutex<HashMap<String, Duration>>,
 }
 
 impl Shared {
+    fn refused(&self) -> MutexGuard<'_, HashMap<String, Duration>> {
+        // Nothing panics while it is held.
+        self.refused.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     async fn probe(&self) {
         let key = format!("{}:probe", self.prefix);
         let write = self.scripts.probe.key(key);
@@ -133,6 +143,7 @@ impl RedisStore {
             prefix: prefix.to_owned(),
             clock,
             is_full: AtomicBool::new(false),
+            refused: Mutex::default(),
         });
         shared.probe().await;
         tokio::spawn(probe(Arc::downgrade(&shared)));
@@ -179,6 +190,23 @@ impl RedisStore {
         script.arg(milliseconds(COUNTED)).arg(LOOKED_AT);
         let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
         Ok((answer.0 == 0).then_some(answer.1))
+    }
+
+    /// Whether no room was found for a client a moment ago.
+    fn is_refused(&self, client: &str) -> bool {
+        let now = self.0.clock.now();
+        self.0
+            .refused()
+            .get(client)
+            .is_some_and(|until| *until > now)
+    }
+
+    /// Refuses a client for a moment.
+    fn refuse(&self, client: &str) {
+        let now = self.0.clock.now();
+        let mut refused = self.0.refused();
+        refused.retain(|_, until| *until > now);
+        refused.insert(client.to_owned(), now + REFUSED);
     }
 
     /// Finds out which of these sessions of a client live. Their records may be at other nodes.
@@ -239,13 +267,20 @@ impl SessionStore for RedisStore {
                 let Some(counted) = self.try_admit(share, session).await? else {
                     return Ok(true);
                 };
+                if self.is_refused(&share.client) {
+                    return Ok(false);
+                }
                 let are_all = counted.len() < LOOKED_AT;
                 self.recount(share, counted).await?;
                 if are_all {
                     break;
                 }
             }
-            Ok(self.try_admit(share, session).await?.is_none())
+            let is_admitted = self.try_admit(share, session).await?.is_none();
+            if !is_admitted {
+                self.refuse(&share.client);
+            }
+            Ok(is_admitted)
         })
     }
 
@@ -309,7 +344,12 @@ impl SessionStore for RedisStore {
     fn end(&self, name: SessionName, ttl: Duration) -> StoreFuture<'_, bool> {
         let mut script = self.on(&self.0.scripts.end, name);
         script.arg(name.incarnation).arg(milliseconds(ttl));
-        Box::pin(self.0.connection.call(Call::Script(script)))
+        Box::pin(async move {
+            let ended = self.0.connection.call(Call::Script(script)).await?;
+            // Its client has room again; who that is, is not known here.
+            self.0.refused().clear();
+            Ok(ended)
+        })
     }
 
     fn secret(&self, new: [u8; 32]) -> StoreFuture<'_, [u8; 32]> {
