@@ -30,6 +30,29 @@ async fn a_page_of_another_origin_opens_no_session() {
     expect(open(&[]).await, StatusCode::CREATED).await;
 }
 
+/// A proxy that leaves the port out of `Host` makes pages of other ports look like the service's own.
+#[tokio::test]
+async fn a_page_that_the_browser_calls_another_site_is_refused_whatever_the_host_says() {
+    let app = TestApplication::start().await;
+    let open = async |app: &TestApplication, site: &str| {
+        let request = app.request(Method::POST, "/sessions", &[("box", BOX)]);
+        let request = request.header("host", "localhost");
+        let request = request.header("origin", "http://localhost");
+        let request = request.header("sec-fetch-site", site);
+        request.body(pictures::png(0)).send().await.unwrap()
+    };
+    for site in ["same-site", "cross-site", ""] {
+        expect_problem(open(&app, site).await, "origin-not-allowed").await;
+    }
+    expect(open(&app, "same-origin").await, StatusCode::CREATED).await;
+    // The settings may allow it all the same.
+    let allowing = TestApplication::start_with(|config| {
+        config.cors_origins = vec!["http://localhost".to_owned()];
+    });
+    let opened = open(&allowing.await, "same-site").await;
+    expect(opened, StatusCode::CREATED).await;
+}
+
 #[tokio::test]
 async fn a_page_of_an_allowed_origin_may_call_and_read_the_headers() {
     let origins = vec![ELSEWHERE.to_owned()];

@@ -6,6 +6,7 @@ mod chaos;
 mod clip;
 mod failures;
 mod folder;
+mod forwarding;
 mod incarnations;
 mod lost_records;
 mod pair;
