@@ -35,18 +35,21 @@ fn start(command: &mut Command, folder: TempDir, port: u16) -> Balancer {
 }
 
 pub fn haproxy(replicas: &[SocketAddr]) -> Balancer {
+    haproxy_with(replicas, &[])
+}
+
+/// HAProxy, where each of these texts is another one too.
+pub fn haproxy_with(replicas: &[SocketAddr], changes: &[(&str, String)]) -> Balancer {
     let (folder, port) = (tempfile::tempdir().unwrap(), free_port());
     let servers = replicas.iter().enumerate();
     let servers =
         servers.map(|(number, address)| format!("server replica{number} {address}\n    "));
     let template = "server-template replica 3 bagtrack:8080 resolvers system init-addr libc,none";
-    let text = shipped(
-        "haproxy.cfg",
-        &[
-            ("bind :8080", format!("bind 127.0.0.1:{port}")),
-            (template, servers.collect()),
-        ],
-    );
+    let own = [
+        ("bind :8080", format!("bind 127.0.0.1:{port}")),
+        (template, servers.collect()),
+    ];
+    let text = shipped("haproxy.cfg", &[&own, changes].concat());
     let file = folder.path().join("haproxy.cfg");
     std::fs::write(&file, text).unwrap();
     start(Command::new("haproxy").arg("-f").arg(file), folder, port)

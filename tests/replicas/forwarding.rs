@@ -1,10 +1,12 @@
-//! What the configurations of docker/ tell the service of a request: the host that it names.
+//! What the configurations of docker/ tell the service of a request: the host that it names, and its client.
 
-use crate::balancers::{Balancer, haproxy, nginx};
+use crate::balancers::{Balancer, haproxy, haproxy_with, nginx};
 use crate::clip::Clip;
 use crate::replica::Replica;
 use reqwest::{Client, Response, StatusCode};
-use std::net::SocketAddr;
+use std::io::Read;
+use std::net::{SocketAddr, TcpStream};
+use std::time::Duration;
 
 type Balance = fn(&[SocketAddr]) -> Balancer;
 
@@ -49,4 +51,64 @@ async fn pages_of_the_same_port_alone_may_call_behind_nginx() {
 #[ignore = "needs redis and haproxy"]
 async fn pages_of_the_same_port_alone_may_call_behind_haproxy() {
     pages_of_the_same_port_alone_may_call(haproxy).await;
+}
+
+/// Each of three replicas lets a client have one session: the fourth is refused, whoever the client says it is.
+async fn a_client_cannot_name_itself_another(balance: Balance) {
+    let flags = [
+        "--trusted-proxies",
+        "127.0.0.0/8",
+        "--client-sessions",
+        "1",
+    ];
+    let (_replicas, front) = behind(balance, &flags);
+    for name in ["x-forwarded-for", "forwarded"] {
+        let mut statuses = Vec::new();
+        for client in 1..=4 {
+            let value = match name {
+                "forwarded" => format!("for=198.51.100.{client}"),
+                _ => format!("198.51.100.{client}"),
+            };
+            statuses.push(open(&front, &[(name, &value)]).await.status());
+        }
+        let refused = StatusCode::TOO_MANY_REQUESTS;
+        assert!(statuses.contains(&refused), "{name}: {statuses:?}");
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs redis and nginx"]
+async fn a_client_cannot_name_itself_another_behind_nginx() {
+    a_client_cannot_name_itself_another(nginx).await;
+}
+
+#[tokio::test]
+#[ignore = "needs redis and haproxy"]
+async fn a_client_cannot_name_itself_another_behind_haproxy() {
+    a_client_cannot_name_itself_another(haproxy).await;
+}
+
+/// With a smaller bound: so many connections would need a higher limit of open files than tests have.
+#[test]
+#[ignore = "needs redis and haproxy"]
+fn one_source_has_so_many_connections_at_haproxy() {
+    const MOST: usize = 8;
+    let bound = [("sc0_conn_cur gt 1024", format!("sc0_conn_cur gt {MOST}"))];
+    let replicas = [(); 3].map(|()| Replica::start(&[]));
+    let addresses = replicas.each_ref().map(|replica| replica.address);
+    let front = haproxy_with(&addresses, &bound);
+    let silent: Vec<TcpStream> = (0..MOST + 4)
+        .map(|_| TcpStream::connect(front.address).unwrap())
+        .collect();
+    let is_closed = |mut stream: &TcpStream| {
+        let short = Some(Duration::from_millis(300));
+        stream.set_read_timeout(short).unwrap();
+        match stream.read(&mut [0]) {
+            Ok(_) => true,
+            Err(error) => error.kind() == std::io::ErrorKind::ConnectionReset,
+        }
+    };
+    let closed = silent.iter().filter(|stream| is_closed(stream)).count();
+    // The one that found out when HAProxy listens may be gone or not.
+    assert!((4..=5).contains(&closed), "{closed}");
 }
