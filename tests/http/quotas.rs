@@ -3,12 +3,18 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::heavy;
 use crate::pictures;
-use bagtrack::http::Config;
+use crate::raw::RawConnection;
+use bagtrack::http::{Config, Secret};
 use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tokio::task::JoinSet;
+use tokio::time::timeout;
+
+/// Longer than anything takes that does happen.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn behind_a_proxy(config: &mut Config) {
     config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
@@ -166,4 +172,85 @@ async fn what_is_left_of_the_frames_comes_back_and_is_told_by_every_call() {
     within(full, "the frames come back").await;
     let refused = app.request(Method::POST, "/track", &[]).send().await;
     assert!(refused.unwrap().headers().contains_key("ratelimit"));
+}
+
+const ASK: &str = "GET /version HTTP/1.1\r\nHost: localhost\r\n\r\n";
+
+/// hyper would answer 16 of them before anybody else has a turn.
+#[tokio::test]
+async fn requests_that_came_at_once_leave_turns_to_other_connections() {
+    let app = TestApplication::start().await;
+    let mut many = RawConnection::open(app.address).await;
+    let mut one = RawConnection::open(app.address).await;
+    for connection in [&mut many, &mut one] {
+        connection.send(ASK).await;
+        connection.read_answer().await;
+    }
+    many.send_now(ASK.repeat(64));
+    one.send_now(ASK);
+    one.read_answer().await;
+    let before = many.answers_now();
+    assert!(before < 8, "{before}");
+}
+
+/// Asks again and again, many times at once.
+async fn flood(address: SocketAddr, ask: &str) {
+    let mut connection = RawConnection::open(address).await;
+    loop {
+        connection.send(ask.repeat(50)).await;
+        connection.read_answers(50).await;
+    }
+}
+
+const NO_KEY: &str = "POST /sessions HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_that_asks_too_often_is_refused_and_its_probes_its_frames_and_others_are_not() {
+    // What is refused for want of a key counts too.
+    for ask in [ASK, NO_KEY] {
+        let app = TestApplication::start_with(|config| {
+            config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
+        });
+        let app = app.await;
+        let id = app.open().await;
+        let mut floods = JoinSet::new();
+        for _ in 0..8 {
+            floods.spawn(flood(app.address, ask));
+        }
+        let refused = async {
+            loop {
+                let answer = app.get("/version").await;
+                if answer.status() != StatusCode::OK {
+                    break answer;
+                }
+            }
+        };
+        let refused = timeout(PATIENCE, refused).await.expect("it is bounded");
+        assert_eq!(refused.headers()["retry-after"], "1");
+        let problem = expect_problem(refused, "quota-exceeded").await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains("500 requests a second"), "{detail}");
+        for probe in ["/healthz", "/readyz"] {
+            assert_eq!(app.get(probe).await.status(), StatusCode::OK, "{probe}");
+        }
+        expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+        let mut other = RawConnection::open_from(IpAddr::from([127, 0, 0, 9]), app.address).await;
+        other.send(ASK).await;
+        let answer = other.read_answer().await;
+        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+        floods.shutdown().await;
+        let again = async { while app.get("/version").await.status() != StatusCode::OK {} };
+        timeout(PATIENCE, again).await.expect("it comes back");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_trusted_proxy_asks_for_itself_as_often_as_it_likes() {
+    let app = TestApplication::start_with(behind_a_proxy).await;
+    let mut proxy = RawConnection::open(app.address).await;
+    for _ in 0..40 {
+        proxy.send(ASK.repeat(100)).await;
+        let answers = proxy.read_answers(100).await;
+        assert!(!answers.contains("HTTP/1.1 429"), "{answers}");
+    }
 }

@@ -53,6 +53,35 @@ impl RawConnection {
         all
     }
 
+    /// What comes until so many answers have begun.
+    pub async fn read_answers(&mut self, count: usize) -> String {
+        let mut bytes = Vec::new();
+        loop {
+            let text = String::from_utf8_lossy(&bytes);
+            if text.matches("HTTP/1.1 ").count() >= count {
+                return text.into_owned();
+            }
+            let read = self.stream.read_buf(&mut bytes);
+            let read = timeout(PATIENCE, read).await.expect("answers come");
+            assert_ne!(read.unwrap(), 0, "it ended early: {bytes:?}");
+        }
+    }
+
+    /// Sends, without giving anybody else a turn.
+    pub fn send_now(&self, bytes: impl AsRef<[u8]>) {
+        let bytes = bytes.as_ref();
+        assert_eq!(self.stream.try_write(bytes).unwrap(), bytes.len());
+    }
+
+    /// How many answers there are to read.
+    pub fn answers_now(&self) -> usize {
+        let (mut bytes, mut buffer) = (Vec::new(), [0; 4096]);
+        while let Ok(count @ 1..) = self.stream.try_read(&mut buffer) {
+            bytes.extend_from_slice(&buffer[..count]);
+        }
+        String::from_utf8_lossy(&bytes).matches("HTTP/1.1 ").count()
+    }
+
     /// Closes its own side of the connection.
     pub async fn close_sending(&mut self) {
         self.stream.shutdown().await.unwrap();

@@ -55,12 +55,7 @@ async fn pages_of_the_same_port_alone_may_call_behind_haproxy() {
 
 /// Each of three replicas lets a client have one session: the fourth is refused, whoever the client says it is.
 async fn a_client_cannot_name_itself_another(balance: Balance) {
-    let flags = [
-        "--trusted-proxies",
-        "127.0.0.0/8",
-        "--client-sessions",
-        "1",
-    ];
+    let flags = ["--trusted-proxies", "127.0.0.0/8", "--client-sessions", "1"];
     let (_replicas, front) = behind(balance, &flags);
     for name in ["x-forwarded-for", "forwarded"] {
         let mut statuses = Vec::new();

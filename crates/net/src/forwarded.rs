@@ -12,6 +12,8 @@ use axum::http::header::FORWARDED;
 use ipnet::IpNet;
 use std::net::{IpAddr, SocketAddr};
 
+const X_FORWARDED_FOR: &str = "x-forwarded-for";
+
 /// The address of the client of a request that came from `peer`.
 pub fn client_address(peer: IpAddr, headers: &HeaderMap, trusted: &[IpNet]) -> IpAddr {
     let peer = peer.to_canonical();
@@ -21,13 +23,18 @@ pub fn client_address(peer: IpAddr, headers: &HeaderMap, trusted: &[IpNet]) -> I
     let forwarded = list(headers, FORWARDED.as_str());
     let forwarded =
         forwarded.map(|hops| walk(peer, hops.iter().map(|hop| of_forwarded(hop)), trusted));
-    let x_forwarded = list(headers, "x-forwarded-for");
+    let x_forwarded = list(headers, X_FORWARDED_FOR);
     let x_forwarded =
         x_forwarded.map(|hops| walk(peer, hops.iter().map(|hop| parse(hop)), trusted));
     match (forwarded, x_forwarded) {
         (Some(one), Some(other)) if one != other => peer,
         (one, other) => one.or(other).unwrap_or(peer),
     }
+}
+
+/// Whether somebody says whom a request was passed on for.
+pub fn is_forwarded(headers: &HeaderMap) -> bool {
+    headers.contains_key(FORWARDED) || headers.contains_key(X_FORWARDED_FOR)
 }
 
 /// Whether the address is a trusted proxy's.

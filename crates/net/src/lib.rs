@@ -28,7 +28,7 @@ pub use certificate::{Certificate, CertificateError};
 pub use connection_hold::ConnectionHold;
 pub use connection_io::{ClientLimits, ConnectionIo};
 pub use connections::{ConnectionPermit, Connections, NoRoom};
-pub use forwarded::{client_address, is_trusted};
+pub use forwarded::{client_address, is_forwarded, is_trusted};
 pub use fragments::{Fragments, MessageRate, MessageTooSlow, Rates};
 #[cfg(feature = "tls")]
 pub use handshake::MAX_UNSENT_BYTES;

@@ -7,18 +7,22 @@ use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
 use bagtrack_api::ProblemKind as Kind;
-use bagtrack_net::client_address;
+use bagtrack_net::{client_address, is_forwarded, is_trusted};
 use bagtrack_sessions::clock::sleep;
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
 use tracing::Span;
 
 /// How long an answer that refuses a client for its quota is held back.
-const REFUSAL_DELAY: Duration = Duration::from_millis(250);
+pub(super) const REFUSAL_DELAY: Duration = Duration::from_millis(250);
 
 /// The client's address, as far as proxies are trusted.
 #[derive(Debug, Clone, Copy)]
-struct ClientAddress(IpAddr);
+struct ClientAddress {
+    address: IpAddr,
+    /// Whether a trusted proxy asks for itself.
+    is_proxy: bool,
+}
 
 /// Notes the address of the client that a request is from.
 pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
@@ -26,8 +30,18 @@ pub fn note_address(state: &AppState, request: &mut Request) -> IpAddr {
     let peer = peer.map_or(Ipv4Addr::UNSPECIFIED.into(), |Peer(peer)| peer.ip());
     let trusted = &state.config.limits.trusted_proxies;
     let address = client_address(peer, request.headers(), trusted);
-    request.extensions_mut().insert(ClientAddress(address));
+    // Clients of a proxy whose headers contradict each other have its address, too.
+    let is_proxy = is_trusted(peer.to_canonical(), trusted) && !is_forwarded(request.headers());
+    let noted = ClientAddress { address, is_proxy };
+    request.extensions_mut().insert(noted);
     address
+}
+
+/// The client at the noted address; none where a trusted proxy asks for itself.
+pub(super) fn client_at(request: &Request) -> Option<Client> {
+    let noted = request.extensions().get::<ClientAddress>();
+    let noted = noted.filter(|noted| !noted.is_proxy)?;
+    Some(Client::at(noted.address))
 }
 
 /// The middleware. A request that has its client already keeps it.
@@ -39,7 +53,7 @@ pub async fn identify(State(state): State<AppState>, mut request: Request, next:
         Some(Client::Address(_)) => {}
         None => {
             let noted = request.extensions().get::<ClientAddress>().copied();
-            let address = noted.map_or(Ipv4Addr::UNSPECIFIED.into(), |noted| noted.0);
+            let address = noted.map_or(Ipv4Addr::UNSPECIFIED.into(), |noted| noted.address);
             request.extensions_mut().insert(Client::at(address));
         }
     }

@@ -17,6 +17,7 @@ pub mod draining;
 pub mod exported_span;
 pub mod lingering_close;
 pub mod request_log;
+pub mod request_rate;
 pub mod security_headers;
 pub mod single_host;
 pub mod trace_context;

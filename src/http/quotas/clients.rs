@@ -1,7 +1,7 @@
 //! What each client has in use, against its quotas.
 //!
 //! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and frames
-//! a second. They are told in the headers `RateLimit-Policy` and `RateLimit` (draft-ietf-httpapi-ratelimit-headers).
+//! and requests a second. They are told in the headers `RateLimit-Policy` and `RateLimit` (draft-ietf-httpapi-ratelimit-headers).
 
 use super::client::Client;
 use super::holdings::Holdings;
@@ -17,7 +17,7 @@ use bagtrack_sessions::{
 use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::{InMemoryState, NotKeyed};
-use governor::{Quota, RateLimiter};
+use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 use ipnet::Ipv6Net;
 use std::collections::HashMap;
 use std::num::NonZeroU32;
@@ -40,6 +40,12 @@ type FrameRate = RateLimiter<NotKeyed, InMemoryState, DefaultClock, StateInforma
 const MESSAGES: NonZeroU32 = NonZeroU32::new(10_000).expect("it is not 0");
 /// And at once.
 const MESSAGES_AT_ONCE: NonZeroU32 = NonZeroU32::new(2_000).expect("it is not 0");
+
+/// Requests a second that take no turn at the workers: more than pages of some people and their programs ask for, and so
+/// few that they take a network thread some percent of its time.
+const ASKED: NonZeroU32 = NonZeroU32::new(500).expect("it is not 0");
+/// And at once: the 70 files of the page, for a dozen people behind one address.
+const ASKED_AT_ONCE: NonZeroU32 = NonZeroU32::new(1_000).expect("it is not 0");
 
 /// What one client may have.
 #[derive(Debug, Clone, Copy)]
@@ -88,6 +94,7 @@ pub struct Account {
     requests: Arc<Semaphore>,
     videos: Arc<Semaphore>,
     messages: Arc<MessageRate>,
+    asked: DefaultDirectRateLimiter,
     frames: Option<FrameRate>,
     /// Whose frame is counted next, where several wait for it.
     next_frame: tokio::sync::Mutex<()>,
@@ -230,6 +237,7 @@ impl Account {
             messages: Arc::new(MessageRate::direct(
                 Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
             )),
+            asked: RateLimiter::direct(Quota::per_second(ASKED).allow_burst(ASKED_AT_ONCE)),
             frames,
             next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((
@@ -264,6 +272,20 @@ impl Account {
             account: self.clone(),
             _permit: permit.expect("the places are never closed"),
         }
+    }
+
+    /// Counts a request that takes no turn at the workers.
+    ///
+    /// # Errors
+    /// The client has sent too many lately.
+    pub fn count_asked(&self) -> Result<(), Problem> {
+        let counted = self.asked.check();
+        counted.map_err(|not_yet| {
+            let wait = not_yet.wait_time_from(DefaultClock::default().now());
+            let limit = usize::try_from(ASKED.get()).unwrap_or(usize::MAX);
+            Problem::quota_exceeded("requests a second for pages and states", limit)
+                .retry_after(wait)
+        })
     }
 
     /// Takes a place for a stream.

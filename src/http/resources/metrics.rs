@@ -4,9 +4,12 @@ use crate::http::extract::caller::Caller;
 use crate::http::extract::query::NoQuery;
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
+use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
+use bagtrack_sessions::clock;
+use std::sync::Arc;
 
 /// The text format of Prometheus.
 const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
@@ -30,6 +33,27 @@ pub async fn get(
     caller: Caller,
 ) -> Result<impl IntoResponse, Problem> {
     caller.require_key()?;
-    state.measure();
-    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], state.metrics.render()))
+    let text = rendered(&state).await?;
+    Ok(([(CONTENT_TYPE, MEDIA_TYPE)], text))
+}
+
+/// The metrics as they are now. It takes a millisecond and more, so it is done beside the network threads: one at a time,
+/// and once for all who asked before it began.
+async fn rendered(state: &AppState) -> Result<Bytes, Problem> {
+    let asked = clock::now();
+    let mut rendered = state.rendered_metrics.lock().await;
+    if let Some((began, text)) = &*rendered
+        && *began > asked
+    {
+        return Ok(text.clone());
+    }
+    let (began, state) = (clock::now(), state.clone());
+    let render = move || {
+        state.measure();
+        Bytes::from(state.metrics.render())
+    };
+    let text = tokio::task::spawn_blocking(render).await;
+    let text = text.map_err(|error| Problem::internal(Arc::new(error)))?;
+    *rendered = Some((began, text.clone()));
+    Ok(text)
 }

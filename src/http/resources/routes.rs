@@ -24,7 +24,7 @@ use utoipa_axum::routes;
             uploaded frame. Every error is a [problem document](problems) (RFC 9457) and leaves the session as it \
             was, but for `work-timeout`, which says what to do. The `type` of a problem opens as a page. Paths that do not exist answer `route-not-found` (404). \
             Requests of web pages from origins that are not allowed answer `origin-not-allowed` (403), and requests \
-            to hosts that are not allowed `host-not-allowed` (421).\n\n\
+            to hosts that are not allowed `host-not-allowed` (421). Who asks too often gets `quota-exceeded` (429).\n\n\
             Where the service has API keys, a request needs one, or a session token: `Authorization: Bearer …`. \
             While the service is about to end, all answers have the header `Draining: true`.",
         contact(name = "The authors of bagtrack")

@@ -18,6 +18,7 @@ use hyper_util::service::TowerToHyperService;
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::net::TcpStream;
+use tokio::task::yield_now;
 
 /// How all connections of a service are served.
 #[derive(Debug)]
@@ -100,7 +101,11 @@ impl ConnectionService {
             let activity = activity.clone();
             let request = request.map(|body| activity.receive(Body::new(body)));
             let answer = service.call(request);
-            async move { answer.await.map(|answer| activity.answer(answer)) }
+            async move {
+                // hyper goes on with the next of the requests that came at once, up to 16 of them.
+                yield_now().await;
+                answer.await.map(|answer| activity.answer(answer))
+            }
         });
         let connection = self.http.serve_connection(TokioIo::new(io), watched);
         hold.serve(connection.with_upgrades()).await;

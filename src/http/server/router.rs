@@ -11,6 +11,7 @@ use crate::http::middleware::count_requests::count_request;
 use crate::http::middleware::draining::mark_draining;
 use crate::http::middleware::lingering_close::drain_refused;
 use crate::http::middleware::request_log::log_request;
+use crate::http::middleware::request_rate::bound_rate;
 use crate::http::middleware::security_headers::secure;
 use crate::http::middleware::single_host::one_host;
 use crate::http::page::docs;
@@ -64,6 +65,7 @@ fn with_layers(routes: Router, state: &AppState) -> Router {
         .layer(cors(&config.cors_origins))
         .layer(middleware::from_fn(one_host))
         .layer(CatchPanicLayer::custom(panic_response))
+        .layer(middleware::from_fn_with_state(state.clone(), bound_rate))
         .layer(middleware::from_fn_with_state(
             state.clone(),
             answer_problems,

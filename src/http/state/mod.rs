@@ -7,8 +7,10 @@ mod saturation;
 use crate::http::metrics::registry::Metrics;
 use crate::http::quotas::client::Client;
 use crate::http::quotas::clients::Clients;
+use axum::body::Bytes;
 use bagtrack_access::Access;
 use bagtrack_config::Config;
+use bagtrack_sessions::clock::Instant;
 use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,
     Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
@@ -39,6 +41,8 @@ pub struct Shared {
     pub access: Access,
     /// What is counted and measured.
     pub metrics: Metrics,
+    /// The text of `/metrics` that was rendered last, and when that began.
+    pub rendered_metrics: tokio::sync::Mutex<Option<(Instant, Bytes)>>,
     /// Places for the processes that decode videos.
     pub videos: Arc<Semaphore>,
     /// Whether `/readyz` has found the queue full.
@@ -92,6 +96,7 @@ impl AppState {
             clients,
             access,
             metrics,
+            rendered_metrics: tokio::sync::Mutex::default(),
             // A client has one at a time, and no client all of them.
             videos: Arc::new(Semaphore::new(config.video_places())),
             queue_saturation: Saturation::default(),

@@ -1,0 +1,65 @@
+//! Bounds how often a client asks for what takes no turn at the workers: pages, states, what is refused.
+//!
+//! All of it is done on the network threads, so a client that asks as fast as it can takes them from the others. It is
+//! known by its address: most of it needs no key. A trusted proxy that asks for itself is not counted.
+
+use super::client_identity::{REFUSAL_DELAY, client_at};
+use crate::http::state::AppState;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::Method;
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use bagtrack_sessions::clock::sleep;
+
+/// When a request counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Counts {
+    /// Before it is answered, and it may be refused.
+    Always,
+    /// It is answered all the same, if late: whoever asks whether the service lives must not take it for dead, for the
+    /// haste of another client at its address.
+    AsProbe,
+    /// Where it was refused: otherwise it took its turn at the workers.
+    Refused,
+}
+
+impl Counts {
+    fn of(request: &Request) -> Self {
+        let route = request.extensions().get::<MatchedPath>();
+        let route = route.map_or("", MatchedPath::as_str);
+        let sends_frames = matches!(*request.method(), Method::POST | Method::PUT);
+        if route.ends_with("/healthz") || route.ends_with("/readyz") {
+            Self::AsProbe
+        } else if sends_frames && !route.ends_with("/token") {
+            Self::Refused
+        } else {
+            Self::Always
+        }
+    }
+}
+
+/// The middleware. It has to see the matched route, and the address that was noted.
+pub async fn bound_rate(State(state): State<AppState>, request: Request, next: Next) -> Response {
+    let Some(client) = client_at(&request) else {
+        return next.run(request).await;
+    };
+    let count = || state.clients.account(&client).count_asked();
+    let counts = Counts::of(&request);
+    if counts == Counts::Always
+        && let Err(problem) = count()
+    {
+        // Whoever does not wait before it asks again is answered no faster.
+        sleep(REFUSAL_DELAY).await;
+        return problem.into_response();
+    }
+    let response = next.run(request).await;
+    let counts_now = match counts {
+        Counts::Always => false,
+        Counts::AsProbe => true,
+        Counts::Refused => response.status().is_client_error(),
+    };
+    if counts_now && count().is_err() {
+        sleep(REFUSAL_DELAY).await;
+    }
+    response
+}
