@@ -12,11 +12,15 @@ use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 const ISSUER: &str = "https://login.example.org/";
 const AUDIENCE: &str = "https://tracker.example.org";
+const SHORT: Duration = Duration::from_millis(10);
+/// Longer than anything takes that does happen.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// Seconds since 1970.
 const NOW: u64 = 1_800_000_000;
 
@@ -310,20 +314,76 @@ async fn the_issuer_may_change_its_keys_and_be_away() {
     // A key that was taken back is good for ten minutes at most, whatever was checked with it.
     source.give(&[&new]);
     assert!(taken(&of_old, 689).await.is_ok());
-    assert_eq!(taken(&of_old, 690).await, Err(TokenError::UnknownKey));
+    // They are read beside the token that finds them old, and not twice.
+    while taken(&of_old, 690).await.is_ok() {
+        tokio::time::sleep(SHORT).await;
+    }
+    assert_eq!(taken(&of_old, 691).await, Err(TokenError::UnknownKey));
     assert_eq!(reads(), 5);
 
     // While the issuer is away, its keys stay.
     *source.keys.lock().unwrap() = None;
-    assert!(taken(&of_new, 1300).await.is_ok());
+    while reads() < 6 {
+        assert!(taken(&of_new, 1300).await.is_ok());
+        tokio::time::sleep(SHORT).await;
+    }
     assert!(taken(&of_new, 1301).await.is_ok());
     assert_eq!(reads(), 6);
     assert!(verifier.reload(at(NOW + 1302)).is_err());
     assert!(taken(&of_new, 1303).await.is_ok());
     source.give(&[&new, &old]);
     assert_eq!(verifier.reload(at(NOW + 1304)).unwrap(), 2);
+    // A key that was taken back while nobody came is good for nothing.
+    source.give(&[&new]);
+    assert_eq!(taken(&of_old, 2504).await, Err(TokenError::UnknownKey));
     // They end with their time all the same.
     assert_eq!(taken(&of_new, 7260).await, Err(TokenError::Expired));
+}
+
+/// An issuer that answers once, and then hangs until it is let go.
+#[derive(Debug)]
+struct Hanging {
+    keys: Mutex<Option<String>>,
+    let_go: Mutex<Receiver<()>>,
+}
+
+impl KeySource for Hanging {
+    fn read(&self) -> Result<String, SourceError> {
+        if let Some(keys) = self.keys.lock().unwrap().take() {
+            return Ok(keys);
+        }
+        let _ = self.let_go.lock().unwrap().recv();
+        Err(SourceError::new("the issuer", "it hangs"))
+    }
+}
+
+#[tokio::test]
+async fn an_issuer_that_hangs_holds_nobody_up_whose_key_is_known() {
+    let (known, unknown) = (IssuerKey::p256("known"), IssuerKey::p256("unknown"));
+    let (holding, let_go) = channel();
+    let source = Arc::new(Hanging {
+        keys: Mutex::new(Some(key_set(&[&known]))),
+        let_go: Mutex::new(let_go),
+    });
+    let verifier = TokenVerifier::with_source(&config(), source, at(NOW)).unwrap();
+    let long = |key: &IssuerKey| key.sign(&claims(json!({ "exp": NOW + 7200 })));
+    let (of_known, of_unknown) = (long(&known), long(&unknown));
+    for seconds in [600, 601, 631, 1300] {
+        let identified = verifier.identify(&of_known, at(NOW + seconds));
+        let identified = tokio::time::timeout(PATIENCE, identified).await;
+        assert!(identified.expect("nobody waits").is_ok(), "{seconds}");
+        // What reads beside it has begun.
+        tokio::time::sleep(SHORT).await;
+    }
+    // Whoever has another key waits for the issuer.
+    let mut waiting = tokio::spawn({
+        let verifier = verifier.clone();
+        async move { verifier.identify(&of_unknown, at(NOW + 1301)).await }
+    });
+    let early = tokio::time::timeout(10 * SHORT, &mut waiting).await;
+    assert!(early.is_err(), "{early:?}");
+    drop(holding);
+    assert_eq!(waiting.await.unwrap(), Err(TokenError::UnknownKey));
 }
 
 /// Keys of an issuer and API keys are for two kinds of clients, who may both come.

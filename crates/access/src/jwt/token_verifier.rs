@@ -16,6 +16,8 @@ use std::time::{Duration, SystemTime};
 const LEEWAY: Duration = Duration::from_secs(60);
 /// After so long the keys are read again: an issuer takes one back.
 const MAX_AGE: Duration = Duration::from_secs(600);
+/// After so long without a try, whoever comes waits for it: a key may have been taken back while nobody came.
+const MAX_UNTRIED: Duration = Duration::from_secs(1200);
 /// Not before this time they are read again for a token that none of them has signed.
 const MIN_AGE: Duration = Duration::from_secs(30);
 /// Tokens whose signature need not be checked again.
@@ -94,7 +96,7 @@ struct Inner {
     owner_claim: String,
     source: Arc<dyn KeySource>,
     known: Mutex<Known>,
-    /// Held by whoever reads the keys, for whom the others wait.
+    /// Held by whoever reads the keys, for whom those wait that need other keys.
     reading: tokio::sync::Mutex<()>,
 }
 
@@ -157,18 +159,23 @@ impl TokenVerifier {
         })))
     }
 
-    /// Whom this token speaks for. Reads the keys again where they are old, or have not signed it.
+    /// Whom this token speaks for. The keys are read again where they are old, beside this call, and where they have not
+    /// signed it.
     ///
     /// # Errors
     /// See [`TokenError`].
     pub async fn identify(&self, token: &str, now: SystemTime) -> Result<Identity, TokenError> {
         let header = decode_header(token).map_err(|_| TokenError::Form)?;
-        let (keys, came) = {
+        let (keys, asked, came) = {
             let known = self.known();
-            (known.keys.clone(), known.came)
+            (known.keys.clone(), known.asked, known.came)
         };
-        if since(came, now) >= MAX_AGE {
+        if since(asked, now) >= MAX_UNTRIED {
             self.read_keys(&keys, now).await;
+        } else if since(came, now) >= MAX_AGE && self.is_due(&keys, now) {
+            // An issuer that is away, or hangs, holds nobody up whose key is known.
+            let (verifier, keys) = (self.clone(), keys.clone());
+            tokio::spawn(async move { verifier.read_keys(&keys, now).await });
         }
         let identity = self.look_up(token, &header, now);
         // The key may be new, or another of the same name.
@@ -225,14 +232,16 @@ impl TokenVerifier {
         Ok(count)
     }
 
+    /// Whether the keys may be asked for: those that are known are the ones `seen`, and nobody has tried a moment ago.
+    fn is_due(&self, seen: &Arc<KeySet>, now: SystemTime) -> bool {
+        let known = self.known();
+        Arc::ptr_eq(&known.keys, seen) && since(known.asked, now) >= MIN_AGE
+    }
+
     /// Reads the keys again, unless somebody else has done so since they were `seen`, or tried a moment ago.
     async fn read_keys(&self, seen: &Arc<KeySet>, now: SystemTime) {
         let _reading = self.0.reading.lock().await;
-        let is_done = {
-            let known = self.known();
-            !Arc::ptr_eq(&known.keys, seen) || since(known.asked, now) < MIN_AGE
-        };
-        if is_done {
+        if !self.is_due(seen, now) {
             return;
         }
         let verifier = self.clone();
