@@ -6,7 +6,7 @@ use crate::metrics::{metrics, value};
 use crate::pictures;
 use crate::raw::RawConnection;
 use crate::stream_client::{Received, StreamClient};
-use bagtrack::http::Config;
+use bagtrack::http::{Config, Secret};
 use bagtrack_testing::within::within;
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use std::net::IpAddr;
@@ -132,9 +132,14 @@ async fn upload_bytes(app: &TestApplication) -> usize {
 
 /// Sends a body but for its last byte; nothing where it is refused, what holds its memory otherwise.
 async fn hold_body(app: &TestApplication, client: &str) -> Option<RawConnection> {
+    hold_body_with(app, "/sessions", &format!("X-Forwarded-For: {client}")).await
+}
+
+/// The same, of a post to this path with this header line.
+async fn hold_body_with(app: &TestApplication, path: &str, line: &str) -> Option<RawConnection> {
     let before = upload_bytes(app).await;
-    let lines = format!("X-Forwarded-For: {client}\r\nContent-Length: {HELD}");
-    let mut body = RawConnection::hold_with(app.address, "POST", "/sessions", &lines).await;
+    let lines = format!("{line}\r\nContent-Length: {HELD}");
+    let mut body = RawConnection::hold_with(app.address, "POST", path, &lines).await;
     // It may be refused before all of it has come.
     let _ = body.try_send(vec![7; HELD - 1]).await;
     loop {
@@ -178,6 +183,69 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
         let freed = async { while upload_bytes(&app).await > 0 {} };
         within(freed, "all is given back").await;
     }
+}
+
+/// A service with one key, two sessions of it, and what a page with a token for the first one says.
+async fn beside_a_page(change: fn(&mut Config)) -> (TestApplication, [String; 2], String) {
+    let app = TestApplication::start_with(|config| {
+        config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
+        change(config);
+    });
+    let app = app.await;
+    let sessions = [app.open().await, app.open().await];
+    let path = format!("/sessions/{}/token", sessions[0]);
+    let made = app.request(Method::POST, &path, &[]).send().await.unwrap();
+    let made = expect(made, StatusCode::OK).await;
+    let token = made["token"].as_str().unwrap();
+    let line = format!("Authorization: Bearer {token}");
+    (app, sessions, line)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn stalled_bodies_of_a_page_leave_memory_to_the_other_sessions_of_its_key() {
+    let (app, sessions, line) = beside_a_page(|config| {
+        config.max_body_bytes = HELD;
+        config.max_upload_bytes = UPLOADS;
+    })
+    .await;
+    let path = format!("/sessions/{}/frames", sessions[0]);
+    let mut held = Vec::new();
+    for _ in 0..6 {
+        held.extend(hold_body_with(&app, &path, &line).await);
+    }
+    // The key has a quarter, and the page no more than it leaves of that.
+    assert_eq!(held.len(), 1);
+    let mut picture = pictures::png(1);
+    picture.resize(HELD, 0);
+    let answer = app.post_frame(&sessions[1], picture).await;
+    expect(answer, StatusCode::OK).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn stalled_requests_of_a_page_leave_places_to_the_other_sessions_of_its_key() {
+    let (app, sessions, line) = beside_a_page(|config| config.queue = 16).await;
+    let head = format!(
+        "POST /sessions/{}/frames HTTP/1.1\r\nHost: localhost\r\n{line}\r\nContent-Length: 9\r\n\
+         Expect: 100-continue\r\n\r\n",
+        sessions[0]
+    );
+    let mut stalled = Vec::new();
+    for _ in 0..4 {
+        let mut connection = RawConnection::open(app.address).await;
+        connection.send(&head).await;
+        let answer = connection.read_some().await;
+        if answer.starts_with("HTTP/1.1 100") {
+            stalled.push(connection);
+        } else {
+            assert!(answer.starts_with("HTTP/1.1 429"), "{answer}");
+        }
+    }
+    assert_eq!(stalled.len(), 2);
+    let answer = app.post_frame(&sessions[1], pictures::png(1)).await;
+    expect(answer, StatusCode::OK).await;
+    let told = app.get_session(&sessions[1]).await;
+    let limit = told.headers()["ratelimit"].to_str().unwrap();
+    assert!(limit.contains("\"requests\";r=2"), "{limit}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

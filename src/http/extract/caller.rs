@@ -49,6 +49,11 @@ impl Caller {
         &self.owner
     }
 
+    /// The only session that may be used, where the request came with a session token.
+    pub fn page_of(&self) -> Option<Uuid> {
+        self.only.map(|only| only.id)
+    }
+
     /// Whether a session of this id may be used, if it is one of the owner's: see [`Self::may_use`].
     pub fn may_ask_for(&self, id: Uuid) -> bool {
         self.only.is_none_or(|only| only.id == id)

@@ -28,9 +28,13 @@ pub async fn authenticate(
 ) -> Response {
     match caller(&state, request.headers()).await {
         Ok(caller) => {
-            // Who has a key shares its quotas, wherever the requests come from.
+            // Who has a key shares its quotas, wherever the requests come from. A page is not to use them up.
             if let Some(name) = caller.owner().name() {
-                request.extensions_mut().insert(Client::Key(name.into()));
+                let client = match caller.page_of() {
+                    Some(session) => Client::Page(name.into(), session),
+                    None => Client::Key(name.into()),
+                };
+                request.extensions_mut().insert(client);
             }
             request.extensions_mut().insert(caller);
             next.run(request).await

@@ -47,10 +47,11 @@ pub(super) fn client_at(request: &Request) -> Option<Client> {
 /// The middleware. A request that has its client already keeps it.
 pub async fn identify(State(state): State<AppState>, mut request: Request, next: Next) -> Response {
     match request.extensions().get::<Client>() {
-        Some(Client::Key(name)) => {
-            Span::current().record("key", &**name);
+        Some(client) => {
+            if let Some(name) = client.key() {
+                Span::current().record("key", &**name);
+            }
         }
-        Some(Client::Address(_)) => {}
         None => {
             let noted = request.extensions().get::<ClientAddress>().copied();
             let address = noted.map_or(Ipv4Addr::UNSPECIFIED.into(), |noted| noted.address);

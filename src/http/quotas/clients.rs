@@ -85,6 +85,8 @@ pub struct Clients {
 #[derive(Debug)]
 pub struct Account {
     client: Client,
+    /// That of the key, where this is a page's. It counts the frames.
+    key: Option<Arc<Account>>,
     flow: Flow,
     quotas: Quotas,
     all: Holdings,
@@ -107,6 +109,7 @@ pub struct Account {
 pub struct RequestPermit {
     account: Arc<Account>,
     _permit: OwnedSemaphorePermit,
+    _of_key: Option<OwnedSemaphorePermit>,
 }
 
 impl Clients {
@@ -139,13 +142,21 @@ impl Clients {
 
     /// The account of a client.
     pub fn account(&self, client: &Client) -> Arc<Account> {
+        let key = match client {
+            Client::Page(name, _) => Some(self.account(&Client::Key(name.clone()))),
+            _ => None,
+        };
         let mut accounts = self.lock();
         if let Some(account) = accounts.get(client) {
             return account.clone();
         }
         if accounts.len() >= MAX_IDLE_ACCOUNTS {
-            accounts
-                .retain(|_, account| Arc::strong_count(account) > 1 || !account.held.is_empty());
+            accounts.retain(|_, account| Arc::strong_count(account) > 1 || !account.is_idle());
+        }
+        if let Some(key) = key {
+            let account = Arc::new(Account::of_page(client.clone(), key));
+            accounts.insert(client.clone(), account.clone());
+            return account;
         }
         let flow = Flow(self.next_flow.fetch_add(1, Ordering::Relaxed));
         let networks = client.networks().map(|network| self.network(network));
@@ -182,19 +193,19 @@ impl Clients {
     /// Tells a client its quotas and what is left of them.
     pub fn write_headers(&self, client: &Client, headers: &mut HeaderMap) {
         let account = self.account(client);
-        let quotas = &self.quotas;
+        let quotas = &account.quotas;
         let mut policy = format!(
             "\"requests\";q={};qu=\"concurrent-requests\", \"sessions\";q={};qu=\"sessions\"",
             quotas.requests, quotas.sessions
         );
         let mut left = format!(
             "\"requests\";r={}, \"sessions\";r={}",
-            account.requests.available_permits(),
+            account.requests_left(),
             account.held.sessions.left()
         );
         if let Some((rate, burst)) = quotas.frames {
             let window = burst.get().div_ceil(rate.get());
-            let frames_left = account.frames_left(rate, burst);
+            let frames_left = account.counting_frames().frames_left(rate, burst);
             policy += &format!(", \"frames\";q={burst};w={window};qu=\"frames\"");
             left += &format!(", \"frames\";r={frames_left};t={window}");
         }
@@ -224,20 +235,20 @@ impl Account {
             let quota = Quota::per_second(rate).allow_burst(burst);
             RateLimiter::direct(quota).with_middleware()
         });
-        let permits = |count: usize| Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)));
         Self {
             client,
+            key: None,
             flow,
             quotas,
             all,
             held,
             _networks: networks,
-            requests: permits(quotas.requests),
-            videos: permits(1),
+            requests: places(quotas.requests),
+            videos: places(1),
             messages: Arc::new(MessageRate::direct(
                 Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
             )),
-            asked: RateLimiter::direct(Quota::per_second(ASKED).allow_burst(ASKED_AT_ONCE)),
+            asked: ask_rate(),
             frames,
             next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((
@@ -247,9 +258,60 @@ impl Account {
         }
     }
 
+    /// That of a page with a token of this key: a part of the key's. It cannot take from the key's other sessions what a
+    /// body holds as slowly as it likes: memory, and places for requests. All else it shares with them.
+    fn of_page(client: Client, key: Arc<Self>) -> Self {
+        let requests = key.quotas.requests.div_ceil(2);
+        let held = Holdings {
+            upload_bytes: key.held.upload_bytes.part(),
+            ..key.held.clone()
+        };
+        Self {
+            client,
+            flow: key.flow,
+            quotas: Quotas {
+                requests,
+                ..key.quotas
+            },
+            all: key.all.clone(),
+            held,
+            _networks: Vec::new(),
+            requests: places(requests),
+            videos: key.videos.clone(),
+            messages: key.messages.clone(),
+            asked: ask_rate(),
+            frames: None,
+            next_frame: tokio::sync::Mutex::default(),
+            frames_left: Mutex::new((0, clock::now())),
+            key: Some(key),
+        }
+    }
+
+    /// Whether it may be forgotten: nothing is held.
+    fn is_idle(&self) -> bool {
+        match self.key {
+            Some(_) => self.held.upload_bytes.held() == 0,
+            None => self.held.is_empty(),
+        }
+    }
+
+    /// Who counts frames.
+    fn counting_frames(&self) -> &Self {
+        self.key.as_deref().unwrap_or(self)
+    }
+
     /// In whose turn the client's work is done.
     pub fn flow(&self) -> Flow {
         self.flow
+    }
+
+    /// Places for requests in flight that are left. A page takes no more than it leaves of its key's.
+    fn requests_left(&self) -> usize {
+        let left = self.requests.available_permits();
+        let Some(key) = &self.key else { return left };
+        let taken = self.quotas.requests.saturating_sub(left);
+        let of_key = key.requests.available_permits();
+        left.min(of_key.saturating_sub(taken))
     }
 
     /// Takes a place for a request in flight.
@@ -257,20 +319,34 @@ impl Account {
     /// # Errors
     /// The client has as many as it may.
     pub fn request(self: &Arc<Self>) -> Result<RequestPermit, Problem> {
-        let permit = self.requests.clone().try_acquire_owned();
-        let refused = |_| Problem::quota_exceeded("requests in flight", self.quotas.requests);
+        let refused = || Problem::quota_exceeded("requests in flight", self.quotas.requests);
+        if self.requests_left() == 0 {
+            return Err(refused());
+        }
+        let take = |places: &Arc<Semaphore>| places.clone().try_acquire_owned();
+        let of_key = self.key.as_ref().map(|key| take(&key.requests));
         Ok(RequestPermit {
             account: self.clone(),
-            _permit: permit.map_err(refused)?,
+            _permit: take(&self.requests).map_err(|_| refused())?,
+            _of_key: of_key.transpose().map_err(|_| refused())?,
         })
     }
 
     /// The same, but waits for a place, in order of arrival.
     pub async fn request_in_order(self: &Arc<Self>) -> RequestPermit {
-        let permit = self.requests.clone().acquire_owned().await;
+        let take = async |places: &Arc<Semaphore>| {
+            let place = places.clone().acquire_owned().await;
+            place.expect("the places are never closed")
+        };
+        let permit = take(&self.requests).await;
+        let of_key = match &self.key {
+            Some(key) => Some(take(&key.requests).await),
+            None => None,
+        };
         RequestPermit {
             account: self.clone(),
-            _permit: permit.expect("the places are never closed"),
+            _permit: permit,
+            _of_key: of_key,
         }
     }
 
@@ -317,6 +393,14 @@ impl Account {
     pub fn bytes(&self) -> &Budget {
         &self.held.upload_bytes
     }
+}
+
+fn places(count: usize) -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)))
+}
+
+fn ask_rate() -> DefaultDirectRateLimiter {
+    RateLimiter::direct(Quota::per_second(ASKED).allow_burst(ASKED_AT_ONCE))
 }
 
 /// The budget of a client in these networks.
@@ -419,9 +503,10 @@ impl Account {
     /// # Errors
     /// None may until `deadline`.
     pub async fn count_frame_in_order(&self, deadline: Instant) -> Result<(), Problem> {
-        let turn = timeout_at(deadline, self.next_frame.lock()).await;
+        let counting = self.counting_frames();
+        let turn = timeout_at(deadline, counting.next_frame.lock()).await;
         loop {
-            let problem = match self.count_frames(1) {
+            let problem = match counting.count_frames(1) {
                 Ok(()) => return Ok(()),
                 Err(problem) => problem,
             };
@@ -439,21 +524,22 @@ impl Account {
     /// # Errors
     /// It has sent too many lately.
     pub fn count_frames(&self, frames: usize) -> Result<(), Problem> {
+        let counting = self.counting_frames();
         let frames = u32::try_from(frames).ok().and_then(NonZeroU32::new);
-        let (Some(limiter), Some(frames)) = (&self.frames, frames) else {
+        let (Some(limiter), Some(frames)) = (&counting.frames, frames) else {
             return Ok(());
         };
         match limiter.check_n(frames) {
             Ok(Ok(state)) => {
                 let left = state.remaining_burst_capacity();
-                self.note_frames_left(left);
+                counting.note_frames_left(left);
                 Ok(())
             }
             Ok(Err(not_yet)) => {
                 let wait = not_yet.wait_time_from(DefaultClock::default().now());
                 let rate = self.quotas.frames.map_or(0, |(rate, _)| rate.get());
                 let rate = usize::try_from(rate).unwrap_or(usize::MAX);
-                self.note_frames_left(0);
+                counting.note_frames_left(0);
                 Err(Problem::quota_exceeded("frames a second", rate).retry_after(wait))
             }
             // A request has no more frames than fit at once.

@@ -3,6 +3,8 @@
 //! A client may hold no more than is free (a dynamic threshold: Choudhury, Hahne 1998), and no more than its own maximum.
 //! So each further client finds half of what those before it left, and no number of greedy ones takes all. The networks
 //! that a client is in may hold no more than is free either, so that many addresses of one network are no many shares.
+//!
+//! A client may have parts, of which none holds more than it leaves of the client's budget.
 
 use crate::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
@@ -17,6 +19,8 @@ struct Inner {
     held: AtomicUsize,
     /// Those of the networks that a client is in.
     networks: Vec<Budget>,
+    /// The client's, where this is that of a part of it.
+    whole: Option<Budget>,
 }
 
 /// Which budget has too little left.
@@ -42,6 +46,17 @@ impl Budget {
             most,
             held: AtomicUsize::new(0),
             networks,
+            whole: None,
+        }))
+    }
+
+    /// That of a part of this client: what it holds, the client holds.
+    pub fn part(&self) -> Self {
+        Self(Arc::new(Inner {
+            most: self.0.most,
+            held: AtomicUsize::new(0),
+            networks: self.0.networks.clone(),
+            whole: Some(self.clone()),
         }))
     }
 
@@ -102,16 +117,20 @@ impl Charge {
     /// One of the budgets has too few left. Nothing was taken.
     pub fn grow(&mut self, count: usize) -> Result<(), BudgetFull> {
         let (client, free) = (&self.client.0, self.all.left());
-        if count > client.most.saturating_sub(self.client.held()) {
+        let most = client.whole.as_ref().map_or(client.most, Budget::left);
+        if count > most.saturating_sub(self.client.held()) {
             return Err(BudgetFull::Client);
         }
+        let whole = client.whole.as_ref().unwrap_or(&self.client);
         // Whoever is alone may have what is left over.
-        let is_alone = self.all.held() <= self.client.held();
+        let is_alone = self.all.held() <= whole.held();
         let limit = if is_alone { usize::MAX } else { free };
         // A network has at least what one client may have.
         let networks = client.networks.iter();
         let levels = networks.map(|network| (network, free.max(client.most)));
-        let levels = levels.chain([(&self.client, limit), (&self.all, usize::MAX)]);
+        let part = client.whole.as_ref().map(|_| (&self.client, most));
+        let levels = levels.chain(part);
+        let levels = levels.chain([(whole, limit), (&self.all, usize::MAX)]);
         let mut taken: Vec<&Budget> = Vec::new();
         for (budget, limit) in levels {
             if !budget.take(count, limit) {
@@ -128,8 +147,9 @@ impl Charge {
     pub fn shrink(&mut self, count: usize) {
         let less = self.count.saturating_sub(count);
         self.count -= less;
-        let networks = self.client.0.networks.iter();
-        let budgets = networks.chain([&self.client, &self.all]);
+        let client = &self.client.0;
+        let above = client.networks.iter().chain(&client.whole);
+        let budgets = above.chain([&self.client, &self.all]);
         budgets.for_each(|budget| budget.give_back(less));
     }
 }
@@ -195,6 +215,27 @@ mod tests {
         assert!(network.held() <= 256, "{network:?}");
         let mut other = Charge::new(&all, &Budget::new(128));
         assert_eq!(other.grow(128), Ok(()));
+    }
+
+    #[test]
+    fn a_part_of_a_client_holds_no_more_than_it_leaves() {
+        let (all, client) = (Budget::new(512), Budget::new(128));
+        let hold_all = |budget: &Budget| {
+            let mut charge = Charge::new(&all, budget);
+            while charge.grow(1).is_ok() {}
+            charge
+        };
+        let parts: Vec<Charge> = (0..3).map(|_| hold_all(&client.part())).collect();
+        let held: Vec<usize> = parts.iter().map(|charge| charge.count).collect();
+        assert_eq!(held, [64, 32, 16]);
+        assert_eq!((client.held(), all.held()), (112, 112));
+        // The client itself has the rest.
+        let rest = hold_all(&client);
+        assert_eq!(rest.count, 16);
+        let mut part = Charge::new(&all, &client.part());
+        assert_eq!(part.grow(1), Err(BudgetFull::Client));
+        drop((part, rest, parts));
+        assert_eq!((client.held(), all.held()), (0, 0));
     }
 
     proptest! {
