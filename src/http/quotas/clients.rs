@@ -9,7 +9,7 @@ use crate::http::problems::problem::Problem;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_config::Config;
 use bagtrack_net::MessageRate;
-use bagtrack_sessions::clock::{self, Instant, sleep_until, timeout_at};
+use bagtrack_sessions::clock::{self, Instant, sleep, sleep_until, timeout_at};
 use bagtrack_sessions::{
     Budget, BudgetFull, Charge, Flow, MAX_LIST_BYTES, OpenError, QuotaExhausted, Reservation,
     SessionQuota, StoreShare, TooManySessions,
@@ -46,6 +46,11 @@ const MESSAGES_AT_ONCE: NonZeroU32 = NonZeroU32::new(2_000).expect("it is not 0"
 const ASKED: NonZeroU32 = NonZeroU32::new(500).expect("it is not 0");
 /// And at once: the 70 files of the page, for a dozen people behind one address.
 const ASKED_AT_ONCE: NonZeroU32 = NonZeroU32::new(1_000).expect("it is not 0");
+
+/// TLS handshakes a second: the service signs in each, which takes a network thread milliseconds with a large key of RSA.
+const HANDSHAKES: NonZeroU32 = NonZeroU32::new(25).expect("it is not 0");
+/// And at once: the cameras and pages of some dozen people behind one address.
+const HANDSHAKES_AT_ONCE: NonZeroU32 = NonZeroU32::new(64).expect("it is not 0");
 
 /// What one client may have.
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +102,9 @@ pub struct Account {
     videos: Arc<Semaphore>,
     messages: Arc<MessageRate>,
     asked: DefaultDirectRateLimiter,
+    handshakes: DefaultDirectRateLimiter,
+    /// Whose handshake is next.
+    next_handshake: tokio::sync::Mutex<()>,
     frames: Option<FrameRate>,
     /// Whose frame is counted next, where several wait for it.
     next_frame: tokio::sync::Mutex<()>,
@@ -245,10 +253,10 @@ impl Account {
             _networks: networks,
             requests: places(quotas.requests),
             videos: places(1),
-            messages: Arc::new(MessageRate::direct(
-                Quota::per_second(MESSAGES).allow_burst(MESSAGES_AT_ONCE),
-            )),
-            asked: ask_rate(),
+            messages: Arc::new(rate(MESSAGES, MESSAGES_AT_ONCE)),
+            asked: rate(ASKED, ASKED_AT_ONCE),
+            handshakes: rate(HANDSHAKES, HANDSHAKES_AT_ONCE),
+            next_handshake: tokio::sync::Mutex::default(),
             frames,
             next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((
@@ -279,7 +287,9 @@ impl Account {
             requests: places(requests),
             videos: key.videos.clone(),
             messages: key.messages.clone(),
-            asked: ask_rate(),
+            asked: rate(ASKED, ASKED_AT_ONCE),
+            handshakes: rate(HANDSHAKES, HANDSHAKES_AT_ONCE),
+            next_handshake: tokio::sync::Mutex::default(),
             frames: None,
             next_frame: tokio::sync::Mutex::default(),
             frames_left: Mutex::new((0, clock::now())),
@@ -350,6 +360,14 @@ impl Account {
         }
     }
 
+    /// Waits until the client may make a TLS handshake, in order of arrival.
+    pub async fn handshake_in_order(&self) {
+        let _turn = self.next_handshake.lock().await;
+        while let Err(not_yet) = self.handshakes.check() {
+            sleep(not_yet.wait_time_from(DefaultClock::default().now())).await;
+        }
+    }
+
     /// Counts a request that takes no turn at the workers.
     ///
     /// # Errors
@@ -399,8 +417,8 @@ fn places(count: usize) -> Arc<Semaphore> {
     Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)))
 }
 
-fn ask_rate() -> DefaultDirectRateLimiter {
-    RateLimiter::direct(Quota::per_second(ASKED).allow_burst(ASKED_AT_ONCE))
+fn rate(a_second: NonZeroU32, at_once: NonZeroU32) -> DefaultDirectRateLimiter {
+    RateLimiter::direct(Quota::per_second(a_second).allow_burst(at_once))
 }
 
 /// The budget of a client in these networks.

@@ -1,13 +1,15 @@
 //! What a connection goes through from when it is accepted to its end.
 
-use crate::http::quotas::client::Peer;
+use crate::http::quotas::client::{Client, Peer};
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
 use bagtrack_config::MAX_BUFFER_BYTES;
-use bagtrack_net::{Begun, ClientLimits, ConnectionHold, ConnectionIo, Security, Transport};
+use bagtrack_net::{
+    Begun, ClientLimits, ConnectionHold, ConnectionIo, Security, Transport, is_trusted,
+};
 use bagtrack_sessions::clock::timeout;
 use hyper::Request;
 use hyper::body::Incoming;
@@ -62,7 +64,13 @@ impl ConnectionService {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "cannot set TCP_NODELAY");
         }
-        let beginning = timeout(self.handshake_timeout, self.security.begin(stream));
+        let beginning = async {
+            if self.has_tls() {
+                self.handshake_turn(peer).await;
+            }
+            self.security.begin(stream).await
+        };
+        let beginning = timeout(self.handshake_timeout, beginning);
         let (transport, routes) = match hold.begin(beginning).await {
             Some(Ok(Ok(Begun::AsConfigured(transport)))) => (transport, &self.routes),
             #[cfg(feature = "tls")]
@@ -72,6 +80,15 @@ impl ConnectionService {
             None => return tracing::debug!(%peer, "connection closed during its TLS handshake"),
         };
         self.speak_http(transport, peer, routes.clone(), hold).await;
+    }
+
+    /// Waits until the client at this address may make a handshake. A trusted proxy makes those of many.
+    async fn handshake_turn(&self, peer: SocketAddr) {
+        let trusted = &self.state.config.limits.trusted_proxies;
+        if !is_trusted(peer.ip().to_canonical(), trusted) {
+            let account = self.state.clients.account(&Client::at(peer.ip()));
+            account.handshake_in_order().await;
+        }
     }
 
     /// Serves HTTP over these bytes until they end, or a stream that has taken them over does.

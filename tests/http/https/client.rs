@@ -5,10 +5,10 @@ use rustls::pki_types::{CertificateDer, ServerName};
 use rustls::{ClientConfig, RootCertStore, crypto::ring};
 use serde_json::Value;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpSocket, TcpStream};
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 
@@ -55,10 +55,21 @@ impl Client<TlsStream<TcpStream>> {
     /// # Errors
     /// There is no handshake.
     pub async fn try_open(connector: &TlsConnector, address: SocketAddr) -> io::Result<Self> {
-        let stream = TcpStream::connect(address).await?;
+        Self::over(TcpStream::connect(address).await?, connector).await
+    }
+
+    async fn over(stream: TcpStream, connector: &TlsConnector) -> io::Result<Self> {
         let name = ServerName::try_from("localhost").unwrap();
         let connected = within(connector.connect(name, stream), "the handshake ends");
         connected.await.map(Self)
+    }
+
+    /// From another address of this machine.
+    pub async fn open_from(from: IpAddr, connector: &TlsConnector, address: SocketAddr) -> Self {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.bind(SocketAddr::new(from, 0)).unwrap();
+        let stream = socket.connect(address).await.unwrap();
+        Self::over(stream, connector).await.unwrap()
     }
 
     pub async fn open(connector: &TlsConnector, address: SocketAddr) -> Self {

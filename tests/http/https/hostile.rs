@@ -4,9 +4,11 @@ use super::certificates::{Authority, Files, kinds};
 use super::client::{Client, trusting};
 use super::service::Service;
 use bagtrack_testing::within::within;
+use std::net::IpAddr;
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
+use tokio::task::JoinSet;
 
 /// The head of a TLS record of 512 bytes, and the head of the hello in it.
 const HELLO_BEGUN: [u8; 9] = [22, 3, 1, 2, 0, 1, 0, 1, 252];
@@ -98,6 +100,36 @@ async fn a_connection_over_its_share_is_closed_without_a_word() {
     let mut second = Client(TcpStream::connect(service.address).await.unwrap());
     assert_eq!(second.ends().await, b"");
     drop(busy);
+    assert!(service.end().await);
+}
+
+/// Each costs the network thread a signature.
+#[tokio::test]
+async fn an_address_makes_so_many_handshakes_a_second_and_others_do_not_wait_for_them() {
+    const AT_ONCE: usize = 64;
+    const A_SECOND: usize = 25;
+    let (authority, files) = issued();
+    let service = Service::start(Some(&files), |_| ()).await;
+    let (connector, address) = (trusting(&authority.root, &[]), service.address);
+    let started = Instant::now();
+    for _ in 0..AT_ONCE + 2 * A_SECOND {
+        Client::open(&connector, address).await;
+    }
+    let took = started.elapsed();
+    assert!(took >= Duration::from_millis(1_950), "{took:?}");
+    let mut waiting = JoinSet::new();
+    for _ in 0..8 * A_SECOND {
+        let connector = connector.clone();
+        waiting.spawn(async move { Client::open(&connector, address).await });
+    }
+    let mut other = Client::open_from(IpAddr::from([127, 0, 0, 9]), &connector, address).await;
+    assert_eq!(other.call("GET", "/healthz", b"").await.status(), "200");
+    let mut ended = 0;
+    while waiting.try_join_next().is_some() {
+        ended += 1;
+    }
+    assert!(ended < 8 * A_SECOND, "{ended}");
+    waiting.shutdown().await;
     assert!(service.end().await);
 }
 
