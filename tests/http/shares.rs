@@ -188,6 +188,8 @@ async fn the_addresses_of_one_network_hold_half_of_the_memory_for_bodies_and_oth
 /// A service with one key, two sessions of it, and what a page with a token for the first one says.
 async fn beside_a_page(change: fn(&mut Config)) -> (TestApplication, [String; 2], String) {
     let app = TestApplication::start_with(|config| {
+        behind_a_proxy(config);
+        behind_a_proxy(config);
         config.access.api_keys = vec![Secret::from("me:0123456789abcdef")];
         change(config);
     });
@@ -243,9 +245,6 @@ async fn stalled_requests_of_a_page_leave_places_to_the_other_sessions_of_its_ke
     assert_eq!(stalled.len(), 2);
     let answer = app.post_frame(&sessions[1], pictures::png(1)).await;
     expect(answer, StatusCode::OK).await;
-    let told = app.get_session(&sessions[1]).await;
-    let limit = told.headers()["ratelimit"].to_str().unwrap();
-    assert!(limit.contains("\"requests\";r=2"), "{limit}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -99,7 +99,7 @@ fn one_source_has_so_many_connections_at_haproxy() {
         let short = Some(Duration::from_millis(300));
         stream.set_read_timeout(short).unwrap();
         match stream.read(&mut [0]) {
-            Ok(_) => true,
+            Ok(read) => read == 0,
             Err(error) => error.kind() == std::io::ErrorKind::ConnectionReset,
         }
     };

@@ -36,8 +36,8 @@ fn check(config: &Config, hosts: AllowedHosts, request: &Request) -> Result<(), 
         return Ok(());
     };
     let origin = origin.to_str().unwrap_or("");
-    // Pages cannot set this header. A proxy may have changed the host, but not this. Over plain HTTP browsers send it to
-    // this machine only.
+    // Pages cannot set this header. A proxy may have changed the host, but not this. Over plain HTTP browsers send it
+    // to this machine only.
     let same = match text(headers, "sec-fetch-site") {
         Some(site) => matches!(site, "same-origin" | "none"),
         None => is_same_origin(origin, host),

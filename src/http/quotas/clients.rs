@@ -1,7 +1,8 @@
 //! What each client has in use, against its quotas.
 //!
 //! Quotas are shares of what the service has: sessions and their bytes, requests in flight, bytes of uploads, and frames
-//! and requests a second. They are told in the headers `RateLimit-Policy` and `RateLimit` (draft-ietf-httpapi-ratelimit-headers).
+//! and requests a second. They are told in the headers `RateLimit-Policy` and `RateLimit`
+//! (draft-ietf-httpapi-ratelimit-headers).
 
 use super::client::Client;
 use super::holdings::Holdings;
@@ -41,13 +42,14 @@ const MESSAGES: NonZeroU32 = NonZeroU32::new(10_000).expect("it is not 0");
 /// And at once.
 const MESSAGES_AT_ONCE: NonZeroU32 = NonZeroU32::new(2_000).expect("it is not 0");
 
-/// Requests a second that take no turn at the workers: more than pages of some people and their programs ask for, and so
-/// few that they take a network thread some percent of its time.
+/// Requests a second that take no turn at the workers: more than pages of some people and their programs ask for, and
+/// so few that they take a network thread some percent of its time.
 const ASKED: NonZeroU32 = NonZeroU32::new(500).expect("it is not 0");
 /// And at once: the 70 files of the page, for a dozen people behind one address.
 const ASKED_AT_ONCE: NonZeroU32 = NonZeroU32::new(1_000).expect("it is not 0");
 
-/// TLS handshakes a second: the service signs in each, which takes a network thread milliseconds with a large key of RSA.
+/// TLS handshakes a second: the service signs in each, for which a network thread takes milliseconds with a large key of
+/// RSA.
 const HANDSHAKES: NonZeroU32 = NonZeroU32::new(25).expect("it is not 0");
 /// And at once: the cameras and pages of some dozen people behind one address.
 const HANDSHAKES_AT_ONCE: NonZeroU32 = NonZeroU32::new(64).expect("it is not 0");
@@ -266,8 +268,8 @@ impl Account {
         }
     }
 
-    /// That of a page with a token of this key: a part of the key's. It cannot take from the key's other sessions what a
-    /// body holds as slowly as it likes: memory, and places for requests. All else it shares with them.
+    /// That of a page with a token of this key: a part of the key's. It cannot take from the key's other sessions what
+    /// a body holds as slowly as it likes: memory, and places for requests. All else it shares with them.
     fn of_page(client: Client, key: Arc<Self>) -> Self {
         let requests = key.quotas.requests.div_ceil(2);
         let held = Holdings {
@@ -344,13 +346,9 @@ impl Account {
 
     /// The same, but waits for a place, in order of arrival.
     pub async fn request_in_order(self: &Arc<Self>) -> RequestPermit {
-        let take = async |places: &Arc<Semaphore>| {
-            let place = places.clone().acquire_owned().await;
-            place.expect("the places are never closed")
-        };
-        let permit = take(&self.requests).await;
+        let permit = place_in_order(&self.requests).await;
         let of_key = match &self.key {
-            Some(key) => Some(take(&key.requests).await),
+            Some(key) => Some(place_in_order(&key.requests).await),
             None => None,
         };
         RequestPermit {
@@ -415,6 +413,11 @@ impl Account {
 
 fn places(count: usize) -> Arc<Semaphore> {
     Arc::new(Semaphore::new(count.min(Semaphore::MAX_PERMITS)))
+}
+
+async fn place_in_order(places: &Arc<Semaphore>) -> OwnedSemaphorePermit {
+    let place = places.clone().acquire_owned().await;
+    place.expect("the places are never closed")
 }
 
 fn rate(a_second: NonZeroU32, at_once: NonZeroU32) -> DefaultDirectRateLimiter {

@@ -37,8 +37,8 @@ pub async fn get(
     Ok(([(CONTENT_TYPE, MEDIA_TYPE)], text))
 }
 
-/// The metrics as they are now. It takes a millisecond and more, so it is done beside the network threads: one at a time,
-/// and once for all who asked before it began.
+/// The metrics as they are now. It takes a millisecond and more, so it is done beside the network threads: one at a
+/// time, and once for all who asked before it began.
 async fn rendered(state: &AppState) -> Result<Bytes, Problem> {
     let asked = clock::now();
     let mut rendered = state.rendered_metrics.lock().await;

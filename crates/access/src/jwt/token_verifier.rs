@@ -159,8 +159,8 @@ impl TokenVerifier {
         })))
     }
 
-    /// Whom this token speaks for. The keys are read again where they are old, beside this call, and where they have not
-    /// signed it.
+    /// Whom this token speaks for. The keys are read again where they are old, beside this call, and where they have
+    /// not signed it.
     ///
     /// # Errors
     /// See [`TokenError`].

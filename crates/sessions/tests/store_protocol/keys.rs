@@ -95,9 +95,9 @@ async fn requests_with_keys_that_are_refused_leave_nothing_in_redis() {
     let redis = Redis::start();
     let store = redis.store(Duration::from_secs(5)).await;
     let service = service(Some(Arc::new(store)), 1);
-    for key in 0..20 {
-        let refused = ask(&service, &Owner::default(), &key.to_string(), b"x".to_vec());
-        assert!(matches!(refused.await, Err(OpenError::Frame(_))));
+    for key in ["a", "b", "c"] {
+        let refused = ask(&service, &Owner::default(), key, b"x".to_vec()).await;
+        assert!(matches!(refused, Err(OpenError::Frame(_))), "{refused:?}");
     }
     let mut kept: Vec<String> = redis.ask(&["KEYS", "*"]);
     kept.retain(|key| key != "suite:probe");
