@@ -1,10 +1,10 @@
-// Nothing is lost: the work is kept in the browser as it goes on, and comes back when the page is loaded anew. A project
-// file does the same by hand.
+// Nothing is lost: each run is kept in the browser as it goes on. It comes back when the page is loaded anew, and can be
+// gone on with when another source has taken its place. A project file does the same by hand.
 
 import { catchUp } from "./again.js";
 import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
-import { MOST_BYTES, forget, keepFiles, keepWork, keptFiles, keptWork, tab } from "./kept.js";
+import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepFiles, keepWork, keptFiles, keptWork } from "./kept.js";
 import { adopt, projectOf, readProject, withoutVideo } from "./project.js";
 import { openFiles } from "./sources.js";
 
@@ -18,11 +18,15 @@ import { openFiles } from "./sources.js";
 /** Milliseconds after a change until it is kept. */
 const AFTER = 1000;
 const CLIPS = ["card", "leaves"];
+/** What the tab has open, also after it was loaded anew. */
+const OWN = "work";
 
 export class Keeping {
   /** @param {import("./page.js").Page} page */
   constructor(page) {
     this.page = page;
+    /** The entry of what is here. */
+    this.id = "";
     /** @type {Source | undefined} The one whose files are kept. */
     this.source = undefined;
     this.hasFiles = false;
@@ -30,11 +34,13 @@ export class Keeping {
     this.isSafe = false;
     /** @type {number | undefined} */
     this.timer = undefined;
-    /** @type {Kept | undefined} What another tab has left. */
-    this.offered = undefined;
+    /** What was left for another source. */
+    this.left = "";
     get("forget").addEventListener("click", () => this.forget());
-    get("go-on").addEventListener("click", () => this.offered && this.bringBack(this.offered));
-    document.addEventListener("visibilitychange", () => document.hidden && this.timer && this.keep());
+    document.addEventListener("visibilitychange", () => {
+      if (!document.hidden) this.offer();
+      else if (this.timer) this.keep();
+    });
   }
 
   /** Keeps what is here, in a moment. */
@@ -43,75 +49,146 @@ export class Keeping {
     this.timer ??= setTimeout(() => this.keep(), AFTER);
   }
 
+  /** @returns {Promise<boolean>} Whether all of what was here is kept. */
   async keep() {
     clearTimeout(this.timer);
     this.timer = undefined;
-    const { run } = this.page;
-    if (!run || run.objects.length === 0) return;
+    const { id, page: { run } } = this;
+    if (!run) return false;
     try {
+      if (run.objects.length === 0) return await this.keepNothing();
       const project = projectOf(run);
-      if (this.source !== run.source) await this.keepSource(run.source);
-      const states = Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
+      if (this.source !== run.source) await this.keepSource(id, run.source);
       const clip = CLIPS.find((name) => name === run.source.name && !run.source.files);
-      await keepWork({ tab: tab(), isLocal: run.isLocal, project, states, clip });
-      if (run !== this.page.run) return;
-      this.isSafe = this.timer === undefined && (!!clip || this.hasFiles);
-      this.tell(project, clip || this.hasFiles ? "" : " The pictures are not kept.");
+      const isWhole = !!clip || this.hasFiles;
+      await keepWork({ id, at: Date.now(), isLocal: run.isLocal, project, states: statesOf(run), clip });
+      if (run !== this.page.run) return isWhole;
+      this.isSafe = this.timer === undefined && isWhole;
+      this.tell(`Kept in this browser: ${told(project)}.${isWhole ? "" : " The pictures are not kept."}`);
+      return isWhole;
     } catch (error) {
-      get("kept").hidden = false;
-      get("kept-text").textContent = `The browser keeps nothing of this (${error instanceof Error ? error.message : error}).`;
+      this.tell(`The browser keeps nothing of this (${error instanceof Error ? error.message : error}).`);
+      return false;
     }
   }
 
-  /** @param {Source} source */
-  async keepSource(source) {
+  /** All objects were deleted. */
+  async keepNothing() {
+    this.source = undefined;
+    await forget(this.id);
+    this.isSafe = this.timer === undefined;
+    this.tell("");
+    return true;
+  }
+
+  /** @param {string} id
+   * @param {Source} source */
+  async keepSource(id, source) {
     const files = source.files ?? [];
     const bytes = files.reduce((sum, { size }) => sum + size, 0);
     this.hasFiles = files.length > 0 && bytes <= MOST_BYTES;
-    await keepFiles(this.hasFiles ? files : []);
+    await keepFiles(id, this.hasFiles ? files : []);
     this.source = source;
   }
 
-  /** @param {Project} project
-   * @param {string} [more] */
-  tell({ video, objects }, more = "") {
-    const rows = objects.reduce((sum, object) => sum + object.rows.length, 0);
-    const count = `${objects.length} ${objects.length === 1 ? "object" : "objects"}, ${rows} rows`;
-    get("kept").hidden = false;
-    get("kept-text").textContent = `Kept in this browser: ${video.name}, ${count}.${more}`;
+  /** @param {string} text Of what is here; empty where nothing is kept of it. */
+  tell(text) {
+    get("kept-own").hidden = text === "";
+    get("kept-text").textContent = text;
+    get("kept").hidden = text === "" && get("works").children.length === 0;
   }
 
   async forget() {
     clearTimeout(this.timer);
     this.timer = undefined;
-    this.source = this.offered = undefined;
+    this.source = undefined;
     this.isSafe = false;
-    get("kept").hidden = true;
-    await forget().catch(() => undefined);
+    this.tell("");
+    await forget(this.id).catch(() => undefined);
     this.page.say("The browser has forgotten it.");
   }
 
-  /** Brings back what this tab had; offers what another one left. */
+  /** Before another source takes the place of what is here: keeps that, and asks where not all of it can be kept.
+   * @returns {Promise<boolean>} Whether it may be left. */
+  async leave() {
+    const { run } = this.page;
+    this.left = "";
+    if (!run || run.objects.length === 0) return true;
+    const isKept = (this.isSafe && this.timer === undefined) || (await this.keep());
+    this.left = isKept ? run.source.name : "";
+    const question = `Not all of ${run.source.name} can be kept, and its results were not saved. Leave it?`;
+    return isKept || !this.page.isUnsaved || confirm(question);
+  }
+
+  /** Another source is here.
+   * @param {string} [id] Its entry, where it has one.
+   * @returns {string} What is to be said of the one before it. */
+  arrived(id = crypto.getRandomValues(new Uint32Array(2)).join("-")) {
+    clearTimeout(this.timer);
+    this.timer = undefined;
+    this.isSafe = false;
+    if (this.id !== id) giveUp(this.id);
+    this.id = id;
+    claim(id);
+    sessionStorage.setItem(OWN, id);
+    this.tell("");
+    this.offer();
+    return this.left && ` ${this.left} is kept: below you can go on with it.`;
+  }
+
+  /** Brings back what this tab had; offers what others left. */
   async begin() {
-    const kept = await keptWork().catch(() => undefined);
-    if (!kept || this.page.state !== "start") return;
-    if (kept.tab === tab()) return this.bringBack(kept);
-    this.offered = kept;
-    get("go-on").hidden = false;
-    this.tell(kept.project);
+    const own = sessionStorage.getItem(OWN);
+    // A tab that was duplicated has it open.
+    const kept = own && (await claim(own)) ? await keptWork(own).catch(() => undefined) : undefined;
+    if (kept && this.page.state === "start") return this.bringBack(kept, true);
+    if (own && own !== this.id) giveUp(own);
+    await this.offer();
+  }
+
+  /** Offers what was left and no tab has open. */
+  async offer() {
+    const works = await freeWorks().catch(() => []);
+    get("works").replaceChildren(...works.map((work) => this.item(work)));
+    this.tell(get("kept-text").textContent ?? "");
   }
 
   /** @param {Kept} kept */
-  async bringBack(kept) {
-    const { project, states, clip } = kept;
-    get("go-on").hidden = true;
-    input(kept.isLocal ? "here" : "there").checked = true;
-    const files = (await keptFiles().catch(() => undefined)) ?? [];
+  item(kept) {
+    const item = document.createElement("li");
+    item.className = "row";
+    const day = new Date(kept.at).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+    item.append(`Kept in this browser: ${told(kept.project)}, ${day}.`);
+    /** @type {[string, string, () => Promise<unknown>][]} */
+    const buttons = [
+      ["go-on", "Go on with it", () => this.bringBack(kept)],
+      ["quiet", "Forget it", () => forget(kept.id).then(() => giveUp(kept.id))],
+    ];
+    for (const [name, text, act] of buttons) {
+      const button = document.createElement("button");
+      [button.type, button.className, button.textContent] = ["button", name, text];
+      button.addEventListener("click", async () => {
+        if (await claim(kept.id)) await act();
+        else this.page.say("Another tab has it open.", true);
+        this.offer();
+      });
+      item.append(button);
+    }
+    return item;
+  }
+
+  /** @param {Kept} kept That this page has open.
+   * @param {boolean} [isOwn] Whether this tab left it. */
+  async bringBack({ id, isLocal, project, states, clip }, isOwn = false) {
+    const files = (await keptFiles(id).catch(() => undefined)) ?? [];
     const open = async () => {
+      input(isLocal ? "here" : "there").checked = true;
       if (clip) return openClip(clip);
       return files.length > 0 ? openFiles(files) : withoutVideo(project);
     };
-    await this.open(project, open, states);
+    // Another tab may have it open where browsers do not tell: then this one has a copy.
+    await this.open(project, open, states, isOwn || navigator.locks ? id : undefined);
+    if (this.id !== id) giveUp(id);
   }
 
   /** Takes a project file, alone or with its video, and the video of a project that was opened without.
@@ -122,8 +199,9 @@ export class Keeping {
     const others = files.filter((other) => other !== file);
     const { run } = this.page;
     if (file) this.openProject(file, others);
-    else if (run?.source.isAbsent && files[0].name === run.source.name) this.open(projectOf(run), () => openFiles(files));
-    else return false;
+    else if (run?.source.isAbsent && files[0].name === run.source.name) {
+      this.open(projectOf(run), () => openFiles(files), statesOf(run), this.id);
+    } else return false;
     return true;
   }
 
@@ -142,9 +220,11 @@ export class Keeping {
    * @param {Project} project
    * @param {() => Promise<Source>} open
    * @param {Kept["states"]} [states]
+   * @param {string} [id] Its entry.
    */
-  open(project, open, states = {}) {
+  open(project, open, states = {}, id) {
     return this.page.choose(open, async (run) => {
+      const left = this.arrived(id);
       adopt(run, project);
       for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
       const last = run.frames.numbers.pop();
@@ -159,11 +239,21 @@ export class Keeping {
       this.page.seen.figures(run, undefined);
       this.page.repaint();
       const isAbsent = source.isAbsent ? ` Choose ${source.name} to see its pictures.` : "";
-      this.page.say(`${source.name} is here again, with ${run.tracked} frames.${isAbsent}`);
+      this.page.say(`${source.name} is here again, with ${run.tracked} frames.${isAbsent}${left}`);
       this.changed();
     });
   }
 }
+
+/** @param {Project} project */
+function told({ video, objects }) {
+  const rows = objects.reduce((sum, object) => sum + object.rows.length, 0);
+  return `${video.name}, ${objects.length} ${objects.length === 1 ? "object" : "objects"}, ${rows} rows`;
+}
+
+/** The last state of each object.
+ * @param {Run} run */
+const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
 
 /** Goes on with the frames after the last one.
  * @param {Run} run */

@@ -1,11 +1,12 @@
-// What the browser keeps of the page, so that nothing is lost when it is loaded anew: the project, the states of the
-// trackers, and the video file where it is small.
+// What the browser keeps of the page, so that nothing is lost: of each run the project, the states of the trackers, and
+// the files where they are small. A run has an entry of its own, which one tab at a time has open.
 
 /**
  * @typedef {import("./project.js").Project} Project
  *
  * @typedef {object} Kept
- * @property {string} tab Of which tab it is.
+ * @property {string} id
+ * @property {number} at When it was kept, in milliseconds.
  * @property {boolean} isLocal Whether it was tracked in the page.
  * @property {Project} project
  * @property {Record<number, {bytes: Uint8Array<ArrayBuffer>, frames: number[]}>} states The last one of each object.
@@ -14,19 +15,14 @@
 
 const NAME = "bagtrack";
 const STORE = "kept";
-/** A larger file is not copied. */
+/** Larger files are not copied. */
 export const MOST_BYTES = 512 << 20;
-
-/**
- * @template T
- * @param {IDBRequest<T>} request
- * @returns {Promise<T>}
- */
-const done = (request) =>
-  new Promise((resolve, reject) => {
-    request.onsuccess = () => resolve(request.result);
-    request.onerror = () => reject(request.error);
-  });
+/** Entries that no tab has open. */
+const MOST = 5;
+/** Milliseconds after which they are forgotten. */
+const OLDEST = 30 * 24 * 3600 * 1000;
+/** Milliseconds in which a page that is loaded anew lets go of its entry. */
+const PATIENCE = 1000;
 
 /** @type {Promise<IDBDatabase> | undefined} */
 let database;
@@ -38,32 +34,121 @@ let database;
  * @returns {Promise<T>}
  */
 async function within(mode, run) {
-  database ??= (() => {
+  database ??= new Promise((resolve, reject) => {
     const request = indexedDB.open(NAME, 1);
     request.onupgradeneeded = () => request.result.createObjectStore(STORE);
-    return done(request);
-  })();
-  return done(run((await database).transaction(STORE, mode).objectStore(STORE)));
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+  const transaction = (await database).transaction(STORE, mode);
+  const request = run(transaction.objectStore(STORE));
+  return new Promise((resolve, reject) => {
+    transaction.oncomplete = () => resolve(request.result);
+    // Want of room is told here.
+    transaction.onabort = () => reject(transaction.error ?? request.error);
+  });
 }
 
-/** The tab that this is, also after it was loaded anew. */
-export function tab() {
-  const known = sessionStorage.getItem("tab");
-  const own = known ?? crypto.getRandomValues(new Uint32Array(2)).join("");
-  if (!known) sessionStorage.setItem("tab", own);
-  return own;
+/** @param {IDBValidKey} key */
+const read = (key) => within("readonly", (store) => store.get(key));
+
+/** Writes. Where there is no room, the oldest entry that no tab has open makes room.
+ * @param {unknown} value
+ * @param {IDBValidKey} key
+ * @returns {Promise<unknown>} */
+async function write(value, key) {
+  try {
+    return await within("readwrite", (store) => store.put(value, key));
+  } catch (error) {
+    const oldest = Object(error).name === "QuotaExceededError" ? (await freeWorks()).pop() : undefined;
+    if (!oldest) throw error;
+    await forget(oldest.id);
+    return write(value, key);
+  }
 }
 
 /** @param {Kept} kept */
-export const keepWork = (kept) => within("readwrite", (store) => store.put(kept, "work"));
+export const keepWork = (kept) => write(kept, ["work", kept.id]);
 
-/** @returns {Promise<Kept | undefined>} */
-export const keptWork = () => within("readonly", (store) => store.get("work"));
+/** @param {string} id
+ * @returns {Promise<Kept | undefined>} */
+export const keptWork = (id) => read(["work", id]);
 
-/** @param {File[]} files */
-export const keepFiles = (files) => within("readwrite", (store) => store.put(files, "files"));
+/** @param {string} id
+ * @param {File[]} files */
+export const keepFiles = (id, files) => write(files, ["files", id]);
 
-/** @returns {Promise<File[] | undefined>} */
-export const keptFiles = () => within("readonly", (store) => store.get("files"));
+/** @param {string} id
+ * @returns {Promise<File[] | undefined>} */
+export const keptFiles = (id) => read(["files", id]);
 
-export const forget = () => within("readwrite", (store) => store.clear());
+/** @param {string} id */
+export const forget = (id) =>
+  within("readwrite", (store) => {
+    store.delete(["files", id]);
+    return store.delete(["work", id]);
+  });
+
+/** The entries that no tab has open, newest first. Those that are too many or too old are forgotten.
+ * @returns {Promise<Kept[]>} */
+export async function freeWorks() {
+  await moveOld();
+  /** @type {Kept[]} */
+  const works = await within("readonly", (store) => store.getAll(IDBKeyRange.bound(["work"], ["work", []])));
+  const { held = [] } = (await navigator.locks?.query()) ?? {};
+  const taken = new Set([...held.map(({ name }) => name), ...[...mine.keys()].map(lockOf)]);
+  const free = works.filter(({ id }) => !taken.has(lockOf(id))).sort((one, other) => other.at - one.at);
+  const isLeft = (/** @type {Kept} */ { at }, /** @type {number} */ index) => index < MOST && Date.now() - at < OLDEST;
+  await Promise.all(free.filter((work, index) => !isLeft(work, index)).map(({ id }) => forget(id)));
+  return free.filter(isLeft);
+}
+
+/** Earlier versions of the page had one entry for all tabs. */
+async function moveOld() {
+  const [work, files] = await Promise.all([read("work"), read("files")]);
+  if (!work) return;
+  await write(files ?? [], ["files", work.tab]);
+  await write({ ...work, id: work.tab, at: Date.now() }, ["work", work.tab]);
+  await within("readwrite", (store) => {
+    store.delete("files");
+    return store.delete("work");
+  });
+}
+
+/** @type {Map<string, () => void>} The entries that this page has open, and what gives them up. */
+const mine = new Map();
+
+/** @param {string} id */
+const lockOf = (id) => `bagtrack work ${id}`;
+
+/** Has an entry open, until it is given up or the page is left.
+ * @param {string} id
+ * @returns {Promise<boolean>} Not where another tab has it. Over plain http browsers do not tell. */
+export async function claim(id) {
+  if (mine.has(id)) return true;
+  mine.set(id, () => undefined);
+  if (!navigator.locks || (await locked(id, { ifAvailable: true }))) return true;
+  const isHeld = mine.has(id) && (await locked(id, { signal: AbortSignal.timeout(PATIENCE) }));
+  if (!isHeld) mine.delete(id);
+  return isHeld;
+}
+
+/** @param {string} id
+ * @param {LockOptions} options
+ * @returns {Promise<boolean>} Whether this page has the lock. */
+const locked = (id, options) =>
+  new Promise((resolve) => {
+    const granted = (/** @type {Lock | null} */ lock) => {
+      // It may have been given up meanwhile.
+      const isHeld = lock !== null && mine.has(id);
+      resolve(isHeld);
+      return isHeld ? new Promise((release) => mine.set(id, () => release(undefined))) : undefined;
+    };
+    navigator.locks.request(lockOf(id), options, granted).catch(() => resolve(false));
+  });
+
+/** @param {string} id */
+export function giveUp(id) {
+  mine.get(id)?.();
+  mine.delete(id);
+}

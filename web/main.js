@@ -12,6 +12,8 @@ const page = new Page();
 const keeping = new Keeping(page);
 
 page.changed = () => keeping.changed();
+page.mayLeave = () => keeping.leave();
+page.arrived = () => keeping.arrived();
 keeping.begin();
 offerSources(
   (open) => page.choose(open),

@@ -52,6 +52,10 @@ export class Page {
     this.again = undefined;
     /** Is told when rows or objects have changed. */
     this.changed = () => {};
+    /** Keeps what is here, and says whether another source may take its place. */
+    this.mayLeave = async () => true;
+    /** Is told that another source is here, and says what is to be said of the one before it. */
+    this.arrived = () => "";
     /** @type {State} */
     this.state = "start";
     this.enter("start");
@@ -102,18 +106,25 @@ export class Page {
     if (this.run?.isOver && this.hasRows) this.enter("ended");
   }
 
-  /** Shows the first frame of a source and asks for a box.
+  /** Shows the first frame of a source and asks for a box. What was there before stays until then.
    * @param {() => Promise<Source>} open
    * @param {(run: Run) => Promise<void>} [resume] Brings back what was tracked in it. */
   async choose(open, resume) {
     const own = (this.choice += 1);
-    this.reset();
-    this.enter("opening");
+    get("decoding").hidden = true;
+    if (!this.run) this.enter("opening");
     this.say("Opening…");
     try {
       const source = await open();
       const first = await source.first();
-      if (own !== this.choice) return source.stop();
+      const mayLeave = own === this.choice && (await this.mayLeave());
+      if (own !== this.choice || !mayLeave) {
+        source.stop();
+        source.close?.();
+        if (own === this.choice) this.say(`${this.run?.source.name} stays.`);
+        return;
+      }
+      this.reset();
       const isLocal = input("here").checked;
       if (isLocal) this.local.warm().catch(() => undefined);
       this.run = new Run(isLocal ? this.local : this.client, source, first, this.told());
@@ -127,10 +138,10 @@ export class Page {
       this.beginning.reset();
       this.preview();
       get("picture").scrollIntoView({ block: "nearest" });
-      this.say(TAP + DRAW);
+      this.say(TAP + DRAW + this.arrived());
     } catch (error) {
       if (own !== this.choice) return;
-      this.enter("start");
+      if (!this.run) this.enter("start");
       this.fail(error);
       this.again = () => this.choose(open, resume);
       if (error instanceof UnplayableError) this.offerDecoding(error.file, resume);
@@ -152,7 +163,6 @@ export class Page {
 
   /** Lets go of what was there. */
   reset() {
-    get("decoding").hidden = true;
     this.run?.stop();
     this.run = undefined;
     this.frozen = undefined;

@@ -79,5 +79,8 @@ export function offerSources(choose, take) {
       if (kind === "drop" && dataTransfer) open(await filesOf(dataTransfer));
     });
   }
-  addEventListener("paste", (event) => open([...(event.clipboardData?.files ?? [])]));
+  addEventListener("paste", ({ target, clipboardData }) => {
+    const isTaken = target instanceof Element && target.closest('input:is([type="text"], [type="password"])');
+    if (!isTaken) open([...(clipboardData?.files ?? [])]);
+  });
 }

@@ -57,21 +57,112 @@ def reloaded_in_the_middle(checks):
     page.context.close()
 
 
-def left_in_another_tab(checks):
-    """What another tab has left is offered, not opened."""
-    page = checks.page(where="here")
+def kept_run(checks, page):
+    """Tracks a part of the sample in a page, and gives its rows."""
     choose(page, "card")
     drag(page, checks.clips["card"]["truth"][0])
     frames(page, 20)
     page.locator("#stop").click()
-    before = kept_rows(page)
+    return kept_rows(page)
+
+
+def offers(page, names):
+    """Waits until a page offers to go on with these, newest first."""
+    for _ in range(50):
+        # As if it was looked at again.
+        page.evaluate("() => void document.dispatchEvent(new Event('visibilitychange'))")
+        page.wait_for_timeout(300)
+        texts = page.locator("#works li").all_inner_texts()
+        found = [text.split(",")[0].removeprefix("Kept in this browser: ") for text in texts]
+        if found == names:
+            return
+    raise AssertionError(f"{found} are offered, not {names}")
+
+
+def go_on(page, name):
+    page.locator("#works li").filter(has_text=name).locator(".go-on").click()
+    said(page, f"{name} is here again")
+
+
+def each_tab_for_itself(checks):
+    """Tabs keep their work for themselves. What no tab has open is offered with its own pictures, not opened."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    page = checks.page(where="here")
+    before = kept_run(checks, page)
     other = page.context.new_page()
     other.goto(page.url)
-    kept_says(other, "card, 1 object")
-    other.locator("#go-on").click()
-    said(other, "card is here again")
+    offers(other, [])
+    other.locator("#here").evaluate("button => button.click()")
+    choose_file(other, path)
+    drag(other, sent_box(checks.files.truth[0]))
+    to_the_end(other)
+    own = kept_rows(other)
+    with page.context.expect_page() as opened:
+        page.evaluate("() => void open(location.href)")
+    duplicate = opened.value
+    said(duplicate, "Nothing is uploaded")
+    duplicate.wait_for_timeout(1500)
+    assert duplicate.locator("#results").is_hidden(), "a duplicate is a tab of its own"
+    offers(duplicate, [])
+    duplicate.close()
+    page.reload()
+    said(page, "card is here again")
+    same_rows(page, before)
+    page.close()
+    offers(other, ["card"])
+    checks.no_axe_violations(other, "work of another tab")
+    go_on(other, "card")
     same_rows(other, before)
+    assert other.evaluate("document.getElementById('picture').width") == checks.clips["card"]["width"]
+    offers(other, ["clip.mp4"])
+    go_on(other, "clip.mp4")
+    assert told(rows(other)) == told(own)
+    other.locator("#works button").filter(has_text="Forget it").click()
+    other.locator("#works li").wait_for(state="detached")
+    offers(other, [])
+    other.context.close()
+
+
+def left_for_another_source(checks):
+    """What cannot be opened leaves the run as it is, and so does what is pasted into a name. Another source takes its
+    place, and it can be gone on with."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    text = checks.files.folder / "notes.txt"
+    text.write_text("no video")
+    page = checks.page(where="here")
+    slow(page)
+    choose_file(page, path)
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 20)
+    page.locator("#pause").click()
+    before = rows(page)
+    page.locator("#file").set_input_files(text)
+    page.locator("#message.bad").wait_for()
+    same_rows(page, before)
+    assert page.locator("#pause").inner_text() == "Go on"
+    page.locator("#list input[type=text]").evaluate(PASTED)
+    page.wait_for_timeout(500)
+    before = same_rows(page, before)
+    page.locator("#sources summary").click()
+    page.locator("#card").click()
+    said(page, "clip.mp4 is kept: below you can go on with it")
+    assert page.locator("#results").is_hidden()
+    go_on(page, "clip.mp4")
+    before = same_rows(page, before)
+    page.locator("#pause").click()
+    to_the_end(page)
+    after = rows(page)
+    assert told(after[: len(before)]) == told(before) and len(after) == FRAMES
     page.context.close()
+
+
+PASTED = """(input) => {
+    const clipboardData = new DataTransfer();
+    const canvas = document.createElement("canvas");
+    const bytes = Uint8Array.from(atob(canvas.toDataURL("image/png").split(",")[1]), (sign) => sign.charCodeAt(0));
+    clipboardData.items.add(new File([bytes], "image.png", { type: "image/png" }));
+    input.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true }));
+}"""
 
 
 def project_opened_again(checks):
@@ -112,4 +203,4 @@ def project_opened_again(checks):
     page.context.close()
 
 
-ALL = [reloaded_in_the_middle, left_in_another_tab, project_opened_again]
+ALL = [reloaded_in_the_middle, each_tab_for_itself, left_for_another_source, project_opened_again]
