@@ -60,5 +60,6 @@ export async function openDecoded(file, key, tell) {
   }
   const source = await openImages(images);
   source.name = file.name;
+  source.imageNames = undefined;
   return source;
 }

@@ -37,10 +37,12 @@ async function timesIn(images) {
   return times;
 }
 
-/** @param {File[]} files Images, all of one size. */
-export async function openImages(files) {
+/** @param {File[]} files Images, all of one size.
+ * @param {string[]} [names] Their paths in their folder, in the order of the files, where they have been opened before. */
+export async function openImages(files, names) {
   const order = new Intl.Collator("en", { numeric: true });
-  const images = files.filter(isImage).sort((one, other) => order.compare(pathOf(one), pathOf(other)));
+  const images = files.filter(isImage);
+  if (!names) images.sort((one, other) => order.compare(pathOf(one), pathOf(other)));
   if (images.length === 0) throw new DOMException("", "NotSupportedError");
   const folder = pathOf(images[0]).split("/").slice(0, -1).pop();
   /** @type {{width: number, height: number} | undefined} */
@@ -66,5 +68,7 @@ export async function openImages(files) {
   await source.first();
   source.size = size ?? source.size;
   source.files = images;
+  // Without the folder that was chosen.
+  source.imageNames = names ?? images.map((image) => pathOf(image).replace(/^[^/]*\//, ""));
   return source;
 }

@@ -61,7 +61,8 @@ export class Keeping {
       if (this.source !== run.source) await this.keepSource(id, run.source);
       const clip = CLIPS.find((name) => name === run.source.name && !run.source.files);
       const isWhole = !!clip || this.hasFiles;
-      await keepWork({ id, at: Date.now(), isLocal: run.isLocal, project, states: statesOf(run), clip });
+      const { isLocal, source: { imageNames } } = run;
+      await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames });
       if (run !== this.page.run) return isWhole;
       this.isSafe = this.timer === undefined && isWhole;
       this.tell(`Kept in this browser: ${told(project)}.${isWhole ? "" : " The pictures are not kept."}`);
@@ -179,12 +180,14 @@ export class Keeping {
 
   /** @param {Kept} kept That this page has open.
    * @param {boolean} [isOwn] Whether this tab left it. */
-  async bringBack({ id, isLocal, project, states, clip }, isOwn = false) {
+  async bringBack({ id, isLocal, project, states, clip, imageNames }, isOwn = false) {
     const files = (await keptFiles(id).catch(() => undefined)) ?? [];
     const open = async () => {
       input(isLocal ? "here" : "there").checked = true;
       if (clip) return openClip(clip);
-      return files.length > 0 ? openFiles(files) : withoutVideo(project);
+      if (files.length === 0) return withoutVideo(project);
+      // Files that were kept have lost their folder.
+      return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
     };
     // Another tab may have it open where browsers do not tell: then this one has a copy.
     await this.open(project, open, states, isOwn || navigator.locks ? id : undefined);

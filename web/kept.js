@@ -11,6 +11,7 @@
  * @property {Project} project
  * @property {Record<number, {bytes: Uint8Array<ArrayBuffer>, frames: number[]}>} states The last one of each object.
  * @property {string} [clip] The sample clip.
+ * @property {string[]} [imageNames] Of images.
  */
 
 const NAME = "bagtrack";

@@ -13,10 +13,21 @@ function about({ source }) {
   return { video: source.name, video_width: source.size.width, video_height: source.size.height, frame_rate: rate };
 }
 
+/** What an object is called, also where its name was deleted.
+ * @param {import("./objects.js").FollowedObject} object */
+const nameOf = ({ name, number }) => name.trim() || `Object ${number + 1}`;
+
+/** The classes of objects: those of one name are one.
+ * @param {Run} run */
+const classesOf = ({ objects }) => [...new Set(objects.map(nameOf))];
+
 /** The rows of all objects, frame by frame. `target` counts objects from 0, as `bagtrack track` does.
  * @param {Run} run */
 function flat({ objects }) {
-  const rows = objects.flatMap(({ name, number, rows }) => [...rows.values()].map((row) => ({ name, number, row })));
+  const rows = objects.flatMap((object) => {
+    const { number } = object;
+    return [...object.rows.values()].map((row) => ({ name: nameOf(object), number, row }));
+  });
   rows.sort((a, b) => a.row.frame - b.row.frame || a.number - b.number);
   return rows.map(({ name, number, row: { frame, time, box: { x, y, width, height }, score, status } }) => {
     return { frame, time, target: number, name, x, y, width, height, score, status };
@@ -70,24 +81,27 @@ function inside({ source: { size } }, { x, y, width, height, status }) {
  * @param {Run} run */
 const tracked = (run) => [...new Set(flat(run).map(({ frame }) => frame))];
 
-/** @param {number} frame */
-const imageName = (frame) => `frame_${String(frame).padStart(6, "0")}`;
+/** How the picture of a frame is called: as its file, or by its number.
+ * @param {Run} run
+ * @param {number} frame */
+const imageName = ({ source }, frame) => source.imageNames?.[frame] ?? `frame_${String(frame).padStart(6, "0")}.jpg`;
 
 /** COCO, with the `track_id` and `video_id` of its kin for videos. Lost objects are left out.
  * @param {Run} run */
 function coco(run) {
   const { video, video_width: width, video_height: height } = about(run);
   const images = tracked(run).map((frame) => {
-    return { id: frame + 1, file_name: `${imageName(frame)}.jpg`, width, height, video_id: 1, frame_id: frame };
+    return { id: frame + 1, file_name: imageName(run, frame), width, height, video_id: 1, frame_id: frame };
   });
+  const classes = classesOf(run);
   const annotations = flat(run).flatMap((row) => {
     const box = inside(run, row);
     if (!box) return [];
     const bbox = [box.left, box.top, box.width, box.height].map((value) => Number(value.toFixed(2)));
-    const ids = { image_id: row.frame + 1, category_id: row.target + 1, track_id: row.target + 1, video_id: 1 };
-    return [{ ...ids, bbox, area: bbox[2] * bbox[3], iscrowd: 0, segmentation: [], score: row.score }];
+    const ids = { image_id: row.frame + 1, category_id: classes.indexOf(row.name) + 1, track_id: row.target + 1 };
+    return [{ ...ids, video_id: 1, bbox, area: bbox[2] * bbox[3], iscrowd: 0, segmentation: [], score: row.score }];
   });
-  const categories = run.objects.map(({ number, name }) => ({ id: number + 1, name, supercategory: "" }));
+  const categories = classes.map((name, at) => ({ id: at + 1, name, supercategory: "" }));
   const numbered = annotations.map((annotation, at) => ({ id: at + 1, ...annotation }));
   const info = { description: `bagtrack: ${video}` };
   return json({ info, licenses: [], videos: [{ id: 1, name: video }], images, annotations: numbered, categories });
@@ -97,7 +111,7 @@ function coco(run) {
  * @param {Run} run */
 function yolo(run) {
   const { width, height } = run.source.size;
-  const classes = run.objects.map(({ number }) => number);
+  const classes = classesOf(run);
   /** @type {Map<number, string[]>} */
   const lines = new Map(tracked(run).map((frame) => [frame, []]));
   for (const row of flat(run)) {
@@ -105,11 +119,11 @@ function yolo(run) {
     if (!box) continue;
     const center = [(box.left + box.width / 2) / width, (box.top + box.height / 2) / height];
     const values = [...center, box.width / width, box.height / height].map((value) => value.toFixed(6));
-    lines.get(row.frame)?.push([classes.indexOf(row.target), ...values].join(" "));
+    lines.get(row.frame)?.push([classes.indexOf(row.name), ...values].join(" "));
   }
-  const names = run.objects.map(({ name }, at) => `  ${at}: ${JSON.stringify(name)}\n`).join("");
+  const names = classes.map((name, at) => `  ${at}: ${JSON.stringify(name)}\n`).join("");
   const texts = [...lines].map(([frame, text]) => ({
-    name: `labels/train/${imageName(frame)}.txt`,
+    name: `labels/train/${imageName(run, frame).replace(/\.[^./]*$/, "")}.txt`,
     text: text.map((line) => `${line}\n`).join(""),
   }));
   return zip([{ name: "data.yaml", text: `path: .\ntrain: images/train\nnames:\n${names}` }, ...texts]);
@@ -143,12 +157,13 @@ function cvat(run) {
   const { video, video_width: width, video_height: height } = about(run);
   const rows = flat(run);
   const size = Math.max(...rows.map(({ frame }) => frame)) + 1;
-  const labels = run.objects.map(({ name }) => `<label><name>${escaped(name)}</name><attributes></attributes></label>`);
-  const tracks = run.objects.map(({ number, name, rows: own }) => {
+  const labels = classesOf(run).map((name) => `<label><name>${escaped(name)}</name><attributes></attributes></label>`);
+  const tracks = run.objects.map((object) => {
+    const { number, rows: own } = object;
     const boxes = [...own.values()].map((row) => keyFrame(row, row.frame, row.status === "lost"));
     const last = [...own.values()].pop();
     if (last && last.status !== "lost" && goesOn(run, last)) boxes.push(keyFrame(last, last.frame + 1, true));
-    return `<track id="${number}" label="${escaped(name)}" source="semi-auto">\n${boxes.join("\n")}\n</track>`;
+    return `<track id="${number}" label="${escaped(nameOf(object))}" source="semi-auto">\n${boxes.join("\n")}\n</track>`;
   });
   const task = `<task><name>${escaped(video)}</name><size>${size}</size><mode>interpolation</mode><start_frame>0</start_frame>
 <stop_frame>${size - 1}</stop_frame><labels>${labels.join("")}</labels>
@@ -189,16 +204,16 @@ function sequenceOf(run, rows) {
 function labelStudio(run) {
   const last = Math.max(...tracked(run));
   const rate = run.source.rate ?? 25;
-  const result = run.objects.map(({ number, name, rows }) => ({
-    id: `object-${number + 1}`,
+  const result = run.objects.map((object) => ({
+    id: `object-${object.number + 1}`,
     type: "videorectangle",
     from_name: "box",
     to_name: "video",
     value: {
       framesCount: last + 1,
       duration: Number(((last + 1) / rate).toFixed(3)),
-      labels: [name],
-      sequence: sequenceOf(run, rows),
+      labels: [nameOf(object)],
+      sequence: sequenceOf(run, object.rows),
     },
   }));
   return json([{ data: { video: run.source.name }, annotations: [{ result }] }]);

@@ -19,6 +19,7 @@
  * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
  * @property {() => void} stop Takes no more frames.
  * @property {number} [duration] Seconds, where one may begin anywhere.
+ * @property {string[]} [imageNames] The files of the frames, where each is one.
  * @property {(time: number, frame?: number) => Promise<Picture>} [goTo] Begins at a time, and gives its frame.
  * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.
  * @property {() => void} [close] Gives up what `at` needs.

@@ -11,11 +11,12 @@ const modules = () => Promise.all([import("./video.js"), import("./images.js"), 
 
 /** Opens what files are: one video, or images.
  * @param {File[]} files
+ * @param {string[]} [names] Of images that have been opened before.
  * @returns {Promise<Source>} */
-export async function openFiles(files) {
+export async function openFiles(files, names) {
   const [{ openVideo }, { isImage, openImages }] = await modules();
   const video = files.find((file) => file.type.startsWith("video/"));
-  if (!video && files.some(isImage)) return openImages(files);
+  if (!video && files.some(isImage)) return openImages(files, names);
   const file = video ?? files[0];
   return openVideo(file, get("stage")).catch((error) => {
     throw error.name === "NotSupportedError" && file.size > 0 ? new UnplayableError(file) : error;

@@ -1,8 +1,11 @@
 """What one opens: a folder of images, files that are dropped or pasted, a file from its middle."""
 
 import base64
+import io
+import json
+import zipfile
 
-from browser import DRAW, begin_at, distance, drag, rows, said, to_the_end
+from browser import DRAW, begin_at, distance, drag, rows, said, saved, to_the_end
 from clips import FRAMES, H264, MPEG4, VP8
 from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
@@ -30,7 +33,30 @@ def folder_of_images(checks):
     assert table[0]["video"] == "walk", table[0]
     close = sum(distance(row, truth[int(row["frame"])]) <= 10 for row in table)
     assert close >= 0.9 * COUNT, close
+    named_as_in_the_folder(page, truth[0])
+    page.locator("#kept-text").filter(has_text="walk, 2 objects").wait_for()
+    page.reload()
+    said(page, "walk is here again")
+    named_as_in_the_folder(page)
     page.context.close()
+
+
+def named_as_in_the_folder(page, added=None):
+    """What is saved of two objects of one name has one class, and calls the images as their files."""
+    if added:
+        page.locator("#add").click()
+        drag(page, added)
+        said(page, "Followed anew")
+        for name in page.locator("#list input[type=text]").all():
+            name.fill("card")
+    coco = json.loads(saved(page, "#save-coco"))
+    assert {image["file_name"] for image in coco["images"]} == {f"image{index}.jpg" for index in range(COUNT)}
+    assert coco["categories"] == [{"id": 1, "name": "card", "supercategory": ""}], coco["categories"]
+    assert {(note["category_id"], note["track_id"]) for note in coco["annotations"]} == {(1, 1), (1, 2)}
+    archive = zipfile.ZipFile(io.BytesIO(saved(page, "#save-yolo")))
+    assert set(archive.namelist()) == {"data.yaml", *(f"labels/train/image{index}.txt" for index in range(COUNT))}
+    assert archive.read("data.yaml").decode().endswith('names:\n  0: "card"\n')
+    assert saved(page, "#save-cvat").decode().count("<label>") == 1
 
 
 HANDED = """([kind, name, type, content]) => {
