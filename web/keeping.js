@@ -5,7 +5,7 @@ import { catchUp } from "./again.js";
 import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
 import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepFiles, keepWork, keptFiles, keptWork } from "./kept.js";
-import { adopt, projectOf, readProject, withoutVideo } from "./project.js";
+import { adopt, fitting, projectIn, projectOf, readProject, unlike, withoutVideo } from "./project.js";
 import { openFiles } from "./sources.js";
 
 /**
@@ -60,7 +60,7 @@ export class Keeping {
       const project = projectOf(run);
       if (this.source !== run.source) await this.keepSource(id, run.source);
       const clip = CLIPS.find((name) => name === run.source.name && !run.source.files);
-      const isWhole = !!clip || this.hasFiles;
+      const isWhole = !!clip || this.hasFiles || run.source.isAbsent === true;
       const { isLocal, source: { imageNames } } = run;
       await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames });
       if (run !== this.page.run) return isWhole;
@@ -128,7 +128,8 @@ export class Keeping {
     clearTimeout(this.timer);
     this.timer = undefined;
     this.isSafe = false;
-    if (this.id !== id) giveUp(this.id);
+    if (this.id === id) this.left = "";
+    else giveUp(this.id);
     this.id = id;
     claim(id);
     sessionStorage.setItem(OWN, id);
@@ -143,7 +144,10 @@ export class Keeping {
     // A tab that was duplicated has it open.
     const kept = own && (await claim(own)) ? await keptWork(own).catch(() => undefined) : undefined;
     if (kept && this.page.state === "start") return this.bringBack(kept, true);
-    if (own && own !== this.id) giveUp(own);
+    if (own && own !== this.id) {
+      giveUp(own);
+      if (sessionStorage.getItem(OWN) === own) sessionStorage.removeItem(OWN);
+    }
     await this.offer();
   }
 
@@ -196,24 +200,39 @@ export class Keeping {
 
   /** Takes a project file, alone or with its video, and the video of a project that was opened without.
    * @param {File[]} files
-   * @returns {boolean} Whether it did. */
-  take(files) {
-    const file = files.find(({ name }) => name.endsWith(".json"));
-    const others = files.filter((other) => other !== file);
+   * @returns {Promise<boolean>} Whether it did. */
+  async take(files) {
+    const file = await projectIn(files);
     const { run } = this.page;
-    if (file) this.openProject(file, others);
-    else if (run?.source.isAbsent && files[0].name === run.source.name) {
-      this.open(projectOf(run), () => openFiles(files), statesOf(run), this.id);
-    } else return false;
+    if (file) await this.openProject(file, files.filter((other) => other !== file));
+    else if (run?.source.isAbsent && !run.source.isLive) await this.takeVideo(run, files);
+    else return false;
     return true;
   }
 
+  /** Takes the video of a project that was opened without; opens another one for itself.
+   * @param {Run} run
+   * @param {File[]} files */
+  async takeVideo(run, files) {
+    const project = projectOf(run);
+    const states = statesOf(run);
+    const { id } = this;
+    const open = async () => {
+      const source = await openFiles(files);
+      return source.name === project.video.name ? fitting(source, project) : source;
+    };
+    const resume = async (/** @type {Run} */ opened) =>
+      !unlike(opened.source, project) && this.resume(opened, project, states, id);
+    await this.page.choose(open, resume);
+  }
+
   /** @param {File} file
-   * @param {File[]} video */
-  async openProject(file, video) {
+   * @param {File[]} files Of its video. */
+  async openProject(file, files) {
     try {
       const project = readProject(JSON.parse(await file.text()));
-      await this.open(project, async () => (video.length > 0 ? openFiles(video) : withoutVideo(project)));
+      const open = async () => (files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project));
+      await this.open(project, open);
     } catch (error) {
       this.page.say(error instanceof SyntaxError ? `${file.name} is no JSON.` : String(Object(error).message), true);
     }
@@ -226,25 +245,35 @@ export class Keeping {
    * @param {string} [id] Its entry.
    */
   open(project, open, states = {}, id) {
-    return this.page.choose(open, async (run) => {
-      const left = this.arrived(id);
-      adopt(run, project);
-      for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
-      const last = run.frames.numbers.pop();
-      run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
-      run.isResting = true;
-      const { source } = run;
-      const canGoOn = !project.ended && source.goTo;
-      if (canGoOn) run.wake = () => wake(run);
-      if (run !== this.page.run) return;
-      this.page.enter(canGoOn ? "paused" : "ended");
-      this.page.again = undefined;
-      this.page.seen.figures(run, undefined);
-      this.page.repaint();
-      const isAbsent = source.isAbsent ? ` Choose ${source.name} to see its pictures.` : "";
-      this.page.say(`${source.name} is here again, with ${run.tracked} frames.${isAbsent}${left}`);
-      this.changed();
-    });
+    return this.page.choose(open, (run) => this.resume(run, project, states, id));
+  }
+
+  /** Brings what was tracked into a run.
+   * @param {Run} run
+   * @param {Project} project
+   * @param {Kept["states"]} states
+   * @param {string} [id] Its entry.
+   * @returns {Promise<true>} */
+  async resume(run, project, states, id) {
+    const left = this.arrived(id);
+    adopt(run, project);
+    for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
+    const last = run.frames.numbers.pop();
+    run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
+    run.isResting = true;
+    const { source } = run;
+    // Also where the video is not at hand: it may be chosen later.
+    if (!project.ended) run.wake = () => wake(run);
+    const canGoOn = run.wake && source.goTo;
+    if (run !== this.page.run) return true;
+    this.page.enter(canGoOn ? "paused" : "ended");
+    this.page.again = undefined;
+    this.page.seen.figures(run, undefined);
+    this.page.repaint();
+    const wanted = source.isLive ? " Pictures of the camera are not kept." : ` Choose ${source.name} to see its pictures.`;
+    this.page.say(`${source.name} is here again, with ${run.tracked} frames.${source.isAbsent ? wanted : ""}${left}`);
+    this.changed();
+    return true;
   }
 }
 

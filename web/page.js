@@ -18,6 +18,8 @@ import { Timeline } from "./timeline.js";
  * @typedef {import("./source.js").Picture} Picture
  * @typedef {import("./source.js").Source} Source
  *
+ * @typedef {(run: Run) => Promise<boolean>} Resume Brings back what was tracked in a source, and says whether it did.
+ *
  * @typedef {"start" | "opening" | "first" | "following" | "paused" | "ended"} State `first` waits for the first box;
  *   from `following` on there are rows. What is shown in which state stands in the page, in `data-in` and `data-on`.
  */
@@ -108,7 +110,7 @@ export class Page {
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.
    * @param {() => Promise<Source>} open
-   * @param {(run: Run) => Promise<void>} [resume] Brings back what was tracked in it. */
+   * @param {Resume} [resume] */
   async choose(open, resume) {
     const own = (this.choice += 1);
     get("decoding").hidden = true;
@@ -133,7 +135,7 @@ export class Page {
       this.stage.show(first.image);
       prepareSaving();
       this.seen.prepare().catch(() => undefined);
-      if (resume) return await resume(this.run);
+      if (await resume?.(this.run)) return;
       this.enter("first");
       this.beginning.reset();
       this.preview();
@@ -150,7 +152,7 @@ export class Page {
 
   /** Offers to have a file decoded by the service: it is uploaded for that.
    * @param {File} file
-   * @param {(run: Run) => Promise<void>} [resume] */
+   * @param {Resume} [resume] */
   offerDecoding(file, resume) {
     get("decoding").hidden = false;
     button("decode").onclick = () => {

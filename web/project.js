@@ -12,19 +12,21 @@ import { FollowedObject } from "./objects.js";
  *
  * @typedef {object} Project
  * @property {1} bagtrack_project The version.
- * @property {{name: string, width: number, height: number, rate?: number}} video
+ * @property {{name: string, width: number, height: number, rate?: number, live?: boolean}} video `live`: of a camera.
  * @property {boolean} ended Whether the whole video was tracked.
  * @property {number} skipped Frames that were not tracked.
  * @property {{number: number, name: string, color: string, shown: boolean, rows: StoredRow[]}[]} objects
  */
 
 const STATUSES = ["tracking", "uncertain", "lost"];
+/** Bytes of a project file that tell that it is one. */
+const HEAD = 100;
 const NOT_ONE = "This file is no project of this page: ";
 
 /** @param {Run} run
  * @returns {Project} */
 export function projectOf(run) {
-  const { name, size, rate } = run.source;
+  const { name, size, rate, isLive } = run.source;
   const objects = run.objects.map(({ number, name, color, isShown, rows }) => ({
     number,
     name,
@@ -32,7 +34,8 @@ export function projectOf(run) {
     shown: isShown,
     rows: [...rows.values()].map(stored),
   }));
-  return { bagtrack_project: 1, video: { name, ...size, rate }, ended: run.isResting && !run.wake, skipped: run.skipped, objects };
+  const video = { name, ...size, rate, live: isLive || undefined };
+  return { bagtrack_project: 1, video, ended: run.isResting && !run.wake, skipped: run.skipped, objects };
 }
 
 /** @param {Row} row
@@ -94,7 +97,7 @@ export function withoutVideo({ video, objects }) {
   const [frame = 0, time = 0] = objects[0]?.rows[0] ?? [];
   return {
     name: video.name,
-    isLive: false,
+    isLive: video.live === true,
     size: { width: video.width, height: video.height },
     rate: video.rate,
     skipped: 0,
@@ -105,4 +108,37 @@ export function withoutVideo({ video, objects }) {
     hold() {},
     stop() {},
   };
+}
+
+/** The project among files: others end with .json, too.
+ * @param {File[]} files */
+export async function projectIn(files) {
+  const named = files.filter(({ name }) => name.endsWith(".json"));
+  if (files.length === 1) return named[0];
+  const heads = await Promise.all(named.map((file) => file.slice(0, HEAD).text()));
+  return named.find((_, at) => heads[at].includes('"bagtrack_project"'));
+}
+
+/** In what a source differs from the video of a project; nothing where it may be that.
+ * @param {import("./source.js").Source} source
+ * @param {Project} project */
+export function unlike({ name, size, count = Infinity }, { video, objects }) {
+  const pixels = `${name} has ${size.width} × ${size.height} pixels`;
+  const last = Math.max(...objects.flatMap(({ rows }) => rows.map(([frame]) => frame)));
+  if (size.width !== video.width || size.height !== video.height) {
+    return `${pixels}, the video of this project (${video.name}) ${video.width} × ${video.height}: it is another one.`;
+  }
+  if (last < count) return "";
+  return `${name} has ${count} frames, and this project (${video.name}) a box in frame ${last}: it is another video.`;
+}
+
+/** @param {import("./source.js").Source} source
+ * @param {Project} project
+ * @returns {import("./source.js").Source} */
+export function fitting(source, project) {
+  const fault = unlike(source, project);
+  if (!fault) return source;
+  source.stop();
+  source.close?.();
+  throw new Error(fault);
 }

@@ -19,6 +19,8 @@
  * @property {(isHeld: boolean) => void} hold Stops delivering for a while.
  * @property {() => void} stop Takes no more frames.
  * @property {number} [duration] Seconds, where one may begin anywhere.
+ * @property {number} [count] How many frames there are, where that is known.
+ * @property {(frame: number) => number} [timeOf] Of any frame, where the times are known.
  * @property {string[]} [imageNames] The files of the frames, where each is one.
  * @property {(time: number, frame?: number) => Promise<Picture>} [goTo] Begins at a time, and gives its frame.
  * @property {(frame: number, time: number) => Promise<Picture>} [at] Any frame again. It works after `stop`, too.

@@ -52,11 +52,11 @@ async function filesIn(entry) {
 
 /**
  * @param {(open: () => Promise<Source>) => void} choose
- * @param {(files: File[]) => boolean} take Takes files that are no frames, and says whether it did.
+ * @param {(files: File[]) => Promise<boolean>} take Takes files that are no frames, and says whether it did.
  */
 export function offerSources(choose, take) {
-  const open = (/** @type {File[]} */ files) => {
-    if (files.length > 0 && !take(files)) choose(() => openFiles(files));
+  const open = async (/** @type {File[]} */ files) => {
+    if (files.length > 0 && !(await take(files))) choose(() => openFiles(files));
   };
   for (const kind of ["pointerover", "focusin", "dragenter"]) {
     addEventListener(kind, () => modules().catch(() => undefined), { once: true });

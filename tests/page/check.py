@@ -265,6 +265,9 @@ def camera(checks):
         assert float(table[-1]["time"]) > float(table[1]["time"]) > 0
         assert table[0]["video"] == "camera"
         print(f"  {len(table)} frames of the camera, {skipped} skipped")
+        page.locator("#kept-text").filter(has_text="The pictures are not kept").wait_for()
+        page.reload()
+        said(page, "Pictures of the camera are not kept")
 
 
 def page_of_another_origin(checks):

@@ -203,4 +203,52 @@ def project_opened_again(checks):
     page.context.close()
 
 
-ALL = [reloaded_in_the_middle, each_tab_for_itself, left_for_another_source, project_opened_again]
+def half_tracked_project(checks):
+    """A project of a part of its video is opened without it, then with it under another name, and goes on to the end.
+    Another video is refused along with it, and opened for itself afterwards."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    page = checks.page(where="here")
+    slow(page)
+    choose_file(page, path)
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 20)
+    page.locator("#pause").click()
+    project = checks.files.folder / "half.bagtrack.json"
+    project.write_bytes(saved(page, "#save-project"))
+    page.context.close()
+
+    renamed = checks.files.folder / "clip (1).mp4"
+    renamed.write_bytes(path.read_bytes())
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files(project)
+    said(page, "Choose clip.mp4 to see its pictures")
+    before = rows(page)
+    assert json.loads(saved(page, "#save-project"))["ended"] is False
+    page.locator("#file").set_input_files(renamed)
+    said(page, "clip (1).mp4 is here again")
+    same_rows(page, before)
+    page.locator("#pause").click()
+    to_the_end(page)
+    after = rows(page)
+    assert told(after[: len(before)]) == told(before) and len(after) == FRAMES
+    page.context.close()
+
+    other = checks.files.file("small.mp4", 30, H264, turned="scale=528:396")
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files([project, other])
+    said(page, "small.mp4 has 528 × 396 pixels, the video of this project (clip.mp4) 1056 × 792")
+    page.locator("#file").set_input_files(project)
+    said(page, "Choose clip.mp4 to see its pictures")
+    page.locator("#file").set_input_files(other)
+    said(page, "clip.mp4 is kept: below you can go on with it")
+    assert page.locator("#results").is_hidden()
+    page.context.close()
+
+
+ALL = [
+    half_tracked_project,
+    reloaded_in_the_middle,
+    each_tab_for_itself,
+    left_for_another_source,
+    project_opened_again,
+]

@@ -22,6 +22,7 @@ def folder_of_images(checks):
     for index in range(COUNT):
         (folder / f"image{index}.jpg").write_bytes(checks.service.bytes(f"/sample/card/{3 * index}.jpg"))
     (folder / "notes.txt").write_text("no image")
+    (folder / "labels.json").write_text("{}")
     page = checks.page(where="here")
     page.locator("#folder").set_input_files(folder)
     said(page, DRAW)
