@@ -1,6 +1,5 @@
 // What one does to objects: draw their boxes, correct them in any frame, track them again, name and delete them.
 
-import { trackBack, trackOn } from "./again.js";
 import { BoxDrawing } from "./box.js";
 import { canvas, get } from "./dom.js";
 import { ObjectList } from "./list.js";
@@ -16,6 +15,8 @@ import { words } from "./problems.js";
 
 export const DRAW = "Draw a box around what to follow.";
 export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
+/** It is loaded when a source is open. */
+const again = () => import("./again.js");
 const ADD = "Draw a box around the object to add.";
 
 export class Editing {
@@ -82,7 +83,7 @@ export class Editing {
   trackOn(run, object, frame, box) {
     const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
     return this.tracksAgain(run, async () => {
-      await trackOn(run, object, frame, box, tell);
+      await (await again()).trackOn(run, object, frame, box, tell);
       return `Followed anew from frame ${frame}.`;
     });
   }
@@ -94,6 +95,7 @@ export class Editing {
     this.page.pause(true);
     const { chosen } = run;
     await this.tracksAgain(run, async () => {
+      const { trackBack } = await again();
       const count = await trackBack(run, chosen, shown.frame, (at) => this.page.say(`Following backwards: frame ${at}.`));
       return count > 0 ? `Followed ${count} frames backwards.` : "There is no frame before it, or a box was drawn there.";
     });

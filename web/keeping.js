@@ -1,11 +1,8 @@
 // Nothing is lost: each run is kept in the browser as it goes on. It comes back when the page is loaded anew, and can be
 // gone on with when another source has taken its place. A project file does the same by hand.
 
-import { catchUp } from "./again.js";
-import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
 import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepFiles, keepWork, keptFiles, keptWork } from "./kept.js";
-import { adopt, fitting, projectIn, projectOf, readProject, unlike, withoutVideo } from "./project.js";
 import { openFiles } from "./sources.js";
 
 /**
@@ -18,6 +15,8 @@ import { openFiles } from "./sources.js";
 /** Milliseconds after a change until it is kept. */
 const AFTER = 1000;
 const CLIPS = ["card", "leaves"];
+/** The first screen does not need it. */
+const projects = () => import("./project.js");
 /** What the tab has open, also after it was loaded anew. */
 const OWN = "work";
 
@@ -57,7 +56,7 @@ export class Keeping {
     if (!run) return false;
     try {
       if (run.objects.length === 0) return await this.keepNothing();
-      const project = projectOf(run);
+      const project = (await projects()).projectOf(run);
       if (this.source !== run.source) await this.keepSource(id, run.source);
       const clip = CLIPS.find((name) => name === run.source.name && !run.source.files);
       const isWhole = !!clip || this.hasFiles || run.source.isAbsent === true;
@@ -188,8 +187,8 @@ export class Keeping {
     const files = (await keptFiles(id).catch(() => undefined)) ?? [];
     const open = async () => {
       input(isLocal ? "here" : "there").checked = true;
-      if (clip) return openClip(clip);
-      if (files.length === 0) return withoutVideo(project);
+      if (clip) return (await import("./clip.js")).openClip(clip);
+      if (files.length === 0) return (await projects()).withoutVideo(project);
       // Files that were kept have lost their folder.
       return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
     };
@@ -202,7 +201,7 @@ export class Keeping {
    * @param {File[]} files
    * @returns {Promise<boolean>} Whether it did. */
   async take(files) {
-    const file = await projectIn(files);
+    const file = await (await projects()).projectIn(files);
     const { run } = this.page;
     if (file) await this.openProject(file, files.filter((other) => other !== file));
     else if (run?.source.isAbsent && !run.source.isLive) await this.takeVideo(run, files);
@@ -214,6 +213,7 @@ export class Keeping {
    * @param {Run} run
    * @param {File[]} files */
   async takeVideo(run, files) {
+    const { fitting, projectOf, unlike } = await projects();
     const project = projectOf(run);
     const states = statesOf(run);
     const { id } = this;
@@ -230,6 +230,7 @@ export class Keeping {
    * @param {File[]} files Of its video. */
   async openProject(file, files) {
     try {
+      const { fitting, readProject, withoutVideo } = await projects();
       const project = readProject(JSON.parse(await file.text()));
       const open = async () => (files.length > 0 ? fitting(await openFiles(files), project) : withoutVideo(project));
       await this.open(project, open);
@@ -256,7 +257,7 @@ export class Keeping {
    * @returns {Promise<true>} */
   async resume(run, project, states, id) {
     const left = this.arrived(id);
-    adopt(run, project);
+    (await projects()).adopt(run, project);
     for (const object of run.objects) object.saves = [states[object.number]].filter((state) => !!state);
     const last = run.frames.numbers.pop();
     run.picture = (last !== undefined && (await run.frames.at(last))) || run.picture;
@@ -291,7 +292,7 @@ const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves })
  * @param {Run} run */
 async function wake(run) {
   run.wake = undefined;
-  await catchUp(run);
+  await (await import("./again.js")).catchUp(run);
   await run.source.goTo?.(run.picture.time, run.picture.frame);
   if (!run.isOver) run.play();
 }

@@ -32,7 +32,7 @@ export function offerSaving(page) {
 }
 
 /** Loads what makes the files, while there is a line to the service. */
-export const prepareSaving = () => void modules().catch(() => undefined);
+export const prepareSaving = () => void Promise.all([modules(), import("./again.js")]).catch(() => undefined);
 
 /** @param {Page} page */
 async function saveVideo(page) {

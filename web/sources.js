@@ -1,11 +1,11 @@
 // What one opens: buttons, files that are chosen, dropped or pasted, folders.
 
-import { openClip } from "./clip.js";
 import { get, input } from "./dom.js";
 import { UnplayableError } from "./problems.js";
 
-/** What opens files and the camera is loaded when one is about to choose. */
-const modules = () => Promise.all([import("./video.js"), import("./images.js"), import("./camera.js")]);
+/** What opens sources is loaded when one is about to choose. */
+const modules = () =>
+  Promise.all([import("./video.js"), import("./images.js"), import("./camera.js"), import("./clip.js")]);
 
 /** @typedef {import("./source.js").Source} Source */
 
@@ -61,7 +61,9 @@ export function offerSources(choose, take) {
   for (const kind of ["pointerover", "focusin", "dragenter"]) {
     addEventListener(kind, () => modules().catch(() => undefined), { once: true });
   }
-  for (const clip of ["card", "leaves"]) get(clip).addEventListener("click", () => choose(() => openClip(clip)));
+  for (const clip of ["card", "leaves"]) {
+    get(clip).addEventListener("click", () => choose(async () => (await import("./clip.js")).openClip(clip)));
+  }
   get("camera").addEventListener("click", () => {
     choose(async () => (await modules())[2].openCamera(get("stage")));
   });
