@@ -40,11 +40,12 @@ async function* filesOf(body) {
  * @param {File} file
  * @param {string} key An API key; empty where the service has none.
  * @param {(count: number) => void} tell Is told how many frames have come.
+ * @param {AbortSignal} signal
  */
-export async function openDecoded(file, key, tell) {
+export async function openDecoded(file, key, tell, signal) {
   /** @type {Record<string, string>} */
   const headers = key ? { authorization: `Bearer ${key}` } : {};
-  const asked = fetch("./frames", { method: "POST", body: file, headers });
+  const asked = fetch("./frames", { method: "POST", body: file, headers, signal });
   const response = await asked.catch(() => Promise.reject(new Problem({})));
   if (!response.ok || !response.body) throw new Problem({ ...(await response.json()), status: response.status });
   /** @type {File[]} */

@@ -10,6 +10,7 @@ import { UnplayableError, words } from "./problems.js";
 import { Run } from "./run.js";
 import { prepareSaving } from "./saving.js";
 import { Seen } from "./seen.js";
+import { offerDecoding } from "./sources.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 
@@ -50,6 +51,7 @@ export class Page {
     this.hasKey = false;
     /** Counts the choices: one that is overtaken by another is dropped. */
     this.choice = 0;
+    this.opening = new AbortController();
     /** @type {(() => void) | undefined} What failed for want of a key. */
     this.again = undefined;
     /** Is told when rows or objects have changed. */
@@ -109,15 +111,17 @@ export class Page {
   }
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.
-   * @param {() => Promise<Source>} open
+   * @param {(signal: AbortSignal) => Promise<Source>} open Its signal says that another choice has overtaken it.
    * @param {Resume} [resume] */
   async choose(open, resume) {
     const own = (this.choice += 1);
+    this.opening.abort();
+    this.opening = new AbortController();
     get("decoding").hidden = true;
     if (!this.run) this.enter("opening");
     this.say("Opening…");
     try {
-      const source = await open();
+      const source = await open(this.opening.signal);
       const first = await source.first();
       const mayLeave = own === this.choice && (await this.mayLeave());
       if (own !== this.choice || !mayLeave) {
@@ -146,21 +150,8 @@ export class Page {
       if (!this.run) this.enter("start");
       this.fail(error);
       this.again = () => this.choose(open, resume);
-      if (error instanceof UnplayableError) this.offerDecoding(error.file, resume);
+      if (error instanceof UnplayableError) offerDecoding(this, error.file, resume);
     }
-  }
-
-  /** Offers to have a file decoded by the service: it is uploaded for that.
-   * @param {File} file
-   * @param {Resume} [resume] */
-  offerDecoding(file, resume) {
-    get("decoding").hidden = false;
-    button("decode").onclick = () => {
-      const tell = (/** @type {number} */ count) => this.say(`The service decodes ${file.name}: ${count} frames…`);
-      const open = async () => (await import("./decoded.js")).openDecoded(file, this.client.transport.key, tell);
-      this.choose(open, resume);
-    };
-    button("decode").focus();
   }
 
   /** Lets go of what was there. */

@@ -1,6 +1,6 @@
 // What one opens: buttons, files that are chosen, dropped or pasted, folders.
 
-import { get, input } from "./dom.js";
+import { button, get, input } from "./dom.js";
 import { UnplayableError } from "./problems.js";
 
 /** What opens sources is loaded when one is about to choose. */
@@ -18,10 +18,17 @@ export async function openFiles(files, names) {
   const video = files.find((file) => file.type.startsWith("video/"));
   if (!video && files.some(isImage)) return openImages(files, names);
   const file = video ?? files[0];
+  if (file.size === 0) throw new Error(`${file.name} is empty.`);
   return openVideo(file, get("stage")).catch((error) => {
-    throw error.name === "NotSupportedError" && file.size > 0 ? new UnplayableError(file) : error;
+    if (error.name !== "NotSupportedError") throw error;
+    throw isNoVideo(file) ? new Error(`${file.name} is neither a video nor an image.`) : new UnplayableError(file);
   });
 }
+
+/** Whether a file is by its kind of no use to a decoder. Some systems take an MPEG transport stream for a text.
+ * @param {File} file */
+const isNoVideo = ({ name, type }) =>
+  /^(text|font)\/|^application\/(json|pdf|xml|zip|javascript|vnd\.)/.test(type) && !/\.m?2?ts$/i.test(name);
 
 /** All files of what was dropped, those in folders too.
  * @param {DataTransfer} dropped */
@@ -48,6 +55,24 @@ async function filesIn(entry) {
     if (some.length === 0) return files;
     files.push(...(await Promise.all(some.map(filesIn))).flat());
   }
+}
+
+/** Offers to have a file decoded by the service: it is uploaded for that.
+ * @param {import("./page.js").Page} page
+ * @param {File} file
+ * @param {import("./page.js").Resume} [resume] */
+export function offerDecoding(page, file, resume) {
+  get("decoding").hidden = false;
+  button("decode").onclick = () => {
+    const open = async (/** @type {AbortSignal} */ signal) => {
+      const tell = (/** @type {number} */ count) => {
+        if (!signal.aborted) page.say(`The service decodes ${file.name}: ${count} frames…`);
+      };
+      return (await import("./decoded.js")).openDecoded(file, page.client.transport.key, tell, signal);
+    };
+    page.choose(open, resume);
+  };
+  button("decode").focus();
 }
 
 /**

@@ -185,7 +185,38 @@ def no_video_at_all(checks):
     page.context.close()
 
 
+def decoding_overtaken(checks):
+    """Who chooses something else while the service decodes a file, stops the upload."""
+    page = checks.page(where="here", allowed=("ERR_FAILED", "ERR_ABORTED"))
+    page.route("**/frames", lambda route: None)
+    page.locator("#file").set_input_files(checks.files.file("old.mp4", 30, MPEG4, "gt(mod(n,7),2)+lt(n,20)"))
+    said(page, "This browser cannot play old.mp4")
+    with page.expect_event("requestfailed", lambda request: request.url.endswith("/frames")):
+        with page.expect_request("**/frames"):
+            page.locator("#decode").click()
+        page.locator("#card").evaluate("button => button.click()")
+        said(page, DRAW)
+    page.wait_for_timeout(300)
+    said(page, DRAW)
+    page.unroute_all(behavior="ignoreErrors")
+    page.context.close()
+
+
+def no_use_to_a_decoder(checks):
+    """An empty file and a text are refused, and the service is not offered to decode them."""
+    page = checks.page(where="here")
+    for name, content, says in (("empty.mp4", "", "empty.mp4 is empty"), ("text.txt", "a", "neither a video nor an image")):
+        path = checks.files.folder / name
+        path.write_text(content)
+        page.locator("#file").set_input_files(path)
+        said(page, says)
+        assert page.locator("#decode").is_hidden()
+    page.context.close()
+
+
 ALL = [
+    decoding_overtaken,
+    no_use_to_a_decoder,
     folder_of_images,
     dropped_and_pasted,
     recorded_in_a_browser,
