@@ -141,7 +141,11 @@ export class Editing {
         this.page.repaint();
       },
       remove: (object) => {
-        this.page.run?.remove(object);
+        const { run, seen } = this.page;
+        if (!run) return;
+        run.remove(object);
+        if (object === seen.shown || !run.chosen) seen.reset();
+        seen.figures(run, run.chosen?.rows.get(run.lastFrame));
         this.page.isUnsaved = true;
         this.page.repaint();
         this.page.changed();

@@ -55,13 +55,19 @@ export class Seen {
   }
 
   /** @param {Run} run
-   * @param {Answer | undefined} answer Of the chosen object. */
+   * @param {Pick<Answer, "status" | "score"> | undefined} answer Of the chosen object. */
   figures(run, answer) {
     const set = (/** @type {string} */ id, /** @type {string} */ text) => (get(id).textContent = text);
     set("frames", String(run.tracked));
     set("rate", run.rate.toFixed(0));
     set("trip", `${run.trip.toFixed(0)} ms`);
     set("skipped", String(run.skipped));
+    if (!run.chosen) {
+      set("status", "–");
+      set("score", "–");
+      get("figures").className = "";
+      get("figures").style.setProperty("--score", "0");
+    }
     if (!answer) return;
     set("status", answer.status);
     get("figures").className = answer.status;

@@ -245,8 +245,26 @@ def half_tracked_project(checks):
     page.context.close()
 
 
+def last_object_deleted(checks):
+    """Nothing is told and kept of an object that was deleted."""
+    page = checks.page(where="here")
+    page.locator("#see").evaluate("box => box.checked || box.click()")
+    kept_run(checks, page)
+    page.locator("#seen-now").wait_for()
+    page.locator("#list .remove").click()
+    assert [page.locator(name).inner_text() for name in ("#status", "#score")] == ["–", "–"]
+    assert page.locator("#seen-now").is_hidden()
+    page.locator("#kept").wait_for(state="hidden")
+    page.reload()
+    page.locator("#hero").wait_for()
+    offers(page, [])
+    assert page.locator("#results").is_hidden()
+    page.context.close()
+
+
 ALL = [
     half_tracked_project,
+    last_object_deleted,
     reloaded_in_the_middle,
     each_tab_for_itself,
     left_for_another_source,
