@@ -25,35 +25,43 @@ export function offerSaving(page) {
   });
   button("hand-over").addEventListener("click", () => giveAway(page));
   button("save-video").addEventListener("click", () => saveVideo(page));
-  if (typeof VideoEncoder === "undefined") {
-    button("save-video").textContent = "Video (Matroska)";
-    get("no-encoder").hidden = false;
-  }
+  restore();
+  get("no-encoder").hidden = typeof VideoEncoder !== "undefined";
 }
 
-/** Loads what makes the files, while there is a line to the service. */
-export const prepareSaving = () => void Promise.all([modules(), import("./again.js")]).catch(() => undefined);
+/** Loads what makes the files of a new run, while there is a line to the service. */
+export function prepareSaving() {
+  restore();
+  button("hand-over").disabled = false;
+  Promise.all([modules(), import("./again.js")]).catch(() => undefined);
+}
+
+/** Lets the video be saved. */
+function restore() {
+  button("save-video").disabled = false;
+  button("save-video").textContent = typeof VideoEncoder === "undefined" ? "Video (Matroska)" : "Video (WebM)";
+}
 
 /** @param {Page} page */
 async function saveVideo(page) {
   const { run } = page;
   if (!run || run.objects.length === 0) return;
   const own = button("save-video");
-  const label = own.textContent;
   own.disabled = true;
+  // Another run may have taken its place.
+  const isHere = () => run === page.run;
   const tell = (/** @type {number} */ done, /** @type {number} */ of) => {
-    own.textContent = `Making the video: ${Math.floor((100 * done) / of)} %`;
+    if (isHere()) own.textContent = `Making the video: ${Math.floor((100 * done) / of)} %`;
   };
   try {
     const [{ save }, { extension, makeVideo }] = await modules();
     save(await makeVideo(run, tell), run, extension);
     const [kept, of] = [run.frames.shown.length, run.tracked];
-    if (kept < of) page.say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
+    if (isHere() && kept < of) page.say(`The video has the last ${kept} of ${of} frames: no more are kept.`);
   } catch (error) {
-    page.say(words(error, page.hasKey), true);
+    if (isHere()) page.say(words(error, page.hasKey), true);
   }
-  own.textContent = label;
-  own.disabled = false;
+  if (isHere()) restore();
 }
 
 /** Hands the objects over to the service, and shows their sessions.
@@ -65,6 +73,7 @@ async function giveAway(page) {
   button("hand-over").disabled = true;
   try {
     const handed = await (await modules())[2].handOver(run, page.client);
+    if (run !== page.run) return;
     const links = handed.map(({ name, id }) => {
       const link = document.createElement("a");
       link.href = `sessions/${id}`;
@@ -82,7 +91,7 @@ async function giveAway(page) {
             "frame and its boxes instead.",
     );
   } catch (error) {
-    page.fail(error);
+    if (run === page.run) page.fail(error);
   }
-  button("hand-over").disabled = false;
+  if (run === page.run) button("hand-over").disabled = false;
 }

@@ -262,9 +262,30 @@ def last_object_deleted(checks):
     page.context.close()
 
 
+def video_made_of_another_run(checks):
+    """While the video of a run is made, the run that has taken its place can be saved."""
+    page = checks.page(where="here")
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    drag(page, sent_box(checks.files.truth[0]))
+    to_the_end(page)
+    slow(page)
+    button = page.locator("#save-video")
+    with page.expect_download() as download:
+        button.click()
+        button.filter(has_text="Making the video").wait_for()
+        page.locator("#sources summary").click()
+        choose(page, "card")
+        for _ in range(10):
+            assert button.text_content() == "Video (WebM)" and button.is_enabled()
+            page.wait_for_timeout(50)
+    assert download.value.suggested_filename == "clip-boxes.webm"
+    page.context.close()
+
+
 ALL = [
     half_tracked_project,
     last_object_deleted,
+    video_made_of_another_run,
     reloaded_in_the_middle,
     each_tab_for_itself,
     left_for_another_source,
