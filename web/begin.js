@@ -10,11 +10,17 @@ export class Beginning {
     this.going = Promise.resolve();
     this.wanted = 0;
     const bar = input("begin-at");
-    bar.addEventListener("input", () => this.goTo(bar.valueAsNumber));
+    /** @type {number | undefined} The frame that was stepped to. */
+    this.frame = undefined;
+    bar.addEventListener("input", () => {
+      this.frame = undefined;
+      this.goTo(bar.valueAsNumber);
+    });
   }
 
   /** Is at the beginning of a source. */
   reset() {
+    this.frame = undefined;
     input("begin-at").max = String(this.page.run?.source.duration ?? 0);
     input("begin-at").value = "0";
     this.tell(0, 0);
@@ -33,7 +39,13 @@ export class Beginning {
    * @param {number} by */
   step(by) {
     const bar = input("begin-at");
-    const time = Math.min(Math.max(0, bar.valueAsNumber + by / (this.page.run?.source.rate ?? 25)), Number(bar.max));
+    const { source, picture } = this.page.run ?? {};
+    let time = bar.valueAsNumber + by / (source?.rate ?? 25);
+    if (picture && source?.timeOf && source.count) {
+      this.frame = Math.min(Math.max(0, (this.frame ?? picture.frame) + by), source.count - 1);
+      time = source.timeOf(this.frame);
+    }
+    time = Math.min(Math.max(0, time), Number(bar.max));
     bar.value = String(time);
     this.goTo(time);
   }

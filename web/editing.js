@@ -33,7 +33,7 @@ export class Editing {
     return new BoxDrawing(canvas("picture"), {
       start: () => this.startDrawing(),
       change: (box) => {
-        this.page.stage.draw(box);
+        this.page.stage.draw(box, this.page.run?.source.size.width);
         if (box) return;
         if (this.page.hasRows) this.page.run?.pause(this.page.state === "paused");
         else this.page.preview();

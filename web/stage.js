@@ -39,6 +39,8 @@ export class Stage {
     this.particles = [];
     /** @type {Box | undefined} The box that is being drawn. */
     this.drawn = undefined;
+    /** Pixels of the video in one of the picture. */
+    this.scale = 1;
     new ResizeObserver(() => this.paint()).observe(overlay);
   }
 
@@ -60,9 +62,11 @@ export class Stage {
     this.paint();
   }
 
-  /** @param {Box | undefined} drawn */
-  draw(drawn) {
+  /** @param {Box | undefined} drawn
+   * @param {number} [width] Of the video, in its own pixels. */
+  draw(drawn, width = this.canvas.width) {
     this.drawn = drawn;
+    this.scale = width / this.canvas.width;
     this.paint();
   }
 
@@ -91,7 +95,7 @@ export class Stage {
     over.rect(0, 0, canvas.width, canvas.height);
     over.rect(box.x, box.y, box.width, box.height);
     over.fill("evenodd");
-    const name = `${Math.round(box.width)} × ${Math.round(box.height)}`;
+    const name = `${Math.round(box.width * this.scale)} × ${Math.round(box.height * this.scale)}`;
     paintBox(over, { box, color: DRAWN, name, isLost: false, isChosen: true }, unit);
   }
 }

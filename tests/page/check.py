@@ -167,7 +167,10 @@ def phone_by_touch(checks):
     swipe()
     said(page, "Tap Draw")
     assert page.locator("#figures").is_hidden(), "the swipe has drawn a box"
+    look = lambda: page.locator("#draw").evaluate("button => getComputedStyle(button).backgroundColor")
+    off = look()
     page.locator("#draw").tap()
+    assert look() != off, "one cannot see that it is on"
     page.locator("#picture").scroll_into_view_if_needed()
     (left, top), (right, bottom) = corners(page, truth[0])
     finger("touchStart", (left, top))

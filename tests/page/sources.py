@@ -214,9 +214,47 @@ def no_use_to_a_decoder(checks):
     page.context.close()
 
 
+def steps_of_varying_rate(checks):
+    """Before the first box each step is one frame, also where the rate changes."""
+    path, numbers = checks.files.varying_file()
+    page = checks.page(where="here")
+    choose_file(page, path)
+    for frame in range(1, len(numbers)):
+        page.locator("#forward").click()
+        page.locator("#begin-time").filter(has_text=f", frame {frame}").wait_for()
+        told = float(page.locator("#begin-time").inner_text().split()[0])
+        assert abs(told - numbers[frame] / 30) < 0.006, (frame, told)
+    page.locator("#back").click()
+    page.locator("#begin-time").filter(has_text=f", frame {len(numbers) - 2}").wait_for()
+    page.context.close()
+
+
+TEXTS = """() => {
+    window.texts = [];
+    const fillText = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+        window.texts.push(text);
+        return fillText.call(this, text, ...place);
+    };
+}"""
+
+
+def size_while_drawing(checks):
+    """The size of the box that is drawn is told in the video's own pixels."""
+    page = checks.page(where="here")
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    page.evaluate(TEXTS)
+    drag(page, [200, 200, 200, 100])
+    [width, height] = map(int, page.evaluate("window.texts").pop().split(" × "))
+    assert abs(width - 220) <= 2 and abs(height - 110) <= 2, (width, height)
+    page.context.close()
+
+
 ALL = [
     decoding_overtaken,
     no_use_to_a_decoder,
+    steps_of_varying_rate,
+    size_while_drawing,
     folder_of_images,
     dropped_and_pasted,
     recorded_in_a_browser,
