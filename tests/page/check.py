@@ -261,6 +261,10 @@ def camera(checks):
         page.mouse.up()
         frames(page, 30)
         page.locator("#stop").click()
+        # Its pictures are not kept: the page asks before another source takes its place, and the answer here is no.
+        page.locator("#sources summary").click()
+        page.locator("#card").click()
+        said(page, "camera stays")
         table = rows(page)
         skipped = int(page.locator("#skipped").inner_text())
         numbers = [int(row["frame"]) for row in table]
