@@ -1,4 +1,5 @@
-// Tracking frames again: on from a box in an earlier frame, or back from it.
+// Tracking frames again: on from a box in an earlier frame, or back from it. What was there before stays until all of it
+// is done: it can be cancelled, and fail.
 
 import { rowOf, scaled } from "./boxes.js";
 import { close } from "./frames.js";
@@ -7,35 +8,48 @@ import { close } from "./frames.js";
  * @typedef {import("./js/bagtrack.js").Box} Box
  * @typedef {import("./objects.js").FollowedObject} FollowedObject
  * @typedef {import("./run.js").Run} Run
- * @typedef {(frame: number) => void} Tell Is told of each frame.
+ *
+ * @typedef {object} Redoing
+ * @property {(frame: number) => void} tell Is told of each frame.
+ * @property {AbortSignal} signal Cancels it.
  */
 
 /**
- * Follows an object anew, from a box in an earlier frame up to the last one.
+ * Follows an object anew, from a box in an earlier frame up to the next one with a box that was drawn, or the last one.
  * @param {Run} run
  * @param {FollowedObject | undefined} known Nothing for a new one.
  * @param {number} frame
  * @param {Box} box
- * @param {Tell} tell
+ * @param {Redoing} redoing
  */
-export function trackOn(run, known, frame, box, tell) {
+export function trackOn(run, known, frame, box, { tell, signal }) {
   return run.alone(async () => {
     const object = known ?? run.newObject();
-    const from = await object.goBackBefore(frame, run.follower());
-    object.forgetFrom(frame);
-    for (const number of run.frames.shown) {
-      if (run.isOver || number < (from === undefined ? frame : from + 1)) continue;
-      const picture = await run.frames.at(number);
-      if (!picture) continue;
-      const isDrawn = number === frame;
-      const isFirst = isDrawn && from === undefined;
-      const { follower } = object;
-      const answer = await (isFirst ? follower.open(picture, box) : follower.track(picture, isDrawn ? { box } : {}));
-      if (!run.objects.includes(object)) run.take(object);
-      if (answer && number >= frame) run.note(object, answer, picture, isDrawn);
-      else if (answer) object.frames.push(number);
-      close(picture);
-      tell(number);
+    const draft = object.draft(run.follower());
+    const until = object.drawnAfter(frame);
+    try {
+      const from = await draft.goBackBefore(frame);
+      for (const number of run.frames.shown) {
+        if (number < (from === undefined ? frame : from + 1)) continue;
+        if (number >= until) break;
+        const picture = await run.frames.at(number);
+        if (run.isOver || signal.aborted) return;
+        if (!picture) continue;
+        const isDrawn = number === frame;
+        const isFirst = isDrawn && from === undefined;
+        const { follower } = draft;
+        const answer = await (isFirst ? follower.open(picture, box) : follower.track(picture, isDrawn ? { box } : {}));
+        if (answer && number >= frame) run.note(draft, answer, picture, isDrawn);
+        else if (answer) draft.frames.push(number);
+        close(picture);
+        tell(number);
+      }
+      const isGone = known && !run.objects.includes(known);
+      if (run.isOver || signal.aborted || isGone) return;
+      object.adopt(draft, until);
+      if (!known) run.take(object);
+    } finally {
+      if (object.follower !== draft.follower) draft.follower.end();
     }
   });
 }
@@ -45,56 +59,73 @@ export function trackOn(run, known, frame, box, tell) {
  * @param {Run} run
  * @param {FollowedObject} object
  * @param {number} frame A frame with a row of it.
- * @param {Tell} tell
+ * @param {Redoing} redoing
  * @returns {Promise<number>} How many frames were tracked.
  */
-export async function trackBack(run, object, frame, tell) {
-  let count = 0;
+export async function trackBack(run, object, frame, { tell, signal }) {
   const drawn = [...object.rows.values()].filter((row) => row.corrected && row.frame < frame).map((row) => row.frame);
   // An object's first box was drawn, too, and is kept.
   const until = Math.max(-1, ...drawn);
   const follower = run.follower();
-  await run.alone(async () => {
-    let picture = await run.frames.at(frame);
-    const row = object.rows.get(frame);
-    if (!picture || !row) return;
-    await follower.open(picture, scaled(row.box, picture.image, run.source.size));
-    while (!run.isOver) {
-      close(picture);
-      picture = await run.frames.before(picture.frame);
-      if (!picture || picture.frame <= until) break;
-      const answer = await follower.track(picture, {});
-      if (!answer) continue;
-      run.frames.keep(picture);
-      object.set(rowOf(answer, picture, run.source.size, false));
-      count += 1;
-      tell(picture.frame);
-    }
-    object.sort();
-  });
-  follower.end();
-  return count;
+  /** @type {import("./objects.js").Row[]} */
+  const rows = [];
+  /** @type {number[]} */
+  const added = [];
+  let isDone = false;
+  try {
+    await run.alone(async () => {
+      let picture = await run.frames.at(frame);
+      const row = object.rows.get(frame);
+      if (!picture || !row) return;
+      await follower.open(picture, scaled(row.box, picture.image, run.source.size));
+      while (!run.isOver && !signal.aborted) {
+        close(picture);
+        picture = await run.frames.before(picture.frame);
+        if (!picture || picture.frame <= until) break;
+        const answer = await follower.track(picture, {});
+        if (!answer) continue;
+        if (!run.frames.times.has(picture.frame)) added.push(picture.frame);
+        run.frames.keep(picture);
+        rows.push(rowOf(answer, picture, run.source.size, false));
+        tell(picture.frame);
+      }
+      isDone = !run.isOver && !signal.aborted;
+    });
+  } finally {
+    follower.end();
+    if (!isDone) added.forEach((number) => run.frames.forget(number));
+  }
+  if (!isDone) return 0;
+  rows.forEach((row) => object.set(row));
+  object.sort();
+  return rows.length;
 }
 
 /**
- * Brings all objects to the last frame again, after the page was loaded anew: from their states, or from their last boxes.
+ * Brings objects to the last frame again, after the page was loaded anew or a correction was undone: from their states, or
+ * from their last boxes.
  * @param {Run} run
+ * @param {FollowedObject[]} objects
  */
-export async function catchUp(run) {
-  const { picture } = run;
-  for (const object of run.objects) {
+export async function catchUp(run, objects) {
+  const { picture, source } = run;
+  for (const object of objects) {
     const last = [...object.rows.values()].pop();
     if (!last) continue;
-    const from = await object.goBackBefore(run.lastFrame + 1, run.follower());
+    object.follower.end();
+    object.follower = run.follower();
+    const from = await object.goBackBefore(run.lastFrame + 1);
     if (from === undefined) {
-      await object.follower.open(picture, scaled(last.box, picture.image, run.source.size));
+      await object.follower.open(picture, scaled(last.box, picture.image, source.size));
       object.frames = [picture.frame];
       continue;
     }
     for (const number of run.frames.shown.filter((number) => number > from)) {
       const passed = await run.frames.at(number);
-      if (!passed || !(await object.follower.track(passed, {}))) continue;
-      object.frames.push(number);
+      if (!passed) continue;
+      const row = object.rows.get(number);
+      const header = row?.corrected ? { box: scaled(row.box, passed.image, source.size) } : {};
+      if (await object.follower.track(passed, header)) object.frames.push(number);
       close(passed);
     }
   }

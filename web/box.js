@@ -9,6 +9,13 @@ const STEP = 4;
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
+/**
+ * @param {number} value
+ * @param {number} least
+ * @param {number} most
+ */
+const limited = (value, least, most) => Math.min(Math.max(value, least), most);
+
 export class BoxDrawing {
   /**
    * @param {HTMLCanvasElement} canvas
@@ -46,10 +53,9 @@ export class BoxDrawing {
   /** @param {PointerEvent} event */
   at(event) {
     const area = this.canvas.getBoundingClientRect();
-    const limit = (/** @type {number} */ value, /** @type {number} */ most) => Math.min(Math.max(value, 0), most);
     return {
-      x: limit(((event.clientX - area.left) / area.width) * this.canvas.width, this.canvas.width),
-      y: limit(((event.clientY - area.top) / area.height) * this.canvas.height, this.canvas.height),
+      x: limited(((event.clientX - area.left) / area.width) * this.canvas.width, 0, this.canvas.width),
+      y: limited(((event.clientY - area.top) / area.height) * this.canvas.height, 0, this.canvas.height),
     };
   }
 
@@ -114,11 +120,11 @@ export class BoxDrawing {
       const [right, down] = [arrow[0] * STEP, arrow[1] * STEP];
       const box = { ...this.box };
       if (event.shiftKey) {
-        box.width = Math.max(LEAST, box.width + right);
-        box.height = Math.max(LEAST, box.height + down);
+        box.width = limited(box.width + right, LEAST, width - box.x);
+        box.height = limited(box.height + down, LEAST, height - box.y);
       } else {
-        box.x += right;
-        box.y += down;
+        box.x = limited(box.x + right, 0, width - box.width);
+        box.y = limited(box.y + down, 0, height - box.height);
       }
       this.box = box;
     }

@@ -1,11 +1,12 @@
 // What one does to objects: draw their boxes, correct them in any frame, track them again, name and delete them.
 
 import { BoxDrawing } from "./box.js";
-import { canvas, get } from "./dom.js";
+import { button, canvas, get } from "./dom.js";
 import { ObjectList } from "./list.js";
 import { FOLLOWING } from "./message.js";
 import { MOST_OBJECTS } from "./objects.js";
 import { words } from "./problems.js";
+import { Undoing } from "./undo.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
@@ -25,6 +26,9 @@ export class Editing {
     this.page = page;
     /** Whether the next box is that of a new object. */
     this.isAdding = false;
+    this.undoing = new Undoing();
+    /** Cancels what is tracked again. */
+    this.cancelling = new AbortController();
     this.drawing = this.makeDrawing();
     this.list = this.makeList();
   }
@@ -70,6 +74,8 @@ export class Editing {
     const object = this.isAdding ? undefined : run.chosen;
     this.add(false);
     if (this.page.viewed || run.isResting) return void this.trackOn(run, object, (this.page.viewed ?? run.picture).frame, box);
+    // Its session learns of the box.
+    this.undoing.push({ ...this.undoing.before(run, object), follower: undefined });
     run.draw(box, object);
     run.pause(this.page.state === "paused");
     this.page.say(object ? "The box is corrected." : "Following another object.");
@@ -82,8 +88,8 @@ export class Editing {
    * @param {Box} box */
   trackOn(run, object, frame, box) {
     const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
-    return this.tracksAgain(run, async () => {
-      await (await again()).trackOn(run, object, frame, box, tell);
+    return this.tracksAgain(run, object, async (signal) => {
+      await (await again()).trackOn(run, object, frame, box, { tell, signal });
       return `Followed anew from frame ${frame}.`;
     });
   }
@@ -94,28 +100,79 @@ export class Editing {
     if (!run?.chosen || !shown || run.isRedoing || run.isOver) return;
     this.page.pause(true);
     const { chosen } = run;
-    await this.tracksAgain(run, async () => {
+    const tell = (/** @type {number} */ at) => this.page.say(`Following backwards: frame ${at}.`);
+    await this.tracksAgain(run, chosen, async (signal) => {
       const { trackBack } = await again();
-      const count = await trackBack(run, chosen, shown.frame, (at) => this.page.say(`Following backwards: frame ${at}.`));
+      const count = await trackBack(run, chosen, shown.frame, { tell, signal });
       return count > 0 ? `Followed ${count} frames backwards.` : "There is no frame before it, or a box was drawn there.";
     });
   }
 
   /**
    * @param {Run} run
-   * @param {() => Promise<string>} track Says what it did.
+   * @param {FollowedObject | undefined} object
+   * @param {(signal: AbortSignal) => Promise<string>} track Says what it did.
    */
-  async tracksAgain(run, track) {
-    this.page.isUnsaved = true;
+  async tracksAgain(run, object, track) {
+    const before = this.undoing.before(run, object);
+    const { signal } = (this.cancelling = new AbortController());
+    get("cancel").hidden = false;
     try {
-      const done = await track();
+      const done = await track(signal);
       if (run !== this.page.run) return;
+      if (signal.aborted) return this.page.say("Cancelled. Nothing has changed.");
+      this.undoing.push(before);
+      this.page.isUnsaved = true;
       this.page.say(done);
-      this.page.repaint();
       this.page.changed();
     } catch (error) {
       if (run === this.page.run) this.page.say(words(error, this.page.hasKey), true);
+    } finally {
+      get("cancel").hidden = true;
+      if (run === this.page.run) this.page.repaint();
     }
+  }
+
+  /** Leaves what is tracked again as it was before. */
+  cancel() {
+    this.cancelling.abort();
+  }
+
+  /** Brings back what was before the last correction. */
+  async undo() {
+    const { run } = this.page;
+    if (!run || run.isRedoing || run.isOver || this.undoing.steps.length === 0) return;
+    try {
+      const name = await this.undoing.undo(run);
+      if (run !== this.page.run) return;
+      this.page.say(name ? `The last correction of ${name} is undone.` : "There is nothing to undo.");
+      this.page.isUnsaved = true;
+      this.page.repaint();
+      this.page.changed();
+    } catch (error) {
+      this.page.fail(error);
+    }
+  }
+
+  /** A box that was drawn in the last frame cannot be followed.
+   * @param {unknown} error */
+  refuse(error) {
+    this.undoing.steps.pop();
+    this.page.say(words(error, this.page.hasKey), true);
+    this.page.repaint();
+  }
+
+  /** Shows what can be done now. */
+  show() {
+    button("undo").disabled = this.undoing.steps.length === 0;
+  }
+
+  /** Lets go of what was there. */
+  reset() {
+    this.cancel();
+    this.undoing = new Undoing();
+    this.drawing.arm(false);
+    this.add(false);
   }
 
   /** Makes the next box that of a new object, or not.

@@ -1,6 +1,6 @@
 // What follows an object: a session in this page, or one of the service. Frames go in, answers come out.
 
-import { Problem } from "./js/bagtrack.js";
+import { LocalClient, Problem } from "./js/bagtrack.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
@@ -140,8 +140,8 @@ export class ServiceFollower {
     this.isOver = false;
     /** @type {{picture: Picture, box: Box} | undefined} What was answered last. */
     this.last = undefined;
-    /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void, by?: object}[]} Oldest
-     * first; `by` is the stream that has it. */
+    /** @type {{picture: Picture, header: Header, resolve: (answer: Answer | undefined) => void,
+     *   reject: (problem: unknown) => void, by?: object}[]} Oldest first; `by` is the stream that has it. */
     this.waiting = [];
   }
 
@@ -183,9 +183,9 @@ export class ServiceFollower {
    * @param {Header} header
    * @returns {Promise<Answer | undefined>} */
   track(picture, header) {
-    return new Promise((resolve) => {
+    return new Promise((resolve, reject) => {
       /** @type {ServiceFollower["waiting"][number]} */
-      const sent = { picture, header, resolve };
+      const sent = { picture, header, resolve, reject };
       this.waiting.push(sent);
       this.transmit(sent);
     });
@@ -206,7 +206,11 @@ export class ServiceFollower {
       }
       sent.resolve(answer);
     } catch (problem) {
-      if (this.stream === stream) this.fail(problem);
+      if (this.stream !== stream) return;
+      if (!stream.isEnded) this.waiting = this.waiting.filter((other) => other !== sent);
+      // A frame that is refused is no end of the stream.
+      if (stream.isEnded) this.fail(problem);
+      else sent.reject(problem);
     }
   }
 
@@ -214,7 +218,14 @@ export class ServiceFollower {
   fail(problem) {
     // Such as a service with other keys after its restart, which does not take the session's snapshot.
     if (problem instanceof Problem && problem.isGone && this.hasAnswered && !this.isOver) this.goOn();
-    else this.told.fail(problem);
+    else this.giveUp(problem);
+  }
+
+  /** @param {unknown} problem */
+  giveUp(problem) {
+    if (this.isOver) return;
+    this.told.fail(problem);
+    this.waiting.splice(0).forEach(({ reject }) => reject(problem));
   }
 
   /** Goes on in another session, from the last picture and its box. */
@@ -228,7 +239,7 @@ export class ServiceFollower {
       this.told.anew();
       this.waiting.forEach((sent) => this.transmit(sent));
     } catch (error) {
-      this.told.fail(error);
+      this.giveUp(error);
     }
   }
 
@@ -254,4 +265,20 @@ export class ServiceFollower {
     // One that cannot be ended expires.
     session?.end().catch(() => undefined);
   }
+}
+
+/** Where the frames of a run are tracked, for one object.
+ * @param {import("./run.js").Run} run
+ * @returns {Follower} */
+export function followerOf(run) {
+  const { client, source, told } = run;
+  if (client instanceof LocalClient) return new LocalFollower(client);
+  // Whoever tracks with one that is no object's own is told by its answers.
+  const isOwn = () => run.objects.some((object) => object.follower === follower);
+  const follower = new ServiceFollower(client, source.isLive, {
+    line: (isUp) => told.line(isUp),
+    anew: () => told.anew(),
+    fail: (error) => isOwn() && run.fail(error),
+  });
+  return follower;
 }

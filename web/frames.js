@@ -39,6 +39,14 @@ export class Frames {
     }
   }
 
+  /** Gives up a frame that is not tracked after all.
+   * @param {number} frame */
+  forget(frame) {
+    this.bytes -= this.blobs.get(frame)?.size ?? 0;
+    this.blobs.delete(frame);
+    this.times.delete(frame);
+  }
+
   /** Its picture; nothing where it is not to be had.
    * @param {number} frame
    * @returns {Promise<Picture | undefined>} */

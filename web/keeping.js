@@ -292,7 +292,7 @@ const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves })
  * @param {Run} run */
 async function wake(run) {
   run.wake = undefined;
-  await (await import("./again.js")).catchUp(run);
+  await (await import("./again.js")).catchUp(run, run.objects);
   await run.source.goTo?.(run.picture.time, run.picture.frame);
   if (!run.isOver) run.play();
 }

@@ -4,12 +4,17 @@
 /**
  * @typedef {import("./project.js").Project} Project
  *
+ * @typedef {object} State Of a tracker.
+ * @property {Uint8Array<ArrayBuffer>} bytes
+ * @property {number[]} frames The frame of the video that each frame of the session was.
+ * @property {number} [after] A frame of the video that it has seen: there may be later ones.
+ *
  * @typedef {object} Kept
  * @property {string} id
  * @property {number} at When it was kept, in milliseconds.
  * @property {boolean} isLocal Whether it was tracked in the page.
  * @property {Project} project
- * @property {Record<number, {bytes: Uint8Array<ArrayBuffer>, frames: number[]}>} states The last one of each object.
+ * @property {Record<number, State>} states The last one of each object.
  * @property {string} [clip] The sample clip.
  * @property {string[]} [imageNames] Of images.
  */

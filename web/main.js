@@ -26,6 +26,8 @@ get("draw").addEventListener("click", () => page.editing.drawing.arm(!page.editi
 get("pause").addEventListener("click", () => page.pause(page.state !== "paused"));
 get("add").addEventListener("click", () => page.editing.toggleAdding());
 get("backwards").addEventListener("click", () => page.editing.trackBack());
+get("undo").addEventListener("click", () => page.editing.undo());
+get("cancel").addEventListener("click", () => page.editing.cancel());
 get("stop").addEventListener("click", () => page.end("Stopped. Save the results, or choose another video."));
 
 /** Goes to the frame before or after the one that is shown.
@@ -38,6 +40,12 @@ get("back").addEventListener("click", () => step(-1));
 get("forward").addEventListener("click", () => step(1));
 addEventListener("keydown", (event) => {
   const { target, key } = event;
+  if (key === "Escape") page.editing.cancel();
+  const isTyping = target instanceof HTMLInputElement && target.type !== "radio" && target.type !== "checkbox";
+  if (key === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey && !isTyping) {
+    event.preventDefault();
+    page.editing.undo();
+  }
   const isTaken = target instanceof HTMLElement && target.closest("input, button, a, #picture, #timeline, summary");
   const isSpace = key === " ";
   if (!page.run || (isTaken && !(isSpace && target.id === "timeline"))) return;

@@ -37,7 +37,7 @@ export class FollowedObject {
     this.rows = new Map();
     /** @type {number[]} The frame of the video that each frame of the session was. */
     this.frames = [];
-    /** @type {{bytes: Uint8Array<ArrayBuffer>, frames: number[]}[]} States, oldest first. */
+    /** @type {import("./kept.js").State[]} Oldest first. */
     this.saves = [];
   }
 
@@ -61,23 +61,51 @@ export class FollowedObject {
 
   async save() {
     const { frames } = this;
+    const after = frames[frames.length - 1];
     // Without it one goes on from an older one.
     const bytes = await Promise.resolve()
       .then(() => this.follower.save())
       .catch(() => undefined);
-    if (bytes) this.saves.push({ bytes, frames });
+    // Meanwhile it may have gone back to an earlier frame.
+    if (bytes && frames === this.frames) this.saves.push({ bytes, frames, after });
   }
 
-  /** Follows it with another session, from a state before a frame of the video.
-   * @param {Follower} follower
+  /** The same object in another session: what is tracked with it counts when it is adopted.
+   * @param {Follower} follower */
+  draft(follower) {
+    const draft = new FollowedObject(this.number, follower);
+    draft.saves = [...this.saves];
+    return draft;
+  }
+
+  /** Takes the rows of a draft, and its session where that has come to the last frame.
+   * @param {FollowedObject} draft
+   * @param {number} until Its rows are of frames before this one. */
+  adopt(draft, until) {
+    this.rows = new Map([...this.rows, ...draft.rows]);
+    this.sort();
+    if (until < Infinity) {
+      this.saves = [...draft.saves, ...this.saves.filter(({ after = -1 }) => after >= until)];
+      return;
+    }
+    this.follower.end();
+    [this.follower, this.frames, this.saves] = [draft.follower, draft.frames, draft.saves];
+  }
+
+  /** The first frame after this one with a box that was drawn; infinite where there is none.
+   * @param {number} frame */
+  drawnAfter(frame) {
+    const drawn = [...this.rows.values()].filter((row) => row.corrected && row.frame > frame);
+    return Math.min(Infinity, ...drawn.map((row) => row.frame));
+  }
+
+  /** Goes on with its session from a state before a frame of the video.
    * @param {number} frame
    * @returns {Promise<number | undefined>} The frame of the video that the state is of; nothing where there is none. */
-  async goBackBefore(frame, follower) {
-    this.follower.end();
-    this.follower = follower;
+  async goBackBefore(frame) {
     while (this.saves.length > 0) {
       const { bytes, frames } = this.saves[this.saves.length - 1];
-      const at = await follower.restore(bytes);
+      const at = await this.follower.restore(bytes);
       if (frames[at] < frame) {
         this.frames = frames.slice(0, at + 1);
         return frames[at];
@@ -86,12 +114,6 @@ export class FollowedObject {
     }
     this.frames = [];
     return undefined;
-  }
-
-  /** Forgets the rows from a frame on.
-   * @param {number} frame */
-  forgetFrom(frame) {
-    for (const number of [...this.rows.keys()]) if (number >= frame) this.rows.delete(number);
   }
 
   /** The first frame after this one where the status gets worse; else the first of all.

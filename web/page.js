@@ -160,10 +160,9 @@ export class Page {
     this.run = undefined;
     this.frozen = undefined;
     this.isUnsaved = false;
-    this.editing.drawing.arm(false);
+    this.editing.reset();
     this.seen.reset();
     get("handed").replaceChildren();
-    this.editing.add(false);
     this.leave();
   }
 
@@ -172,6 +171,7 @@ export class Page {
     return {
       answer: (picture, answer) => this.answered(picture, answer),
       fail: (error) => this.fail(error),
+      refuse: (error) => this.editing.refuse(error),
       line: (isUp) => this.message.line(isUp),
       anew: () => this.say("The service had lost the session. It goes on from the last box: draw again if it is off."),
       end: () => this.end("The video has ended. Save the results, or choose another one."),
@@ -211,6 +211,7 @@ export class Page {
     this.stage.show(shown.image, shownIn(run, shown.frame, shown.image, run.chosen), particles);
     this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, wholeLength(run));
     this.editing.list.show(run.objects, run.chosen);
+    this.editing.show();
     const isKnown = run.chosen?.rows.has(shown.frame) ?? false;
     button("backwards").disabled = !isKnown || shown.frame === 0 || run.isOver;
   }

@@ -1,9 +1,9 @@
 // One run: a source of frames, the objects that are followed through them, and the answers.
 
 import { rowOf } from "./boxes.js";
-import { LocalFollower, ServiceFollower, WINDOW } from "./follower.js";
+import { WINDOW, followerOf } from "./follower.js";
 import { Frames, close } from "./frames.js";
-import { LocalClient } from "./js/bagtrack.js";
+import { LocalClient, Problem } from "./js/bagtrack.js";
 import { FollowedObject } from "./objects.js";
 
 /**
@@ -20,6 +20,7 @@ import { FollowedObject } from "./objects.js";
  * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
  *   chosen object.
  * @property {(error: unknown) => void} fail
+ * @property {(error: unknown) => void} refuse A box that was drawn cannot be followed. Nothing has changed.
  * @property {(isUp: boolean) => void} line
  * @property {() => void} anew The service had lost a session: another one goes on from the last box.
  * @property {() => void} end The source has no more frames, and all are answered.
@@ -130,15 +131,8 @@ export class Run {
     if (this.chosen === object) this.chosen = this.objects[0];
   }
 
-  /** @returns {import("./follower.js").Follower} */
   follower() {
-    const { client } = this;
-    if (client instanceof LocalClient) return new LocalFollower(client);
-    return new ServiceFollower(client, this.source.isLive, {
-      line: (isUp) => this.told.line(isUp),
-      anew: () => this.told.anew(),
-      fail: (error) => this.fail(error),
-    });
+    return followerOf(this);
   }
 
   /** @param {Picture} picture */
@@ -249,7 +243,10 @@ export class Run {
         this.told.answer(picture, answer);
       }
     } catch (error) {
-      this.fail(error);
+      // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
+      const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
+      if (isRefused && !this.isOver) this.told.refuse(error);
+      else this.fail(error);
     }
     this.underWay = this.underWay.filter((other) => other !== sent);
     this.throttle();

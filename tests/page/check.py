@@ -18,6 +18,7 @@ import time
 import urllib.parse
 
 import budgets
+import corrected
 import files
 import kept
 import local
@@ -364,6 +365,7 @@ ALL = [
     key_needed,
     busy_service,
     *budgets.ALL,
+    *corrected.ALL,
     *files.ALL,
     *local.ALL,
     *kept.ALL,

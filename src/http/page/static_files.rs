@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 68] = [
+const FILES: [File; 69] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -93,6 +93,7 @@ const FILES: [File; 68] = [
     file!("stage.js", SCRIPT),
     file!("stills.js", SCRIPT),
     file!("timeline.js", SCRIPT),
+    file!("undo.js", SCRIPT),
     file!("video.js", SCRIPT),
     file!("votes.js", SCRIPT),
     file!("welcome-rows.js", SCRIPT),

@@ -1,0 +1,137 @@
+"""Corrections: what is there stays until the new rows are, up to the next correction, and comes back when undone."""
+
+import json
+
+from browser import choose, drag, frames, numbers, rows, said, saved, slow, to_the_end
+from clips import FRAMES, H264
+from files import choose_file, sent_box
+from kept import kept_says
+from kept import told as whole
+from studio import to_frame, values
+
+OFF = [30, 200, 80, 60]
+"""A box of the ground, off the target."""
+
+
+def keys(page):
+    """The frames with a box that was drawn, as the project has them."""
+    [stored] = json.loads(saved(page, "#save-project"))["objects"]
+    return [row[0] for row in stored["rows"] if row[8]]
+
+
+def tracked_clip(checks, where="here"):
+    page = checks.page(where=where)
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    to_the_end(page)
+    return page
+
+
+def tracked_anew_and_cancelled(checks):
+    """What is tracked anew is cancelled, and interrupted by a reload: all rows are as before."""
+    page = checks.page(where="here")
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    drag(page, sent_box(checks.files.truth[0]))
+    to_the_end(page)
+    before = rows(page)
+    kept_says(page, f"{FRAMES} rows")
+    slow(page)
+    for cancel in (lambda: page.keyboard.press("Escape"), page.locator("#cancel").click):
+        to_frame(page, 10)
+        drag(page, OFF)
+        said(page, "Following anew: frame 1")
+        assert whole(rows(page)) == whole(before), "rows are lost while it is tracked anew"
+        cancel()
+        said(page, "Cancelled")
+        assert page.locator("#cancel").is_hidden()
+        assert whole(rows(page)) == whole(before) and keys(page) == [0]
+    drag(page, OFF)
+    said(page, "Following anew: frame 1")
+    page.reload()
+    said(page, "clip.mp4 is here again")
+    assert whole(rows(page)) == whole(before)
+    page.context.close()
+
+
+def up_to_the_next_correction(checks):
+    """A correction changes the rows up to the next one, and undoing brings back rows and key frames."""
+    page = tracked_clip(checks)
+    first = rows(page)
+    to_frame(page, 100)
+    drag(page, OFF)
+    said(page, "Followed anew from frame 100")
+    second = rows(page)
+    to_frame(page, 50)
+    drag(page, [10, 20, 60, 60])
+    said(page, "Followed anew from frame 50")
+    third = rows(page)
+    assert keys(page) == [0, 50, 100]
+    assert values(third[:50]) == values(first[:50]) and values(third[100:]) == values(second[100:])
+    assert numbers(third[50])[:2] == [10, 20] and len(third) == 150
+    page.locator("#undo").click()
+    said(page, "is undone")
+    assert values(rows(page)) == values(second) and keys(page) == [0, 100]
+    page.keyboard.press("Control+z")
+    page.wait_for_timeout(300)
+    assert page.locator("#undo").is_disabled()
+    assert values(rows(page)) == values(first) and keys(page) == [0]
+    to_frame(page, 20)
+    page.locator("#backwards").click()
+    said(page, "Followed 19 frames backwards")
+    page.locator("#undo").click()
+    said(page, "is undone")
+    assert values(rows(page)) == values(first)
+    page.context.close()
+
+
+def undone_while_it_is_followed(checks):
+    """A box in the last frame is undone, and the object is followed on from where it was."""
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        truth = checks.clips["card"]["truth"]
+        choose(page, "card")
+        drag(page, truth[0])
+        frames(page, 40)
+        page.locator("#pause").click()
+        page.wait_for_timeout(300)
+        before = rows(page)
+        drag(page, OFF)
+        said(page, "The box is corrected")
+        page.wait_for_timeout(300)
+        assert numbers(rows(page)[-1])[1] > 150
+        page.keyboard.press("Control+z")
+        said(page, "is undone")
+        assert values(rows(page)) == values(before)
+        page.locator("#pause").click()
+        to_the_end(page)
+        table = rows(page)
+        last = truth[149]
+        assert len(table) == 150 and values(table[: len(before)]) == values(before)
+        assert abs(numbers(table[-1])[0] - last[0]) < 15 and abs(numbers(table[-1])[1] - last[1]) < 15, (table[-1], last)
+        page.context.close()
+
+
+def box_at_the_edge(checks):
+    """Arrows move a box to the edge of the picture and no further, and a paused run goes on after it."""
+    page = checks.page(where="here")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 40)
+    page.locator("#pause").click()
+    page.wait_for_timeout(300)
+    before = rows(page)
+    to_frame(page, 20)
+    page.locator("#picture").focus()
+    for key in ["Enter", *["ArrowLeft"] * 90, *["Shift+ArrowDown"] * 90, "Enter"]:
+        page.keyboard.press(key)
+    said(page, "Followed anew from frame 20")
+    table = rows(page)
+    x, y, width, height = numbers(table[20])
+    assert x == 0 and y + height == 360, table[20]
+    assert len(table) == len(before) and values(table[:20]) == values(before[:20])
+    page.locator("#pause").click()
+    to_the_end(page)
+    page.context.close()
+
+
+ALL = [tracked_anew_and_cancelled, up_to_the_next_correction, undone_while_it_is_followed, box_at_the_edge]
