@@ -18,6 +18,7 @@ export const DRAW = "Draw a box around what to follow.";
 export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
 /** It is loaded when a source is open. */
 const again = () => import("./again.js");
+const ABSENT = "Nothing can be tracked without the video.";
 const ADD = "Draw a box around the object to add.";
 
 export class Editing {
@@ -53,9 +54,16 @@ export class Editing {
     });
   }
 
+  /** Whether there are no pictures, which is said.
+   * @param {Run} run */
+  wantsVideo({ source }) {
+    if (source.isAbsent) this.page.say(`${ABSENT} Choose ${source.name} first.`, true);
+    return source.isAbsent ?? false;
+  }
+
   startDrawing() {
     const { run } = this.page;
-    if (!run || run.isOver || run.isRedoing || this.page.state === "opening") return false;
+    if (!run || run.isOver || run.isRedoing || this.page.state === "opening" || this.wantsVideo(run)) return false;
     if (this.page.hasRows) run.pause(true);
     else if (run.source.isLive) {
       const frozen = (this.page.frozen = run.source.first());
@@ -97,7 +105,7 @@ export class Editing {
   /** Follows the chosen object backwards from the frame that is shown. */
   async trackBack() {
     const { run, shown } = this.page;
-    if (!run?.chosen || !shown || run.isRedoing || run.isOver) return;
+    if (!run?.chosen || !shown || run.isRedoing || run.isOver || this.wantsVideo(run)) return;
     this.page.pause(true);
     const { chosen } = run;
     const tell = (/** @type {number} */ at) => this.page.say(`Following backwards: frame ${at}.`);
@@ -184,7 +192,7 @@ export class Editing {
 
   toggleAdding() {
     const { run } = this.page;
-    if (!run || run.isOver) return;
+    if (!run || run.isOver || this.wantsVideo(run)) return;
     if (run.objects.length >= MOST_OBJECTS) return this.page.say(`No more than ${MOST_OBJECTS} objects are followed.`);
     this.add(!this.isAdding);
     if (this.isAdding) this.drawing.arm(true);

@@ -46,6 +46,7 @@ function restore() {
 async function saveVideo(page) {
   const { run } = page;
   if (!run || run.objects.length === 0) return;
+  if (run.source.isAbsent) return page.say(`A video cannot be made without pictures. Choose ${run.source.name} first.`, true);
   const own = button("save-video");
   own.disabled = true;
   // Another run may have taken its place.

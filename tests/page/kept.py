@@ -282,6 +282,32 @@ def video_made_of_another_run(checks):
     page.context.close()
 
 
+def project_without_its_video(checks):
+    """Without pictures nothing is tracked and no video is made: the page says which file to choose."""
+    path = checks.files.file("clip.mp4", 30, H264)
+    page = checks.page(where="here")
+    choose_file(page, path)
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 30)
+    page.locator("#stop").click()
+    before = kept_rows(page)
+    project = checks.files.folder / "alone.bagtrack.json"
+    project.write_bytes(saved(page, "#save-project"))
+    page.context.close()
+
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files(project)
+    said(page, "Choose clip.mp4 to see its pictures")
+    to_frame(page, 20)
+    for act in (page.locator("#backwards").click, lambda: drag(page, [30, 200, 80, 60]), page.locator("#save-video").click):
+        page.locator("#list input[type=radio]").check()
+        act()
+        page.locator("#message.bad").filter(has_text="Choose clip.mp4 first").wait_for()
+        page.locator("#message").evaluate("place => { place.textContent = ''; place.className = ''; }")
+    assert told(rows(page)) == told(before)
+    page.context.close()
+
+
 ALL = [
     half_tracked_project,
     last_object_deleted,
@@ -290,4 +316,5 @@ ALL = [
     each_tab_for_itself,
     left_for_another_source,
     project_opened_again,
+    project_without_its_video,
 ]
