@@ -21,11 +21,12 @@ import { close } from "./frames.js";
  * @param {number} frame
  * @param {Box} box
  * @param {Redoing} redoing
+ * @returns {Promise<boolean>} Whether it goes on from what was learned before; else from the box alone.
  */
-export function trackOn(run, known, frame, box, { tell, signal }) {
-  return run.alone(async () => {
-    const object = known ?? run.newObject();
-    const draft = object.draft(run.follower());
+export async function trackOn(run, known, frame, box, { tell, signal }) {
+  const object = known ?? run.newObject();
+  const draft = object.draft(run.follower());
+  await run.alone(async () => {
     const until = object.drawnAfter(frame);
     try {
       const from = await draft.goBackBefore(frame);
@@ -52,6 +53,7 @@ export function trackOn(run, known, frame, box, { tell, signal }) {
       if (object.follower !== draft.follower) draft.follower.end();
     }
   });
+  return !draft.isForgotten;
 }
 
 /**
@@ -115,6 +117,8 @@ export async function catchUp(run, objects) {
     object.follower.end();
     object.follower = run.follower();
     const from = await object.goBackBefore(run.lastFrame + 1);
+    if (object.isForgotten) run.told.anew();
+    object.isForgotten = false;
     if (from === undefined) {
       await object.follower.open(picture, scaled(last.box, picture.image, source.size));
       object.frames = [picture.frame];

@@ -97,8 +97,9 @@ export class Editing {
   trackOn(run, object, frame, box) {
     const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
     return this.tracksAgain(run, object, async (signal) => {
-      await (await again()).trackOn(run, object, frame, box, { tell, signal });
-      return `Followed anew from frame ${frame}.`;
+      const isWhole = await (await again()).trackOn(run, object, frame, box, { tell, signal });
+      const from = `Followed anew from frame ${frame}`;
+      return isWhole ? `${from}.` : `${from}, by the box alone: the service had lost what was learned before.`;
     });
   }
 

@@ -183,6 +183,7 @@ export class ServiceFollower {
    * @param {Header} header
    * @returns {Promise<Answer | undefined>} */
   track(picture, header) {
+    if (this.isOver) return Promise.resolve(undefined);
     return new Promise((resolve, reject) => {
       /** @type {ServiceFollower["waiting"][number]} */
       const sent = { picture, header, resolve, reject };
@@ -256,12 +257,14 @@ export class ServiceFollower {
   end() {
     this.isOver = true;
     this.leave();
+    this.waiting.splice(0).forEach(({ resolve }) => resolve(undefined));
   }
 
   leave() {
-    const { session } = this;
-    this.session = undefined;
-    this.stream?.close();
+    const { session, stream } = this;
+    // Its end is no failure then.
+    this.session = this.stream = undefined;
+    stream?.close();
     // One that cannot be ended expires.
     session?.end().catch(() => undefined);
   }

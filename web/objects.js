@@ -1,5 +1,7 @@
 // The objects that are followed, each with its rows.
 
+import { Problem } from "./js/bagtrack.js";
+
 /**
  * @typedef {import("./follower.js").Follower} Follower
  * @typedef {import("./js/bagtrack.js").Box} Box
@@ -22,6 +24,13 @@ const COLORS = [
   ...["#a4e05a", "#ff5cf0", "#9db4ff", "#ffd9a0", "#5cffb4", "#e0a45a", "#d0d0d0", "#ff7a7a"],
 ];
 
+/** A service that was started again with other keys takes no states of before. What else fails is a failure.
+ * @param {unknown} error
+ * @returns {undefined} */
+function refusedState(error) {
+  if (!(error instanceof Problem && error.slug === "invalid-snapshot")) throw error;
+}
+
 export class FollowedObject {
   /**
    * @param {number} number
@@ -39,6 +48,8 @@ export class FollowedObject {
     this.frames = [];
     /** @type {import("./kept.js").State[]} Oldest first. */
     this.saves = [];
+    /** Whether the service has not taken a state. */
+    this.isForgotten = false;
   }
 
   /** @param {Row} row */
@@ -105,8 +116,9 @@ export class FollowedObject {
   async goBackBefore(frame) {
     while (this.saves.length > 0) {
       const { bytes, frames } = this.saves[this.saves.length - 1];
-      const at = await this.follower.restore(bytes);
-      if (frames[at] < frame) {
+      const at = await this.follower.restore(bytes).catch(refusedState);
+      this.isForgotten ||= at === undefined;
+      if (at !== undefined && frames[at] < frame) {
         this.frames = frames.slice(0, at + 1);
         return frames[at];
       }

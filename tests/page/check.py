@@ -24,6 +24,7 @@ import kept
 import local
 import quickstart
 import sources
+import stopped
 import studio
 import welcome
 from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
@@ -371,6 +372,7 @@ ALL = [
     *kept.ALL,
     *quickstart.ALL,
     *sources.ALL,
+    *stopped.ALL,
     *studio.ALL,
 ]
 

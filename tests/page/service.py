@@ -14,8 +14,8 @@ import urllib.request
 class Service:
     """The program on a free port."""
 
-    def __init__(self, program, *flags, **environment):
-        command = [program, "serve", "--listen", "127.0.0.1:0", *flags]
+    def __init__(self, program, *flags, port=0, **environment):
+        command = [program, "serve", "--listen", f"127.0.0.1:{port}", *flags]
         environment = {**os.environ, **environment}
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
         for line in self.process.stderr:
