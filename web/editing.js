@@ -8,6 +8,9 @@ import { MOST_OBJECTS } from "./objects.js";
 import { words } from "./problems.js";
 import { Undoing } from "./undo.js";
 
+/** Loaded when a source is open. */
+export const again = () => import("./again.js");
+
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
  * @typedef {import("./objects.js").FollowedObject} FollowedObject
@@ -16,8 +19,6 @@ import { Undoing } from "./undo.js";
 
 export const DRAW = "Draw a box around what to follow.";
 export const TAP = matchMedia("(pointer: coarse)").matches ? "Tap Draw. " : "";
-/** It is loaded when a source is open. */
-const again = () => import("./again.js");
 const ABSENT = "Nothing can be tracked without the video.";
 const ADD = "Draw a box around the object to add.";
 
@@ -97,7 +98,8 @@ export class Editing {
   trackOn(run, object, frame, box) {
     const tell = (/** @type {number} */ done) => this.page.say(`Following anew: frame ${done} of ${run.lastFrame}.`);
     return this.tracksAgain(run, object, async (signal) => {
-      const isWhole = await (await again()).trackOn(run, object, frame, box, { tell, signal });
+      const { trackOn } = await again();
+      const isWhole = await trackOn(run, object, frame, box, { tell, signal });
       const from = `Followed anew from frame ${frame}`;
       return isWhole ? `${from}.` : `${from}, by the box alone: the service had lost what was learned before.`;
     });

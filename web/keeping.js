@@ -2,6 +2,7 @@
 // gone on with when another source has taken its place. A project file does the same by hand.
 
 import { get, input } from "./dom.js";
+import { again } from "./editing.js";
 import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepFiles, keepWork, keptFiles, keptWork } from "./kept.js";
 import { openFiles } from "./sources.js";
 
@@ -292,7 +293,7 @@ const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves })
  * @param {Run} run */
 async function wake(run) {
   run.wake = undefined;
-  await (await import("./again.js")).catchUp(run, run.objects);
+  await (await again()).catchUp(run, run.objects);
   await run.source.goTo?.(run.picture.time, run.picture.frame);
   if (!run.isOver) run.play();
 }

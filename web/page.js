@@ -3,11 +3,10 @@
 import { Beginning } from "./begin.js";
 import { shownIn } from "./boxes.js";
 import { button, canvas, get, input } from "./dom.js";
-import { DRAW, Editing, TAP } from "./editing.js";
+import { DRAW, Editing, TAP, again } from "./editing.js";
 import { Client, LocalClient, Problem } from "./js/bagtrack.js";
 import { FOLLOWING, Message } from "./message.js";
 import { UnplayableError, words } from "./problems.js";
-import { Run } from "./run.js";
 import { prepareSaving } from "./saving.js";
 import { Seen } from "./seen.js";
 import { offerDecoding } from "./sources.js";
@@ -16,6 +15,7 @@ import { Timeline } from "./timeline.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box
+ * @typedef {import("./run.js").Run} Run
  * @typedef {import("./source.js").Picture} Picture
  * @typedef {import("./source.js").Source} Source
  *
@@ -121,7 +121,7 @@ export class Page {
     if (!this.run) this.enter("opening");
     this.say("Opening…");
     try {
-      const source = await open(this.opening.signal);
+      const [source, { Run }] = await Promise.all([open(this.opening.signal), import("./run.js")]);
       const first = await source.first();
       const mayLeave = own === this.choice && (await this.mayLeave());
       if (own !== this.choice || !mayLeave) {
@@ -138,6 +138,7 @@ export class Page {
       this.stage.draw(undefined);
       this.stage.show(first.image);
       prepareSaving();
+      again().catch(() => undefined);
       this.seen.prepare().catch(() => undefined);
       if (await resume?.(this.run)) return;
       this.enter("first");

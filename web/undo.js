@@ -1,7 +1,5 @@
 // Undoing corrections: each brings back the rows and states of one object as they were before it.
 
-import { catchUp } from "./again.js";
-
 /**
  * @typedef {import("./objects.js").FollowedObject} FollowedObject
  * @typedef {import("./run.js").Run} Run
@@ -65,6 +63,6 @@ async function bringBack(run, object, { rows = new Map(), saves, last, follower 
     object.saves = [...saves, ...object.saves.filter(({ after = -1 }) => isSame && after > last)];
     // A run that goes on later catches up then.
     const isAtWork = !run.wake && (run.isLocal || !run.isResting);
-    if (!isSame && isAtWork) await catchUp(run, [object]);
+    if (!isSame && isAtWork) await (await import("./again.js")).catchUp(run, [object]);
   });
 }
