@@ -107,10 +107,13 @@ export class BoxDrawing {
   /** @param {KeyboardEvent} event */
   key(event) {
     const arrow = ARROWS[event.key];
-    if (event.key === "Escape" && this.box) return this.cancel();
-    if (event.key === "Enter" && this.box) return this.finish(this.box);
-    if (!arrow && event.key !== "Enter") return;
+    const isEscape = event.key === "Escape";
+    if (!arrow && event.key !== "Enter" && !(isEscape && this.box)) return;
+    // Without a box arrows step through the frames, but where one is about to draw.
+    if (arrow && !this.box && !this.isArmed) return;
     event.preventDefault();
+    if (isEscape) return this.cancel();
+    if (event.key === "Enter" && this.box) return this.finish(this.box);
     const { width, height } = this.canvas;
     if (!this.box) {
       if (!this.told.start()) return;

@@ -1,8 +1,9 @@
 // What the buttons do.
 
-import { button, get, input } from "./dom.js";
+import { get, input } from "./dom.js";
 import { Keeping } from "./keeping.js";
 import { offerSaving } from "./saving.js";
+import { press } from "./keys.js";
 import { offerSources } from "./sources.js";
 import { Page } from "./page.js";
 import { playWelcome } from "./welcome.js";
@@ -22,7 +23,11 @@ offerSources(
 offerSaving(page);
 playWelcome();
 
-get("draw").addEventListener("click", () => page.editing.drawing.arm(!page.editing.drawing.isArmed));
+get("draw").addEventListener("click", () => {
+  page.editing.drawing.arm(!page.editing.drawing.isArmed);
+  // There arrows move the box.
+  if (page.editing.drawing.isArmed) get("picture").focus({ preventScroll: true });
+});
 get("pause").addEventListener("click", () => page.pause(page.state !== "paused"));
 get("add").addEventListener("click", () => page.editing.toggleAdding());
 get("backwards").addEventListener("click", () => page.editing.trackBack());
@@ -38,25 +43,12 @@ function step(by) {
 }
 get("back").addEventListener("click", () => step(-1));
 get("forward").addEventListener("click", () => step(1));
-addEventListener("keydown", (event) => {
-  const { target, key } = event;
-  if (key === "Escape") page.editing.cancel();
-  const isTyping = target instanceof HTMLInputElement && target.type !== "radio" && target.type !== "checkbox";
-  if (key === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey && !isTyping) {
-    event.preventDefault();
-    page.editing.undo();
-  }
-  const isTaken = target instanceof HTMLElement && target.closest("input, button, a, #picture, #timeline, summary");
-  const isSpace = key === " ";
-  if (!page.run || (isTaken && !(isSpace && target.id === "timeline"))) return;
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  if (isSpace && page.hasRows) {
-    event.preventDefault();
-    button("pause").click();
-  } else if (key === "d" || key === "ArrowLeft") step(-1);
-  else if (key === "f" || key === "ArrowRight") step(1);
+addEventListener("keydown", (event) => press(event, page, step));
+// Space is for the page again after a button was clicked; one that was reached by Tab keeps it.
+addEventListener("click", ({ target, detail }) => {
+  const clicked = detail > 0 && target instanceof Element ? target.closest("button") : undefined;
+  if (clicked && clicked === document.activeElement) clicked.blur();
 });
-get("timeline").addEventListener("keydown", ({ key }) => (key === "d" ? step(-1) : key === "f" && step(1)));
 
 input("see").addEventListener("change", () => {
   if (page.run) page.run.sees = page.seen.isOn;

@@ -227,6 +227,42 @@ def keyboard_alone(checks):
     page.context.close()
 
 
+def shortcuts(checks):
+    """They work after a box was drawn and after buttons were clicked; not where one writes, and Tab keeps Space."""
+    page = checks.page(where="here", viewport={"width": 1000, "height": 500})
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    scrolled = page.evaluate("scrollY")
+    page.keyboard.press("Space")
+    page.locator("body[data-state=paused]").wait_for()
+    assert page.evaluate("scrollY") == scrolled
+    page.wait_for_timeout(300)
+    last = int(page.locator("#timeline").get_attribute("aria-valuenow"))
+    page.locator("#back").click()
+    at = lambda frame: page.locator(f"#timeline[aria-valuenow='{frame}']").wait_for()
+    at(last - 1)
+    for key, by in (("d", 2), ("ArrowLeft", 3), ("f", 2), ("ArrowRight", 1)):
+        page.keyboard.press(key)
+        at(last - by)
+    page.locator("#picture").focus()
+    for key, by in (("ArrowLeft", 2), ("d", 3), ("ArrowRight", 2)):
+        page.keyboard.press(key)
+        at(last - by)
+    page.locator("#list input[type=text]").fill("")
+    page.keyboard.type("a d f")
+    assert page.locator("#list input[type=text]").input_value() == "a d f"
+    at(last - 2)
+    page.locator("#timeline").focus()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Space")
+    at(last - 3)
+    page.locator("#back").evaluate("button => button.blur()")
+    page.keyboard.press("Space")
+    page.locator("body[data-state=following]").wait_for()
+    page.context.close()
+
+
 @contextlib.contextmanager
 def camera_of_the_clip(checks):
     """A browser whose camera shows the sample clip."""
@@ -359,6 +395,7 @@ ALL = [
     broken_line,
     phone_by_touch,
     keyboard_alone,
+    shortcuts,
     camera,
     page_of_another_origin,
     camera_refused,

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 69] = [
+const FILES: [File; 70] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -72,6 +72,7 @@ const FILES: [File; 69] = [
     file!("indexer.js", SCRIPT),
     file!("keeping.js", SCRIPT),
     file!("kept.js", SCRIPT),
+    file!("keys.js", SCRIPT),
     file!("list.js", SCRIPT),
     file!("matroska.js", SCRIPT),
     file!("message.js", SCRIPT),

@@ -1,0 +1,34 @@
+// Shortcuts. They work wherever the focus is, but where one writes, and where a control takes the key itself.
+
+import { button } from "./dom.js";
+
+/** @typedef {import("./page.js").Page} Page */
+
+/** What takes keys of its own. */
+const TEXT = "input:not([type=radio], [type=checkbox], [type=range])";
+const ARROWS = "input, pre";
+const SPACE = "input, button, a, summary";
+
+/**
+ * @param {KeyboardEvent} event
+ * @param {Page} page
+ * @param {(by: number) => void} step Shows the frame before or after.
+ */
+export function press(event, page, step) {
+  const { target, key, defaultPrevented } = event;
+  const isIn = (/** @type {string} */ controls) => target instanceof Element && target.closest(controls) !== null;
+  // While a box is moved, the keys are its own.
+  if (!page.run || defaultPrevented || isIn(TEXT) || page.editing.drawing.box) return;
+  if (key === "Escape") return page.editing.cancel();
+  const isUndoing = key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey && !event.altKey;
+  const isChord = event.ctrlKey || event.metaKey || event.altKey;
+  const isSpace = key === " " && page.hasRows && !isIn(SPACE);
+  const isArrow = key.startsWith("Arrow") && !isIn(ARROWS);
+  if (isUndoing) page.editing.undo();
+  else if (isChord) return;
+  else if (isSpace) button("pause").click();
+  else if (key === "d" || (isArrow && key === "ArrowLeft")) step(-1);
+  else if (key === "f" || (isArrow && key === "ArrowRight")) step(1);
+  else return;
+  event.preventDefault();
+}
