@@ -179,8 +179,8 @@ mod tests {
 
     const LONG: Duration = Duration::from_secs(60);
 
-    /// A call that waited behind one that hung was written later, though its client had been told that it does not count;
-    /// and the store was called ready all the while.
+    /// A call that waited behind one that hung was written later, though its client had been told that it does not
+    /// count; and the store was called ready all the while.
     #[tokio::test(flavor = "multi_thread")]
     async fn a_call_that_was_told_to_have_no_answer_is_not_done_later() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,8 +1,7 @@
 //! The database in its folder: opened, written in transactions, repaired, swept, and given back to the disk.
 
 use super::row::Row;
-use super::rules::CLOCK;
-use super::time::Noted;
+use super::time::{CLOCK, Noted};
 use fjall::{
     Keyspace, KeyspaceCreateOptions, PersistMode, Readable, SingleWriterTxDatabase,
     SingleWriterTxKeyspace, SingleWriterWriteTx,

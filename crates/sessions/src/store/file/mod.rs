@@ -14,8 +14,8 @@
 //! - The disk is full, or writing fails otherwise. The calls are answered
 //!   [`StoreUnavailable`](super::session_store::StoreUnavailable), nothing of them counts, and the database is opened
 //!   again until it takes writes.
-//! - The disk hangs. A call has no answer when its time is over: it is not done later unless it is being written just then,
-//!   and the store is not ready until a write succeeds.
+//! - The disk hangs. A call has no answer when its time is over: it is not done later unless it is being written just
+//!   then, and the store is not ready until a write succeeds.
 //! - Nobody ends a session. Rows whose time is over are swept, and their space is given back.
 //! - The wall clock is set. [What is in the folder](time) expires by the monotonic one.
 //! - Two processes have the same folder. The second is refused: the database locks it.

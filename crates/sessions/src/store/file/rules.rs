@@ -10,8 +10,6 @@ use uuid::Uuid;
 
 /// The note of the store's secret.
 const SECRET: &str = "secret";
-/// The note of the folder's time.
-pub(super) const CLOCK: &str = "clock";
 /// The moment at which a note is over.
 const NEVER: u64 = u64::MAX;
 

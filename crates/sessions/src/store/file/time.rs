@@ -1,12 +1,14 @@
 //! The time by which what is in a folder expires.
 //!
-//! It passes as the monotonic clock does, so that no session ends because the wall clock is set: as that of a small board
-//! without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that after a
-//! restart it goes on by the wall clock, and the time between counts.
+//! It passes as the monotonic clock does, so that no session ends because the wall clock is set: as that of a small
+//! board without a battery is, soon after its start. The folder has how far the wall clock is ahead of it, so that after
+//! a restart it goes on by the wall clock, and the time between counts.
 
 use crate::clock::Clock;
 use std::time::{Duration, SystemTime};
 
+/// The name of the note of it.
+pub(super) const CLOCK: &str = "clock";
 /// Where the wall clock goes away from the monotonic one by so much, it was set, or the machine was suspended.
 const SET_MS: i64 = 1000;
 /// The time is noted so often at least.
