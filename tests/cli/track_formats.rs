@@ -292,3 +292,34 @@ fn labels_of_yolo_go_to_a_new_folder() {
         "{line}"
     );
 }
+
+#[test]
+fn targets_of_one_name_are_one_class() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    let flags = [
+        "track",
+        text(&dir),
+        ONE,
+        OTHER,
+        "--name",
+        "a",
+        "--name",
+        "a",
+    ];
+    let out = parent.path().join("labels");
+    succeeds(&[&flags[..], &["--format", "yolo", "-o", text(&out)]].concat());
+    let about = fs::read_to_string(out.join("data.yaml")).expect("it was written");
+    assert!(about.ends_with("names:\n  0: \"a\"\n"), "{about}");
+    let first = fs::read_to_string(out.join("labels/train/0001.txt")).expect("it was written");
+    assert!(first.lines().all(|line| line.starts_with("0 ")), "{first}");
+    let coco = succeeds(&[&flags[..], &["--format", "coco"]].concat());
+    let coco: Value = serde_json::from_str(&coco).expect("it is JSON");
+    assert_eq!(coco["categories"].as_array().map(Vec::len), Some(1));
+    let notes = coco["annotations"].as_array().expect("there are boxes");
+    assert!(notes.iter().all(|note| note["category_id"] == 1));
+    assert!(notes.iter().any(|note| note["track_id"] == 2));
+    let cvat = succeeds(&[&flags[..], &["--format", "cvat"]].concat());
+    assert_eq!(cvat.matches("<label>").count(), 1, "{cvat}");
+    assert_eq!(cvat.matches("label=\"a\"").count(), 2, "{cvat}");
+}

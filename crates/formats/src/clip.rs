@@ -34,6 +34,17 @@ impl Clip {
         })
     }
 
+    /// The classes of the targets, in the order of the targets: those of one name are one.
+    pub fn classes(&self) -> Vec<&str> {
+        let mut classes: Vec<&str> = Vec::new();
+        for name in &self.names {
+            if !classes.contains(&name.as_str()) {
+                classes.push(name);
+            }
+        }
+        classes
+    }
+
     /// How many frames the rows reach over, from the first of the video.
     pub fn length(rows: &[Row]) -> u64 {
         rows.iter().map(|row| row.frame + 1).max().unwrap_or(0)

@@ -6,13 +6,13 @@ use super::row::Row;
 use serde::Serialize;
 
 #[derive(Serialize)]
-struct Document {
+struct Document<'a> {
     info: Info,
     licenses: [(); 0],
     videos: [Video; 1],
     images: Vec<Image>,
     annotations: Vec<Annotation>,
-    categories: Vec<Category>,
+    categories: Vec<Category<'a>>,
 }
 
 #[derive(Serialize)]
@@ -51,9 +51,9 @@ struct Annotation {
 }
 
 #[derive(Serialize)]
-struct Category {
+struct Category<'a> {
     id: usize,
-    name: String,
+    name: &'a str,
     supercategory: &'static str,
 }
 
@@ -62,13 +62,22 @@ const VIDEO: u32 = 1;
 
 /// The document of rows in the order of frames.
 pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
-    let seen = rows.iter().filter_map(|row| Some((row, clip.inside(row)?)));
-    let annotations = seen.enumerate().map(|(at, (row, area))| {
+    let classes = clip.classes();
+    let class_of = |target: usize| {
+        classes
+            .iter()
+            .position(|class| *class == clip.names[target])
+    };
+    let seen = rows.iter().filter_map(|row| {
+        let area = clip.inside(row)?;
+        Some((row, area, class_of(row.target)?))
+    });
+    let annotations = seen.enumerate().map(|(at, (row, area, class))| {
         let bbox = [area.x, area.y, area.width, area.height].map(hundredths);
         Annotation {
             id: at + 1,
             image_id: row.frame + 1,
-            category_id: row.target + 1,
+            category_id: class + 1,
             track_id: row.target + 1,
             video_id: VIDEO,
             bbox,
@@ -78,15 +87,11 @@ pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
             score: row.estimate.score,
         }
     });
-    let categories = clip
-        .names
-        .iter()
-        .enumerate()
-        .map(|(target, name)| Category {
-            id: target + 1,
-            name: name.clone(),
-            supercategory: "",
-        });
+    let categories = classes.iter().enumerate().map(|(class, name)| Category {
+        id: class + 1,
+        name,
+        supercategory: "",
+    });
     super::pretty(&Document {
         info: Info {
             description: format!("bagtrack: {}", clip.name),

@@ -9,7 +9,7 @@ use bagtrack_tracker::Status;
 pub fn document(clip: &Clip, rows: &[Row]) -> String {
     let size = Clip::length(rows);
     let (width, height) = clip.size;
-    let labels = clip.names.iter().map(|name| {
+    let labels = clip.classes().into_iter().map(|name| {
         format!(
             "<label><name>{}</name><attributes></attributes></label>",
             escaped(name)

@@ -10,9 +10,10 @@ use std::path::Path;
 /// The texts of rows in the order of frames.
 pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
     let mut about = "path: .\ntrain: images/train\nnames:\n".to_owned();
-    for (target, name) in clip.names.iter().enumerate() {
+    let classes = clip.classes();
+    for (class, name) in classes.iter().enumerate() {
         // A text of JSON is one of YAML.
-        about += &format!("  {target}: {}\n", serde_json::to_string(name)?);
+        about += &format!("  {class}: {}\n", serde_json::to_string(name)?);
     }
     let of_frames = rows.chunk_by(|one, other| one.frame == other.frame);
     let labels = of_frames.map(|of_frame| {
@@ -20,7 +21,10 @@ pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
         let name = Path::new(&picture).with_extension("txt");
         TextFile {
             path: format!("labels/train/{}", name.display()),
-            text: of_frame.iter().filter_map(|row| line(clip, row)).collect(),
+            text: of_frame
+                .iter()
+                .filter_map(|row| line(clip, &classes, row))
+                .collect(),
         }
     });
     let about = TextFile {
@@ -30,15 +34,15 @@ pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
     Ok(std::iter::once(about).chain(labels).collect())
 }
 
-/// The line of a target, which is a class of its own.
-fn line(clip: &Clip, row: &Row) -> Option<String> {
+/// The line of a target, whose class is its name.
+fn line(clip: &Clip, classes: &[&str], row: &Row) -> Option<String> {
     let area = clip.inside(row)?;
+    let class = classes
+        .iter()
+        .position(|class| *class == clip.names[row.target])?;
     let (width, height) = (f64::from(clip.size.0), f64::from(clip.size.1));
     let x = (area.x + area.width / 2.0) / width;
     let y = (area.y + area.height / 2.0) / height;
     let (width, height) = (area.width / width, area.height / height);
-    Some(format!(
-        "{} {x:.6} {y:.6} {width:.6} {height:.6}\n",
-        row.target
-    ))
+    Some(format!("{class} {x:.6} {y:.6} {width:.6} {height:.6}\n"))
 }
