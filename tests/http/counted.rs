@@ -9,7 +9,6 @@ use crate::stream_client::StreamClient;
 use bagtrack_testing::within::within;
 use reqwest::{Method, StatusCode};
 use serde_json::Value;
-use std::time::Duration;
 
 #[tokio::test]
 async fn lines_and_messages_count_as_sent() {

@@ -31,8 +31,7 @@ pub async fn readiness(app: &TestApplication, status: StatusCode) -> Response {
             }
         }
     };
-    let answer = tokio::time::timeout(Duration::from_secs(60), answer);
-    answer.await.expect("readiness changes")
+    within(answer, "readiness changes").await
 }
 
 /// The value of the only line that begins with `name` and has all these labels.

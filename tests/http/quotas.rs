@@ -9,7 +9,7 @@ use bagtrack_testing::within::within;
 use reqwest::{Method, Response, StatusCode};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tokio::task::JoinSet;
 
 fn behind_a_proxy(config: &mut Config) {

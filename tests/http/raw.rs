@@ -62,7 +62,7 @@ impl RawConnection {
                 return text.into_owned();
             }
             let read = self.stream.read_buf(&mut bytes);
-            let read = timeout(PATIENCE, read).await.expect("answers come");
+            let read = within(read, "answers come").await;
             assert_ne!(read.unwrap(), 0, "it ended early: {bytes:?}");
         }
     }

@@ -1,7 +1,8 @@
 //! Requests with an idempotency key, at replicas with one store.
 
+use crate::common::FIRST;
 use crate::memory::MemoryStore;
-use crate::pictures::{FIRST, params, picture};
+use crate::pictures::{params, picture};
 use crate::redis::Redis;
 use crate::world::{LONG, NoQuota, service};
 use bagtrack_sessions::{
