@@ -218,7 +218,7 @@ async fn stalled_bodies_of_a_page_leave_memory_to_the_other_sessions_of_its_key(
     // The key has a quarter, and the page no more than it leaves of that.
     assert_eq!(held.len(), 1);
     let mut picture = pictures::png(1);
-    picture.resize(HELD, 0);
+    picture.resize(HELD / 2, 0);
     let answer = app.post_frame(&sessions[1], picture).await;
     expect(answer, StatusCode::OK).await;
 }
