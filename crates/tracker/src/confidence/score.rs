@@ -79,7 +79,7 @@ pub struct ScoreModel {
 
 impl ScoreModel {
     /// The model that the tracker uses. Set by hand near a logistic regression on annotated videos, with more weight on
-    /// the discriminant than the regression gives it. `bagtrack eval DIR... --fit-score` prints the regression, and how
+    /// the discriminant than the regression gives it. `tools/fit_score.py` prints the regression, and how
     /// both order the frames and hold as chances.
     pub const TRACKER: Self = Self {
         intercept: 4.4,
