@@ -5,6 +5,7 @@
 //! What can go wrong: a client changes its address to count as new. IPv6 addresses count by their network, and the
 //! table of clients is bounded.
 
+pub mod account;
 pub mod client;
 pub mod clients;
 pub mod holdings;

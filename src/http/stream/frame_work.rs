@@ -5,7 +5,7 @@ use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::clients::Account;
+use crate::http::quotas::account::Account;
 use crate::http::state::AppState;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
