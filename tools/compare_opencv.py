@@ -31,6 +31,8 @@ import subprocess
 import sys
 import time
 
+from plot_curves import center_error, overlap
+
 try:
     import cv2
 except ImportError:
@@ -100,17 +102,6 @@ def load(folder):
         if frame is None:
             sys.exit(f"compare_opencv: {path} cannot be decoded")
     return frames, boxes
-
-
-def center_error(a, b):
-    return math.hypot(a[0] + a[2] / 2 - b[0] - b[2] / 2, a[1] + a[3] / 2 - b[1] - b[3] / 2)
-
-
-def overlap(a, b):
-    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    shared = max(0.0, width) * max(0.0, height)
-    return shared / (a[2] * a[3] + b[2] * b[3] - shared)
 
 
 def updates(name, frames, boxes, nano=None):

@@ -33,7 +33,7 @@ export function offerSaving(page) {
 export function prepareSaving() {
   restore();
   button("hand-over").disabled = false;
-  Promise.all([modules(), import("./again.js")]).catch(() => undefined);
+  modules().catch(() => undefined);
 }
 
 /** Lets the video be saved. */

@@ -165,6 +165,14 @@ PASTED = """(input) => {
 }"""
 
 
+def saved_project(checks, page, name):
+    """Saves the project as a file of this name, and leaves the page."""
+    path = checks.files.folder / f"{name}.bagtrack.json"
+    path.write_bytes(saved(page, "#save-project"))
+    page.context.close()
+    return path
+
+
 def project_opened_again(checks):
     """A project is opened without its video, then with it, and corrected in an earlier frame."""
     path = checks.files.file("clip.mp4", 30, H264)
@@ -173,9 +181,7 @@ def project_opened_again(checks):
     drag(page, sent_box(checks.files.truth[0]))
     to_the_end(page)
     before = rows(page)
-    project = checks.files.folder / "work.bagtrack.json"
-    project.write_bytes(saved(page, "#save-project"))
-    page.context.close()
+    project = saved_project(checks, page, "work")
 
     page = checks.page(where="here")
     page.locator("#file").set_input_files(project)
@@ -213,9 +219,7 @@ def half_tracked_project(checks):
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 20)
     page.locator("#pause").click()
-    project = checks.files.folder / "half.bagtrack.json"
-    project.write_bytes(saved(page, "#save-project"))
-    page.context.close()
+    project = saved_project(checks, page, "half")
 
     renamed = checks.files.folder / "clip (1).mp4"
     renamed.write_bytes(path.read_bytes())
@@ -291,9 +295,7 @@ def project_without_its_video(checks):
     frames(page, 30)
     page.locator("#stop").click()
     before = kept_rows(page)
-    project = checks.files.folder / "alone.bagtrack.json"
-    project.write_bytes(saved(page, "#save-project"))
-    page.context.close()
+    project = saved_project(checks, page, "alone")
 
     page = checks.page(where="here")
     page.locator("#file").set_input_files(project)

@@ -6,9 +6,8 @@
 //!
 //! What can go wrong: a token is signed with a key that the service may know but the issuer did not mean (only public
 //! keys count, and each with its own algorithms); the issuer changes its keys (they are read again when none of
-//! them has signed a token, and every ten minutes); it is out of reach (the keys before stay, and
-//! only tokens of others wait); somebody invents tokens to
-//! have them read again and again (not twice in half a minute).
+//! them has signed a token, and every ten minutes); it is out of reach (the keys before stay, and only tokens of others
+//! wait); somebody invents tokens to have them read again and again (not twice in half a minute).
 
 mod key_set;
 mod key_source;

@@ -1,18 +1,16 @@
 //! Requests with an idempotency key, at replicas with one store.
 
-use crate::common::FIRST;
+use crate::common::{FIRST, FLOW};
 use crate::memory::MemoryStore;
 use crate::pictures::{params, picture};
 use crate::redis::Redis;
-use crate::world::{LONG, NoQuota, service};
+use crate::world::{LONG, request, service};
 use bagtrack_sessions::{
-    Boxes, Clock, CreationKey, Durability, FileStore, Flow, OpenError, OpenRequest, Opened, Owner,
+    Boxes, Clock, CreationKey, Durability, FileStore, OpenError, OpenRequest, Opened, Owner,
     SessionService, SessionStore, Start,
 };
 use std::sync::Arc;
 use std::time::Duration;
-
-const FLOW: Flow = Flow(0);
 
 /// Asks for a session under a key, with this file as its first frame.
 async fn ask(
@@ -21,17 +19,16 @@ async fn ask(
     key: &str,
     file: Vec<u8>,
 ) -> Result<Opened, OpenError> {
+    let key = CreationKey::Key(owner.clone(), key.to_owned());
+    let digest = u8::try_from(file.len() % 251).unwrap();
+    let start = Start::Frame {
+        file: file.into(),
+        boxes: Boxes::One(FIRST),
+        params: Box::new(params(1)),
+    };
     let request = OpenRequest {
-        key: Some(CreationKey::Key(owner.clone(), key.to_owned())),
         owner: owner.clone(),
-        digest: [u8::try_from(file.len() % 251).unwrap(); 32],
-        start: Start::Frame {
-            file: file.into(),
-            boxes: Boxes::One(FIRST),
-            params: Box::new(params(1)),
-        },
-        quota: Arc::new(NoQuota),
-        queue: service.admission.enter(FLOW, Box::new(())).unwrap(),
+        ..request(service, Some(key), digest, start)
     };
     service.open(request).await
 }

@@ -174,7 +174,7 @@ impl SessionStore for FileStore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock::{now, sleep};
+    use crate::clock::timeout;
     use crate::store::record::tests::record;
 
     const LONG: Duration = Duration::from_secs(60);
@@ -205,12 +205,15 @@ mod tests {
         assert!(hangs.is_err() && late.is_err());
         assert!(!store.is_ready());
         release.send(()).unwrap();
-        let waits = now();
         // Without any call.
-        while !store.is_ready() && waits.elapsed() < LONG {
-            sleep(Duration::from_millis(5)).await;
-        }
-        assert!(store.is_ready());
+        let ready = async {
+            while !store.is_ready() {
+                tokio::task::yield_now().await;
+            }
+        };
+        timeout(LONG, ready)
+            .await
+            .expect("the store is ready again");
         drop(store);
         assert_eq!(open(LONG).load(id).await.unwrap(), None);
     }
