@@ -31,8 +31,11 @@ for format in json mot.txt coco.json yolo cvat.xml label-studio.json; do
 done
 
 if command -v node >/dev/null && [ "$(node -p 'parseInt(process.versions.node)')" -ge 20 ]; then
-    node tools/exports/page.mjs "$folder/command/rows.json" "$folder/page" whole
-    node tools/exports/page.mjs "$folder/part/rows.json" "$folder/page-part" part
+    # The page finds the JavaScript client in a folder of its own.
+    cp -r web "$folder/web"
+    cp -r clients/js "$folder/web/js"
+    node tools/exports/page.mjs "$folder/web" "$folder/command/rows.json" "$folder/page" whole
+    node tools/exports/page.mjs "$folder/web" "$folder/part/rows.json" "$folder/page-part" part
 else
     echo "Left out, for want of Node.js from 20 on: what the page writes"
     rm -r "$folder/page" "$folder/page-part"

@@ -1,12 +1,14 @@
-// Writes rows in all formats of the page, with the page's own module: node page.mjs ROWS.json FOLDER whole|part
+// Writes rows in all formats of the page, with the page's own module: node page.mjs PAGE ROWS.json FOLDER whole|part
 //
+// PAGE is a folder with the page's files as they are served, the JavaScript client in its folder js among them.
 // ROWS.json is what `bagtrack track --format json` writes of two targets in clip.mp4.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { FORMATS } from "../../web/save.js";
+import { pathToFileURL } from "node:url";
 
-const [, , table, folder, extent] = process.argv;
+const [, , page, table, folder, extent] = process.argv;
+const { FORMATS } = await import(pathToFileURL(join(page, "save.js")).href);
 const told = readFileSync(table, "utf8").trim().split("\n").map((line) => JSON.parse(line));
 const names = ['a <thing> & "more"', "Object 2"];
 const objects = names.map((name, number) => {
