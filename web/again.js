@@ -134,3 +134,22 @@ export async function catchUp(run, objects) {
     }
   }
 }
+
+/**
+ * Goes on after the last frame, once what is under way is answered.
+ * @param {Run} run
+ * @param {import("./source.js").Source} source That of the run, or another one of the same frames.
+ */
+export async function goOn(run, source) {
+  if (source !== run.source) {
+    run.passedOver += run.source.skipped;
+    run.source.close?.();
+    run.source = run.frames.source = source;
+  }
+  await run.alone(async () => {
+    run.isResting = false;
+    await catchUp(run, run.objects);
+    await source.goTo?.(run.picture.time, run.picture.frame);
+  });
+  if (!run.isOver && !run.isResting) run.play();
+}

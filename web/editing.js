@@ -65,6 +65,7 @@ export class Editing {
   startDrawing() {
     const { run } = this.page;
     if (!run || run.isOver || run.isRedoing || this.page.state === "opening" || this.wantsVideo(run)) return false;
+    this.page.player.stop();
     if (this.page.hasRows) run.pause(true);
     else if (run.source.isLive) {
       const frozen = (this.page.frozen = run.source.first());
@@ -126,6 +127,7 @@ export class Editing {
    */
   async tracksAgain(run, object, track) {
     const before = this.undoing.before(run, object);
+    this.page.player.stop();
     const { signal } = (this.cancelling = new AbortController());
     get("cancel").hidden = false;
     try {
@@ -213,7 +215,7 @@ export class Editing {
         if (!run) return;
         run.remove(object);
         if (object === seen.shown || !run.chosen) seen.reset();
-        seen.figures(run, run.chosen?.rows.get(run.lastFrame));
+        seen.figures(run);
         this.page.isUnsaved = true;
         this.page.repaint();
         this.page.changed();

@@ -5,6 +5,9 @@
 /** Most bytes of pictures. */
 const MOST_BYTES = 512 << 20;
 
+/** Answers that the rate is taken over. */
+const RATE_OVER = 30;
+
 export class Frames {
   /** @param {import("./source.js").Source} source */
   constructor(source) {
@@ -67,6 +70,30 @@ export class Frames {
     const time = this.times.get(frame);
     if (frame < 1 || !source.at || !source.rate || time === undefined) return undefined;
     return source.at(frame - 1, Math.max(0, time - 1 / source.rate));
+  }
+}
+
+/** How fast frames are answered. */
+export class Pace {
+  constructor() {
+    /** @type {number[]} */
+    this.times = [];
+    /** Milliseconds from sending the last one to its answer. */
+    this.trip = 0;
+  }
+
+  /** @param {number} sent When. */
+  answered(sent) {
+    const now = performance.now();
+    this.trip = now - sent;
+    this.times = [...this.times, now].slice(-RATE_OVER);
+  }
+
+  /** Frames a second, of the last answers. */
+  get rate() {
+    const { times } = this;
+    if (times.length < 2) return 0;
+    return ((times.length - 1) * 1000) / (times[times.length - 1] - times[0]);
   }
 }
 

@@ -16,8 +16,9 @@ import { openFiles } from "./sources.js";
 /** Milliseconds after a change until it is kept. */
 const AFTER = 1000;
 const CLIPS = ["card", "leaves"];
-/** The first screen does not need it. */
+/** The first screen does not need these. */
 const projects = () => import("./project.js");
+const openClip = async (/** @type {string} */ name) => (await import("./clip.js")).openClip(name);
 /** What the tab has open, also after it was loaded anew. */
 const OWN = "work";
 
@@ -59,7 +60,7 @@ export class Keeping {
       if (run.objects.length === 0) return await this.keepNothing();
       const project = (await projects()).projectOf(run);
       if (this.source !== run.source) await this.keepSource(id, run.source);
-      const clip = CLIPS.find((name) => name === run.source.name && !run.source.files);
+      const clip = clipOf(run.source);
       const isWhole = !!clip || this.hasFiles || run.source.isAbsent === true;
       const { isLocal, source: { imageNames } } = run;
       await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames });
@@ -90,6 +91,21 @@ export class Keeping {
     this.hasFiles = files.length > 0 && bytes <= MOST_BYTES;
     await keepFiles(id, this.hasFiles ? files : []);
     this.source = source;
+  }
+
+  /** A run that is about to be stopped can go on later, where its source can be opened again. */
+  letGoOn() {
+    const { run } = this.page;
+    if (!run || run.wake || !run.source.goTo) return;
+    const { files = [], name, imageNames } = run.source;
+    const clip = clipOf(run.source);
+    if (!clip && files.length === 0) return;
+    run.wake = () =>
+      wake(run, async () => {
+        const source = await (clip ? openClip(clip) : openFiles(files, imageNames));
+        await source.first();
+        return Object.assign(source, { name });
+      });
   }
 
   /** @param {string} text Of what is here; empty where nothing is kept of it. */
@@ -188,7 +204,7 @@ export class Keeping {
     const files = (await keptFiles(id).catch(() => undefined)) ?? [];
     const open = async () => {
       input(isLocal ? "here" : "there").checked = true;
-      if (clip) return (await import("./clip.js")).openClip(clip);
+      if (clip) return openClip(clip);
       if (files.length === 0) return (await projects()).withoutVideo(project);
       // Files that were kept have lost their folder.
       return Object.assign(await openFiles(files, imageNames), { name: project.video.name, imageNames });
@@ -265,12 +281,12 @@ export class Keeping {
     run.isResting = true;
     const { source } = run;
     // Also where the video is not at hand: it may be chosen later.
-    if (!project.ended) run.wake = () => wake(run);
+    if (!project.ended) run.wake = () => wake(run, async () => source);
     const canGoOn = run.wake && source.goTo;
     if (run !== this.page.run) return true;
     this.page.enter(canGoOn ? "paused" : "ended");
     this.page.again = undefined;
-    this.page.seen.figures(run, undefined);
+    this.page.seen.figures(run);
     this.page.repaint();
     const wanted = source.isLive ? " Pictures of the camera are not kept." : ` Choose ${source.name} to see its pictures.`;
     this.page.say(`${source.name} is here again, with ${run.tracked} frames.${source.isAbsent ? wanted : ""}${left}`);
@@ -285,15 +301,29 @@ function told({ video, objects }) {
   return `${video.name}, ${objects.length} ${objects.length === 1 ? "object" : "objects"}, ${rows} rows`;
 }
 
+/** The sample that a source is.
+ * @param {Source} source */
+const clipOf = ({ name, files }) => CLIPS.find((clip) => clip === name && !files);
+
 /** The last state of each object.
  * @param {Run} run */
 const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
 
 /** Goes on with the frames after the last one.
- * @param {Run} run */
-async function wake(run) {
+ * @param {Run} run
+ * @param {() => Promise<Source>} open */
+async function wake(run, open) {
+  const own = run.wake;
   run.wake = undefined;
-  await (await again()).catchUp(run, run.objects);
-  await run.source.goTo?.(run.picture.time, run.picture.frame);
-  if (!run.isOver) run.play();
+  try {
+    const source = await open();
+    // It was stopped again meanwhile.
+    if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
+    await (await again()).goOn(run, source);
+  } catch (error) {
+    // It can be tried again.
+    run.wake = own;
+    run.isResting = true;
+    throw error;
+  }
 }

@@ -28,12 +28,16 @@ get("draw").addEventListener("click", () => {
   // There arrows move the box.
   if (page.editing.drawing.isArmed) get("picture").focus({ preventScroll: true });
 });
-get("pause").addEventListener("click", () => page.pause(page.state !== "paused"));
+get("pause").addEventListener("click", () => page.player.press());
+get("resume").addEventListener("click", () => page.player.goOn());
 get("add").addEventListener("click", () => page.editing.toggleAdding());
 get("backwards").addEventListener("click", () => page.editing.trackBack());
 get("undo").addEventListener("click", () => page.editing.undo());
 get("cancel").addEventListener("click", () => page.editing.cancel());
-get("stop").addEventListener("click", () => page.end("Stopped. Save the results, or choose another video."));
+get("stop").addEventListener("click", () => {
+  keeping.letGoOn();
+  page.end(page.canGoOn ? "Stopped. Save the results, or go on." : "Stopped. Save the results, or choose another video.");
+});
 
 /** Goes to the frame before or after the one that is shown.
  * @param {number} by */

@@ -6,6 +6,7 @@ import { button, canvas, get, input } from "./dom.js";
 import { DRAW, Editing, TAP, again } from "./editing.js";
 import { Client, LocalClient, Problem } from "./js/bagtrack.js";
 import { FOLLOWING, Message } from "./message.js";
+import { Player } from "./player.js";
 import { UnplayableError, words } from "./problems.js";
 import { prepareSaving } from "./saving.js";
 import { Seen } from "./seen.js";
@@ -36,6 +37,7 @@ export class Page {
     this.seen = new Seen();
     this.editing = new Editing(this);
     this.beginning = new Beginning(this);
+    this.player = new Player(this);
     /** @type {Run | undefined} */
     this.run = undefined;
     /** @type {Picture | undefined} An earlier frame that is shown. */
@@ -70,6 +72,11 @@ export class Page {
     return this.state === "following" || this.state === "paused" || this.state === "ended";
   }
 
+  /** Whether frames after the last one can be tracked, though it was stopped. */
+  get canGoOn() {
+    return this.run?.wake !== undefined && this.run.source.goTo !== undefined;
+  }
+
   /** The frame that is shown.
    * @returns {Picture | undefined} */
   get shown() {
@@ -90,7 +97,8 @@ export class Page {
     }
     get("begin").hidden = state !== "first" || !this.run?.source.goTo;
     get("hand-over").hidden = !this.run?.isLocal;
-    button("pause").textContent = state === "paused" ? "Go on" : "Pause";
+    button("pause").textContent = { paused: "Go on", ended: "Play" }[String(state)] ?? "Pause";
+    get("resume").hidden = state !== "ended" || !this.canGoOn;
     sources.open = state === "start";
   }
 
@@ -107,7 +115,10 @@ export class Page {
       get("key").focus();
     }
     this.say(words(error, this.hasKey), true);
-    if (this.run?.isOver && this.hasRows) this.enter("ended");
+    const hasEnded = this.run?.isOver || (this.run?.isResting && !this.run.wake);
+    if (!hasEnded || !this.hasRows) return;
+    this.enter("ended");
+    this.changed();
   }
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.
@@ -213,6 +224,7 @@ export class Page {
     this.timeline.show([...(run.chosen?.rows.values() ?? [])], run.lastFrame, shown.frame, wholeLength(run));
     this.editing.list.show(run.objects, run.chosen);
     this.editing.show();
+    this.seen.score(run.chosen?.rows.get(shown.frame));
     const isKnown = run.chosen?.rows.has(shown.frame) ?? false;
     button("backwards").disabled = !isKnown || shown.frame === 0 || run.isOver;
   }
@@ -230,7 +242,7 @@ export class Page {
     this.particles = answer?.particles;
     // Who looks at an earlier frame goes on doing so.
     if (!this.viewed) this.show(shown, answer?.particles);
-    this.seen.figures(run, answer);
+    this.seen.figures(run);
     this.isUnsaved = run.frames.times.size > 1;
     this.changed();
     if (!answer) return;
@@ -270,7 +282,6 @@ export class Page {
     if (!isPaused) this.leave();
     this.repaint();
     this.run?.pause(isPaused);
-    if (!isPaused) this.run?.wake?.().catch((error) => this.fail(error));
   }
 
   /** Takes no more frames.

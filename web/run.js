@@ -2,7 +2,7 @@
 
 import { rowOf } from "./boxes.js";
 import { WINDOW, followerOf } from "./follower.js";
-import { Frames, close } from "./frames.js";
+import { Frames, Pace, close } from "./frames.js";
 import { LocalClient, Problem } from "./js/bagtrack.js";
 import { FollowedObject } from "./objects.js";
 
@@ -11,10 +11,6 @@ import { FollowedObject } from "./objects.js";
  * @typedef {import("./source.js").Picture} Picture
  * @typedef {import("./js/bagtrack.js").StreamAnswer} Answer
  * @typedef {import("./objects.js").Row} Row
- *
- * @typedef {object} Drawn A box that was drawn, until the frames on their way are answered.
- * @property {Box} box
- * @property {FollowedObject | undefined} object The one that it corrects; nothing for a new one.
  *
  * @typedef {object} Told
  * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
@@ -25,9 +21,6 @@ import { FollowedObject } from "./objects.js";
  * @property {() => void} anew The service had lost a session: another one goes on from the last box.
  * @property {() => void} end The source has no more frames, and all are answered.
  */
-
-/** Answers that the rate is taken over. */
-const RATE_OVER = 30;
 
 export class Run {
   /**
@@ -51,18 +44,19 @@ export class Run {
     this.frames = new Frames(source);
     /** How many frames were tracked. */
     this.tracked = 1;
-    /** @type {number[]} */
-    this.answeredAt = [];
+    this.pace = new Pace();
     this.passedOver = 0;
-    this.trip = 0;
     this.sees = false;
     this.isPaused = false;
     this.isOver = false;
     this.isResting = false;
     this.hasAll = false;
+    /** @type {unknown} What keeps the source from giving more frames. */
+    this.failure = undefined;
     /** @type {{picture: Picture, at: number}[]} Frames without an answer, oldest first. */
     this.underWay = [];
-    /** @type {Drawn | undefined} */
+    /** @type {{box: Box, object: FollowedObject | undefined} | undefined} A box that was drawn, until the frames on their
+     * way are answered: for an object, or for a new one. */
     this.drawn = undefined;
     /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back. */
     this.wake = undefined;
@@ -98,7 +92,12 @@ export class Run {
       this.hasAll = true;
       this.checkEnd();
     };
-    this.source.start((picture) => this.deliver(picture), end).catch((error) => this.fail(error));
+    const { source } = this;
+    source.start((picture) => this.deliver(picture), end).catch((error) => {
+      if (source !== this.source) return;
+      this.failure = error;
+      this.checkEnd();
+    });
   }
 
   /** Follows another object, from the picture that was answered last.
@@ -155,6 +154,8 @@ export class Run {
     try {
       const answers = await Promise.all(objects.map((it) => it.follower.track(picture, { see: see(it) })));
       this.underWay = this.underWay.filter((other) => other !== sent);
+      // It was on its way when the sessions were ended, and comes again where one goes on.
+      if (this.isResting && answers.some((answer) => !answer)) return close(picture);
       if (objects.length > 0 && answers.every((answer) => !answer)) this.skip(picture);
       else this.answered(objects, answers, sent);
     } catch (error) {
@@ -179,9 +180,7 @@ export class Run {
    */
   answered(objects, answers, { picture, at }) {
     if (this.isOver) return;
-    const now = performance.now();
-    this.trip = now - at;
-    this.answeredAt = [...this.answeredAt, now].slice(-RATE_OVER);
+    this.pace.answered(at);
     const before = this.picture;
     this.picture = picture;
     this.tracked += 1;
@@ -205,13 +204,6 @@ export class Run {
    */
   note(object, answer, picture, corrected) {
     object.note(rowOf(answer, picture, this.source.size, corrected));
-  }
-
-  /** Frames a second, of the last answers. */
-  get rate() {
-    const times = this.answeredAt;
-    if (times.length < 2) return 0;
-    return ((times.length - 1) * 1000) / (times[times.length - 1] - times[0]);
   }
 
   /** @param {boolean} isPaused */
@@ -271,7 +263,16 @@ export class Run {
 
   checkEnd() {
     const isBusy = this.underWay.length > 0 || this.drawn || this.isRedoing;
-    if (this.hasAll && !isBusy && !this.isResting) this.told.end();
+    if (isBusy || this.isResting) return;
+    if (this.hasAll) this.told.end();
+    else if (this.failure) this.end(this.failure);
+  }
+
+  /** The source has no more frames that can be had: those before are kept.
+   * @param {unknown} failure */
+  end(failure) {
+    this.rest();
+    this.told.fail(failure);
   }
 
   /** @param {unknown} error */

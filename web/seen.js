@@ -54,25 +54,21 @@ export class Seen {
     get("seen-later").hidden = !this.isOn || this.hasShown;
   }
 
-  /** @param {Run} run
-   * @param {Pick<Answer, "status" | "score"> | undefined} answer Of the chosen object. */
-  figures(run, answer) {
+  /** @param {Run} run */
+  figures(run) {
     const set = (/** @type {string} */ id, /** @type {string} */ text) => (get(id).textContent = text);
     set("frames", String(run.tracked));
-    set("rate", run.rate.toFixed(0));
-    set("trip", `${run.trip.toFixed(0)} ms`);
+    set("rate", run.pace.rate.toFixed(0));
+    set("trip", `${run.pace.trip.toFixed(0)} ms`);
     set("skipped", String(run.skipped));
-    if (!run.chosen) {
-      set("status", "–");
-      set("score", "–");
-      get("figures").className = "";
-      get("figures").style.setProperty("--score", "0");
-    }
-    if (!answer) return;
-    set("status", answer.status);
-    get("figures").className = answer.status;
-    get("figures").style.setProperty("--score", String(answer.score));
-    set("score", answer.score.toFixed(2));
+  }
+
+  /** @param {import("./objects.js").Row | undefined} row Of the chosen object in the frame that is shown. */
+  score(row) {
+    get("status").textContent = row?.status ?? "–";
+    get("score").textContent = row?.score.toFixed(2) ?? "–";
+    get("figures").className = row?.status ?? "";
+    get("figures").style.setProperty("--score", String(row?.score ?? 0));
   }
 
   /**

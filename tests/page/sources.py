@@ -60,6 +60,31 @@ def named_as_in_the_folder(page, added=None):
     assert saved(page, "#save-cvat").decode().count("<label>") == 1
 
 
+def folder_with_a_damaged_image(checks):
+    """All images before one that cannot be read are tracked, and can be corrected."""
+    folder = checks.files.folder / "torn"
+    folder.mkdir(exist_ok=True)
+    for index in range(COUNT):
+        (folder / f"image{index}.jpg").write_bytes(checks.service.bytes(f"/sample/card/{3 * index}.jpg"))
+    (folder / "image15.jpg").write_bytes(b"no image")
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        page.locator("#folder").set_input_files(folder)
+        said(page, DRAW)
+        truth = checks.clips["card"]["truth"][::3]
+        drag(page, truth[0])
+        said(page, "image15.jpg is not an image")
+        table = rows(page)
+        assert [int(row["frame"]) for row in table] == list(range(15))
+        page.locator("#timeline").focus()
+        page.keyboard.press("Home")
+        page.locator("#timeline[aria-valuenow='0']").wait_for()
+        drag(page, truth[0])
+        said(page, "Followed anew from frame 0")
+        assert len(rows(page)) == 15
+        page.context.close()
+
+
 HANDED = """([kind, name, type, content]) => {
     const bytes = Uint8Array.from(atob(content), (sign) => sign.charCodeAt(0));
     const data = new DataTransfer();
@@ -256,6 +281,7 @@ ALL = [
     steps_of_varying_rate,
     size_while_drawing,
     folder_of_images,
+    folder_with_a_damaged_image,
     dropped_and_pasted,
     recorded_in_a_browser,
     begun_in_the_middle,

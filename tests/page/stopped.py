@@ -1,6 +1,10 @@
 """Runs that are stopped, and services that were: what was tracked is shown, corrected, and goes on."""
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, said, to_the_end
+import pathlib
+
+from browser import choose, drag, frames, kept_rows, numbers, rows, said, slow, to_the_end
+from clips import FRAMES, H264
+from files import check_distance, choose_file, sent_box
 from service import Service
 from studio import to_frame, values
 
@@ -54,4 +58,64 @@ def service_with_other_keys(checks):
     service.stop()
 
 
-ALL = [stopped_with_the_service, service_with_other_keys]
+def gone_on_after_a_stop(checks):
+    """A stopped run goes on where it was, of a file and of a clip, also after the page was loaded anew."""
+    for where, name in (("there", "file"), ("here", "card"), ("here", "again")):
+        page = checks.page(where=where)
+        if name == "card":
+            choose(page, "card")
+            drag(page, checks.clips["card"]["truth"][0])
+        else:
+            slow(page)
+            choose_file(page, checks.files.file("clip.mp4", 30, H264))
+            drag(page, sent_box(checks.files.truth[0]))
+        frames(page, 40)
+        page.locator("#stop").click()
+        said(page, "or go on")
+        before = kept_rows(page)
+        if name == "again":
+            page.reload()
+            said(page, "clip.mp4 is here again")
+        page.locator("#pause" if name == "again" else "#resume").click()
+        to_the_end(page)
+        table = rows(page)
+        count = 150 if name == "card" else FRAMES
+        assert [int(row["frame"]) for row in table] == list(range(count)), (where, name)
+        assert values(table[: len(before)]) == values(before), (where, name)
+        if name != "card":
+            check_distance(pathlib.Path("clip.mp4"), table, checks.files.truth)
+        assert page.locator("#resume").is_hidden()
+        page.context.close()
+
+
+def played_again(checks):
+    """Space plays what was tracked, from its beginning, and pauses; figures are those of the frame that is shown."""
+    page = checks.page(where="here")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 60)
+    page.locator("#stop").click()
+    said(page, "Stopped")
+    page.wait_for_timeout(300)
+    table = rows(page)
+    at = lambda: int(page.locator("#timeline").get_attribute("aria-valuenow"))
+    page.keyboard.press("Space")
+    page.wait_for_timeout(1000)
+    page.keyboard.press("Space")
+    page.wait_for_timeout(200)
+    paused = at()
+    assert 3 <= paused < len(table) - 1, paused
+    page.wait_for_timeout(300)
+    assert at() == paused, "it plays on"
+    row = table[paused]
+    assert page.locator("#status").inner_text() == row["status"]
+    assert abs(float(page.locator("#score").inner_text()) - float(row["score"])) <= 0.0051
+    page.keyboard.press("Space")
+    page.locator(f"#timeline[aria-valuenow='{len(table) - 1}']").wait_for()
+    page.locator("#pause", has_text="Play").wait_for()
+    to_frame(page, 10)
+    assert abs(float(page.locator("#score").inner_text()) - float(table[10]["score"])) <= 0.0051
+    page.context.close()
+
+
+ALL = [stopped_with_the_service, service_with_other_keys, gone_on_after_a_stop, played_again]

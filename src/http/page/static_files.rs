@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 70] = [
+const FILES: [File; 71] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -80,6 +80,7 @@ const FILES: [File; 70] = [
     file!("page.js", SCRIPT),
     file!("particles.js", SCRIPT),
     file!("playback.js", SCRIPT),
+    file!("player.js", SCRIPT),
     file!("problems.js", SCRIPT),
     file!("project.js", SCRIPT),
     file!("recording.js", SCRIPT),

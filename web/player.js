@@ -1,0 +1,90 @@
+// Going on, pausing, and playing what was tracked.
+
+import { button } from "./dom.js";
+import { close } from "./frames.js";
+import { FOLLOWING } from "./message.js";
+
+export class Player {
+  /** @param {import("./page.js").Page} page */
+  constructor(page) {
+    this.page = page;
+    /** The frame that it shows now is this view of the page: any other one ends it. */
+    this.view = -1;
+  }
+
+  get isPlaying() {
+    return this.view === this.page.view && this.page.state === "ended";
+  }
+
+  /** What the button in the middle does. Where no more is tracked, it plays what was. */
+  press() {
+    const { state } = this.page;
+    if (state === "paused") this.goOn();
+    else if (state !== "ended") this.page.pause(true);
+    else if (this.isPlaying) this.stop();
+    else this.play();
+  }
+
+  /** Stays at the frame that it shows. */
+  stop() {
+    if (this.isPlaying) this.page.view += 1;
+  }
+
+  /** Takes the frames after the last one. */
+  async goOn() {
+    const { page } = this;
+    const { run, state } = page;
+    if (!run || run.isRedoing || run.isOver) return;
+    const isStopped = run.wake && state === "ended";
+    page.enter("following");
+    if (isStopped) page.say(FOLLOWING);
+    page.pause(false);
+    try {
+      await run.wake?.();
+    } catch (error) {
+      if (run !== page.run) return;
+      page.enter(state);
+      page.fail(error);
+    }
+  }
+
+  /** Plays from the frame that is shown, or from the first one where that is the last. */
+  async play() {
+    const { page } = this;
+    const { run, shown } = page;
+    if (!run || !shown || run.isRedoing) return;
+    const numbers = run.frames.shown;
+    const left = shown.frame === run.lastFrame ? numbers : numbers.filter((number) => number > shown.frame);
+    if (left.length === 0) return;
+    const timeOf = (/** @type {number} */ frame) => run.frames.times.get(frame) ?? 0;
+    this.view = page.view += 1;
+    this.say(true);
+    const begun = performance.now() - 1000 * timeOf(left[0]);
+    for (const [at, frame] of left.entries()) {
+      const next = left[at + 1];
+      // What is late is passed over, but the last one.
+      if (next !== undefined && performance.now() - begun > 1000 * timeOf(next)) continue;
+      const picture = await run.frames.at(frame).catch(() => undefined);
+      const early = begun + 1000 * timeOf(frame) - performance.now();
+      if (early > 0) await new Promise((resolve) => setTimeout(resolve, early));
+      if (!this.isPlaying || run !== page.run) break;
+      if (!picture) continue;
+      const { viewed } = page;
+      page.viewed = picture;
+      page.show(picture);
+      if (viewed) close(viewed);
+    }
+    if (run !== page.run || page.state !== "ended") return;
+    if (this.isPlaying) {
+      page.leave();
+      page.repaint();
+    }
+    this.say(false);
+  }
+
+  /** @param {boolean} isPlaying */
+  say(isPlaying) {
+    button("pause").textContent = isPlaying ? "Pause" : "Play";
+    button("pause").classList.toggle("playing", isPlaying);
+  }
+}
