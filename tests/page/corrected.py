@@ -134,4 +134,32 @@ def box_at_the_edge(checks):
     page.context.close()
 
 
-ALL = [tracked_anew_and_cancelled, up_to_the_next_correction, undone_while_it_is_followed, box_at_the_edge]
+def refused_box(checks):
+    """A box that the service does not take, in an earlier frame and for a new object: nothing changes, and it goes on."""
+    page = checks.page(allowed=("422",))
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 40)
+    page.locator("#pause").click()
+    page.wait_for_timeout(300)
+    before = rows(page)
+    problem = json.dumps({"type": "https://localhost/problems#invalid-box", "status": 422, "detail": "The box is refused."})
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: route.fulfill(status=422, content_type="application/problem+json", body=problem))
+    page.locator("#add").click()
+    drag(page, OFF)
+    said(page, "This box cannot be followed")
+    assert whole(rows(page)) == whole(before) and page.locator("#undo").is_disabled()
+    to_frame(page, 20)
+    page.locator("#message").evaluate("place => { place.textContent = ''; }")
+    drag(page, OFF)
+    said(page, "This box cannot be followed")
+    assert whole(rows(page)) == whole(before) and page.locator("#undo").is_disabled()
+    page.unroute(opening)
+    page.locator("#pause").click()
+    to_the_end(page)
+    assert values(rows(page)[: len(before)]) == values(before)
+    page.context.close()
+
+
+ALL = [tracked_anew_and_cancelled, up_to_the_next_correction, undone_while_it_is_followed, box_at_the_edge, refused_box]
