@@ -136,8 +136,11 @@ def frames(page, count):
 
 
 def slow(page):
-    """Makes the page's machine slow: a file that is tracked as fast as it can be has not ended when one acts."""
-    page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 5})
+    """Makes the page's machine slow: a file that is tracked as fast as it can be has not ended when one acts. Returns
+    what makes it as fast again as it was."""
+    session = page.context.new_cdp_session(page)
+    session.send("Emulation.setCPUThrottlingRate", {"rate": 5})
+    return lambda: session.send("Emulation.setCPUThrottlingRate", {"rate": 1})
 
 
 def to_the_end(page):
