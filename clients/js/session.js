@@ -41,7 +41,9 @@ const MOVE_EVERY = 1000;
 
 /** @param {Box} box */
 export function boxText({ x, y, width, height }) {
-  return [x, y, width, height].map((value) => Number(value.toFixed(4))).join(",");
+  const sides = [x, y, width, height];
+  if (!sides.every(Number.isFinite)) throw new TypeError("A box is { x, y, width, height }, four finite numbers.");
+  return sides.map((value) => Number(value.toFixed(4))).join(",");
 }
 
 export class Session {

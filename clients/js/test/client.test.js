@@ -79,6 +79,7 @@ test("a snapshot goes on under another id, a correction moves the box", async ()
   for (const frame of clip.frames.slice(11, 31)) answers.push(await restored.track(frame));
   sameAsTheLibrary(answers, 11);
   const box = { x: 20, y: 30, width: 40, height: 50 };
+  await assert.rejects(client.open(clip.frames[31], Object.values(box), options), /A box is \{ x, y, width, height \}/);
   const corrected = await restored.correct(clip.frames[31], box);
   assert.deepEqual(corrected.box, box);
   assert.equal(corrected.frame, 31);
