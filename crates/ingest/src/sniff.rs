@@ -44,24 +44,39 @@ pub fn type_name(bytes: &[u8]) -> Option<&'static str> {
     read.or_else(|| unread_type(bytes))
 }
 
-/// The name of an image type that is known and not read.
+/// Bytes of a packet of an MPEG transport stream, and the first one of each.
+const PACKET: usize = 188;
+const SYNC: u8 = 0x47;
+
+/// The name of a type of images, videos or packed files that is known and not read.
 pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
     if bytes.get(4..8) == Some(b"ftyp") {
         return still_image(bytes);
     }
-    let signatures: [(&[u8], &str); 5] = [
+    let signatures: [(&[u8], &str); 10] = [
         (b"II\x2A\x00", "TIFF"),
         (b"MM\x00\x2A", "TIFF"),
         (b"\xFF\x0A", "JPEG XL"),
         (b"\x00\x00\x00\x0CJXL \r\n", "JPEG XL"),
         (b"\x00\x00\x00\x0CjP  \r\n", "JPEG 2000"),
+        (b"FLV\x01", "FLV"),
+        (b"\x30\x26\xB2\x75\x8E\x66\xCF\x11", "WMV"),
+        (b"\x00\x00\x01\xBA", "MPEG"),
+        (b"\x1F\x8B\x08", "gzip"),
+        (b"PK\x03\x04", "ZIP"),
     ];
     let found = signatures
         .iter()
         .find(|(start, _)| bytes.starts_with(start));
     // Two letters may begin any text. A bitmap has four zeros after its length.
     let is_bitmap = bytes.starts_with(b"BM") && bytes.get(6..10) == Some(&[0; 4]);
-    found.map(|(_, name)| *name).or(is_bitmap.then_some("BMP"))
+    let is_avi = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ");
+    let is_packets = [0, PACKET, 2 * PACKET]
+        .iter()
+        .all(|at| bytes.get(*at) == Some(&SYNC));
+    let of_parts = [(is_bitmap, "BMP"), (is_avi, "AVI"), (is_packets, "MPEG-TS")];
+    let found = found.map(|(_, name)| *name);
+    found.or_else(|| of_parts.iter().find(|(is, _)| *is).map(|(_, name)| *name))
 }
 
 /// Which still image a file of boxes is; none where it is a video.
@@ -117,6 +132,14 @@ mod tests {
             (b"II*\0", Some("TIFF")),
             (b"BM\x36\x10\0\0\0\0\0\0", Some("BMP")),
             (b"BM, a text", None),
+            (b"RIFF\x24\x10\0\0AVI LIST", Some("AVI")),
+            (b"RIFF\x24\x10\0\0WAVEfmt ", None),
+            (
+                &[&[0x47; 1][..], &[0; 187]].concat().repeat(3),
+                Some("MPEG-TS"),
+            ),
+            (&[0x47; 188], None),
+            (b"\x1F\x8B\x08\0", Some("gzip")),
             (b"", None),
         ] {
             assert_eq!(unread_type(bytes), name, "{bytes:?}");

@@ -49,10 +49,14 @@ impl From<IngestError> for Problem {
     }
 }
 
-/// What is said to an image of a type that is not read.
+/// What is said to a file of a type that is not read.
 fn unread(name: &str) -> String {
     let cure = match name {
         "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
+        "AVI" | "FLV" | "WMV" | "MPEG" | "MPEG-TS" => {
+            "Of videos send MP4, WebM or GIF: `ffmpeg -i VIDEO clip.mp4` makes one."
+        }
+        "gzip" | "ZIP" => "Send the file itself, not packed.",
         _ => "Convert it, or let the camera or the browser make JPEGs.",
     };
     format!("The file has the format {name}, which is not read. Send JPEG, PNG or WebP. {cure}")
