@@ -225,7 +225,6 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
                 ("boxes", both.as_str()),
                 ("names", "a <van>, ground"),
                 ("video_name", "clip.mp4"),
-                ("rate", "30"),
                 ("seed", "7"),
                 ("format", format),
             ];
@@ -243,6 +242,49 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
     let otb = [("box", BOXES[0]), ("seed", "7"), ("format", "otb")];
     let answer = track(&app, &video, &otb).await.text().await.unwrap();
     assert_eq!(answer, file(&video, "otb", &[]));
+    // A rate takes the place of the video's times.
+    let query = [
+        ("box", BOXES[0]),
+        ("seed", "7"),
+        ("format", "json"),
+        ("rate", "10"),
+        ("count", "3"),
+    ];
+    let answer = lines(track(&app, &video, &query).await).await;
+    let times: Vec<f64> = answer
+        .iter()
+        .map(|row| row["time"].as_f64().unwrap())
+        .collect();
+    assert_eq!(times, [0.0, 0.1, 0.2, 0.3]);
+}
+
+/// The frames before the damage were lost with it, and nothing told how to have them.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_file_of_a_damaged_video_is_had_of_the_frames_before_the_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let video = clip(folder.path());
+    let app = TestApplication::start().await;
+    let mut bytes = std::fs::read(&video).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 500].fill(0x5A);
+    std::fs::write(&video, bytes).unwrap();
+    let query = [("box", BOXES[0]), ("format", "csv")];
+    let refused = track(&app, &video, &query).await;
+    let problem = expect_problem(refused, "frame-damaged").await;
+    let detail = problem["detail"].as_str().unwrap();
+    let (_, rest) = detail
+        .split_once("`count=")
+        .unwrap_or_else(|| panic!("{detail}"));
+    let (count, _) = rest.split_once('`').unwrap();
+    let answer = track(&app, &video, &[&query[..], &[("count", count)]].concat()).await;
+    assert_eq!(answer.status(), 200, "{detail}");
+    let rows = answer.text().await.unwrap().lines().count();
+    assert_eq!(
+        rows,
+        count.parse::<usize>().unwrap() + 2,
+        "a head, the first frame, and these"
+    );
 }
 
 #[tokio::test]

@@ -120,6 +120,27 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
     expect_problem(refused.unwrap(), "malformed-request").await;
 }
 
+/// Frames before the start counted as those that are tracked, so that the end of a long video was out of reach.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn frames_before_the_start_do_not_count() {
+    let app = TestApplication::start_with(|config| config.limits.max_video_frames = 5).await;
+    let numbers = async |query: &[(&str, &str)]| {
+        let query = [&[("box", FIRST)], query].concat();
+        let lines = lines(track(&app, &query, "video/mp4", video("mp4")).await).await;
+        let number = |line: &Value| line["frame"].as_u64().ok_or_else(|| line["detail"].clone());
+        lines
+            .iter()
+            .map(number)
+            .collect::<Result<Vec<u64>, Value>>()
+    };
+    assert_eq!(numbers(&[("start", "8")]).await, Ok(vec![8, 9, 10, 11]));
+    let back = [("start", "11"), ("backwards", "true"), ("count", "4")];
+    assert_eq!(numbers(&back).await, Ok(vec![11, 10, 9, 8, 7]));
+    let detail = numbers(&[("start", "2")]).await.unwrap_err();
+    assert!(detail.as_str().unwrap().contains("`start=6`"), "{detail}");
+}
+
 #[tokio::test]
 async fn without_ffmpeg_a_video_to_track_is_refused() {
     let app = TestApplication::start_with(|config| config.limits.ffmpeg = "off".to_owned()).await;

@@ -269,6 +269,98 @@ async fn what_is_wrong_with_a_video_is_told() {
     .await;
 }
 
+/// A file that ffmpeg makes of these arguments.
+fn made(name: &str, arguments: &str) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join(name);
+    let mut command = Command::new("ffmpeg");
+    command.args(["-v", "error", "-f", "lavfi", "-i"]);
+    command.args(arguments.split(' ')).arg(&file);
+    assert!(command.status().unwrap().success(), "{arguments}");
+    std::fs::read(file).unwrap()
+}
+
+/// What was told was the last line of ffmpeg, such as "To ignore this, add a trailing '?' to the map".
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn why_a_video_is_not_read_is_told_with_its_cure() {
+    const SMALL: &str = "testsrc2=size=320x240:rate=10 -frames:v 10";
+    let app = TestApplication::start_with(|config| config.max_frame_pixels = 1 << 20).await;
+    let id = app.open().await;
+    let whole = video("mp4");
+    for (video, slug, words) in [
+        (
+            made("sound.mp4", "sine=duration=1"),
+            "frame-damaged",
+            "no pictures",
+        ),
+        (
+            made("clip.mov", &format!("{SMALL} -c:v prores")),
+            "unsupported-image",
+            "codec",
+        ),
+        (
+            made("clip.mkv", &format!("{SMALL} -c:v ffv1")),
+            "unsupported-image",
+            "H.264",
+        ),
+        (
+            made("large.mp4", "testsrc2=size=1920x1080 -frames:v 2"),
+            "frame-too-large",
+            "scale=",
+        ),
+        (
+            whole[..whole.len() / 2].to_vec(),
+            "frame-damaged",
+            "cut off",
+        ),
+        (
+            made("clip.ts", SMALL),
+            "unsupported-image",
+            "`ffmpeg -i VIDEO clip.mp4`",
+        ),
+        (made("clip.avi", SMALL), "unsupported-image", "AVI"),
+        (made("clip.flv", SMALL), "unsupported-image", "FLV"),
+        (
+            b"\x1F\x8B\x08\0\0\0\0\0\0\x03packed".to_vec(),
+            "unsupported-image",
+            "not packed",
+        ),
+    ] {
+        let problem = expect_problem(post(&app, &id, "", video).await, slug).await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(words), "{words}: {detail}");
+        assert!(
+            !detail.contains("frames before"),
+            "there are none: {detail}"
+        );
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+/// It was told that a picture of the file was damaged.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn of_a_video_that_needs_too_much_memory_it_is_told_how_to_make_it_smaller() {
+    let app = TestApplication::start().await;
+    let encoder = "-c:v libx264 -preset ultrafast -refs 4 -bf 2 -pix_fmt yuv420p";
+    let source = "testsrc2=size=7680x4320:rate=10 -frames:v 6";
+    let large = made("8k.mp4", &format!("{source} {encoder}"));
+    let query = [("box", "2000,1500,400,400")];
+    let request = app.request(Method::POST, "/track", &query);
+    let answer = request.body(large).send().await.unwrap();
+    let told = match answer.status().is_success() {
+        true => lines(answer).await.pop().expect("a line"),
+        false => expect_problem(answer, "frame-too-large").await,
+    };
+    assert_eq!(told["type"], "/docs/problems#frame-too-large", "{told}");
+    let detail = told["detail"].as_str().unwrap();
+    assert!(
+        detail.contains("768 MiB") && detail.contains("scale="),
+        "{detail}"
+    );
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs ffmpeg"]
 async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {

@@ -7,7 +7,7 @@ use axum::body::Bytes;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_config::OFF;
 use bagtrack_ingest::video::{
-    Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits, VideoPicture,
+    Cost, Stop, VideoDecoder, VideoError, VideoFormat, VideoLimits, VideoPicture,
 };
 use bagtrack_sessions::clock::timeout;
 use std::sync::Arc;
@@ -17,20 +17,26 @@ use tokio::sync::mpsc;
 
 /// Decoded pictures that wait to be tracked.
 const MAX_WAITING: usize = 2;
+const SMALLER: &str =
+    "Send it smaller: `ffmpeg -i VIDEO -vf scale=1920:-2 smaller.mp4` makes it so.";
+const CODECS: &str = "Send H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263 or Motion JPEG: `ffmpeg -i VIDEO clip.mp4` makes one.";
 
 /// The frames of a video. Its process ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoFrames {
     pictures: mpsc::Receiver<Result<VideoPicture, VideoError>>,
     patience: Duration,
+    /// Most frames that count.
     max_frames: usize,
-    count: usize,
+    /// Frames before these, which are passed over.
+    passed_over: usize,
+    given: usize,
     _stop: Stop,
     _place: VideoPlace,
 }
 
 impl VideoFrames {
-    /// Begins to decode a video, in its place.
+    /// Begins to decode a video, in its place. Its first `passed_over` frames do not count.
     ///
     /// # Errors
     /// There is no program for it.
@@ -39,13 +45,15 @@ impl VideoFrames {
         video: Bytes,
         format: VideoFormat,
         place: VideoPlace,
+        passed_over: u64,
     ) -> Result<Self, Problem> {
         let (config, limits) = (&state.config, state.config.frame_limits());
         let max_frames = config.limits.max_video_frames;
+        let passed_over = usize::try_from(passed_over).unwrap_or(usize::MAX);
         let limits = VideoLimits {
             max_pixels: limits.max_pixels,
             max_bytes: limits.max_bytes,
-            max_pictures: max_frames,
+            max_pictures: max_frames.saturating_add(passed_over),
         };
         let patience = config.work_timeout;
         if config.limits.ffmpeg == OFF {
@@ -81,7 +89,8 @@ impl VideoFrames {
             pictures,
             patience,
             max_frames,
-            count: 0,
+            passed_over,
+            given: 0,
             _stop: stop,
             _place: place,
         })
@@ -92,26 +101,31 @@ impl VideoFrames {
         self.pictures.close();
     }
 
-    /// The next frame, as a JPEG file; none after the last.
-    pub async fn next(&mut self) -> Option<Result<Bytes, Problem>> {
-        let picture = self.next_picture().await?;
-        Some(picture.map(|picture| picture.jpeg.into()))
+    /// Whether a frame was given.
+    pub fn has_given(&self) -> bool {
+        self.given > 0
     }
 
-    /// The next frame with its time; none after the last.
-    pub async fn next_picture(&mut self) -> Option<Result<VideoPicture, Problem>> {
+    /// The next frame; none after the last.
+    pub async fn next(&mut self) -> Option<Result<VideoPicture, Problem>> {
         let next = timeout(self.patience, self.pictures.recv()).await;
         let Ok(next) = next else {
             return Some(Err(Problem::work_timeout()));
         };
-        self.count += usize::from(next.is_some());
         match next {
-            Some(Ok(_)) if self.count > self.max_frames => {
-                Some(Err(Problem::too_many_frames(self.max_frames)))
+            Some(Ok(_)) if self.given == self.max_frames.saturating_add(self.passed_over) => {
+                let detail = format!(
+                    "A request may have at most {} frames of a video; send the rest in another one.",
+                    self.max_frames
+                );
+                Some(Err(Problem::new(Kind::TooManyFrames, detail)))
             }
-            Some(Ok(picture)) => Some(Ok(picture)),
+            Some(Ok(picture)) => {
+                self.given += 1;
+                Some(Ok(picture))
+            }
             Some(Err(error)) => Some(Err(error.into())),
-            None if self.count == 0 => {
+            None if self.given == 0 => {
                 let detail = "The video has no pictures. Send the whole file again.";
                 Some(Err(Problem::new(Kind::FrameDamaged, detail)))
             }
@@ -130,12 +144,32 @@ impl From<VideoError> for Problem {
     fn from(error: VideoError) -> Self {
         match error {
             VideoError::NoProgram { .. } => no_decoder().caused_by(Arc::new(error)),
-            VideoError::Damaged { picture, reason } => {
-                let detail = format!(
-                    "The video cannot be decoded from its picture {picture} on: {reason}. The frames before count. Send MP4, WebM, GIF or Motion JPEG."
-                );
+            VideoError::NoPictures => {
+                let detail = "The file has no pictures, but sound or other data.";
                 Self::new(Kind::FrameDamaged, detail)
+            }
+            VideoError::UnreadCodec => {
+                let detail = format!("The video's codec is not read here. {CODECS}");
+                Self::new(Kind::UnsupportedImage, detail)
+            }
+            VideoError::TooCostly(Cost::Time) => {
+                let detail = format!("{}. Send it in parts.", sentence(&error));
+                Self::new(Kind::RequestTooCostly, detail)
+            }
+            VideoError::TooCostly(Cost::Memory | Cost::Pixels(_)) => {
+                let detail = format!("{}. {SMALLER}", sentence(&error));
+                Self::new(Kind::FrameTooLarge, detail)
+            }
+            VideoError::Damaged { .. } => {
+                Self::new(Kind::FrameDamaged, format!("{}.", sentence(&error)))
             }
         }
     }
+}
+
+/// An error's words with a capital letter.
+fn sentence(error: &VideoError) -> String {
+    let mut words = error.to_string();
+    words[..1].make_ascii_uppercase();
+    words
 }

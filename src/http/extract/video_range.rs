@@ -3,6 +3,8 @@
 use super::video_frames::VideoFrames;
 use crate::http::problems::problem::Problem;
 use axum::body::Bytes;
+use bagtrack_api::ProblemKind as Kind;
+use bagtrack_ingest::video::VideoPicture;
 use bagtrack_sessions::Charge;
 use std::collections::VecDeque;
 
@@ -17,6 +19,27 @@ pub struct VideoRange {
     pub backwards: bool,
 }
 
+impl VideoRange {
+    /// How many frames are before the first one that is wanted.
+    pub fn passed_over(&self) -> u64 {
+        match self.backwards {
+            true => self.start.saturating_sub(self.count),
+            false => self.start,
+        }
+    }
+}
+
+/// A frame of a range.
+#[derive(Debug)]
+pub struct RangeFrame {
+    /// Its number in the video, counted from 0.
+    pub number: u64,
+    /// When it is shown, in seconds after the first frame of the video.
+    pub time: f64,
+    /// A JPEG file.
+    pub file: Bytes,
+}
+
 /// The frames of a range, as they are decoded. Those that are taken backwards are kept as JPEG files, and their bytes are
 /// charged as those of uploads.
 #[derive(Debug)]
@@ -26,10 +49,12 @@ pub struct RangeFrames {
     charge: Charge,
     /// How many frames were decoded.
     decoded: u64,
+    /// When the first frame of the video is shown, in the video's own time.
+    begin: f64,
     /// How many frames were given.
     given: u64,
     /// Those that are still to be given backwards; the next one is the last.
-    kept: VecDeque<Bytes>,
+    kept: VecDeque<RangeFrame>,
     bytes: usize,
     /// Whether there is a frame after `start`, where the frames go backwards from there.
     goes_on: bool,
@@ -43,6 +68,7 @@ impl RangeFrames {
             range,
             charge,
             decoded: 0,
+            begin: 0.0,
             given: 0,
             kept: VecDeque::new(),
             bytes: 0,
@@ -50,30 +76,61 @@ impl RangeFrames {
         }
     }
 
-    /// The next frame with its number in the video; none after the last.
-    pub async fn next(&mut self) -> Option<Result<(u64, Bytes), Problem>> {
+    /// How many frames were given.
+    pub fn given(&self) -> u64 {
+        self.given
+    }
+
+    /// The next frame; none after the last.
+    pub async fn next(&mut self) -> Option<Result<RangeFrame, Problem>> {
         if self.given > self.range.count {
             return None;
         }
-        let number = match self.range.backwards {
-            true => self.range.start.checked_sub(self.given)?,
-            false => self.range.start + self.given,
-        };
         if self.given == 0
             && let Err(problem) = self.reach_start().await
         {
             return Some(Err(problem));
         }
-        let file = match self.kept.pop_back() {
-            Some(file) => {
-                self.bytes -= file.len();
+        let frame = match (self.kept.pop_back(), self.range.backwards) {
+            (Some(frame), _) => {
+                self.bytes -= frame.file.len();
                 self.charge.shrink(self.bytes);
-                Ok(file)
+                Ok(frame)
             }
-            None => self.video.next().await?,
+            (None, true) => return None,
+            (None, false) => self
+                .decode()
+                .await?
+                .map_err(|problem| self.with_rest(problem)),
         };
-        self.given += 1;
-        Some(file.map(|file| (number, file)))
+        self.given += u64::from(frame.is_ok());
+        Some(frame)
+    }
+
+    /// Decodes the next frame of the video; none after the last.
+    async fn decode(&mut self) -> Option<Result<RangeFrame, Problem>> {
+        let picture = self.video.next().await?;
+        Some(picture.map(|VideoPicture { jpeg, time }| {
+            let number = self.decoded;
+            if number == 0 {
+                self.begin = time;
+            }
+            self.decoded += 1;
+            RangeFrame {
+                number,
+                time: time - self.begin,
+                file: jpeg.into(),
+            }
+        }))
+    }
+
+    /// Says how the frames after those of one request are tracked.
+    fn with_rest(&self, problem: Problem) -> Problem {
+        if problem.kind() != Kind::TooManyFrames {
+            return problem;
+        }
+        let last = self.decoded.saturating_sub(1);
+        problem.and(&format!("`start={last}` with its last box goes on."))
     }
 
     /// Decodes up to the first frame. It is kept, and backwards those before it that are wanted.
@@ -84,16 +141,15 @@ impl RangeFrames {
             backwards,
         } = self.range;
         while self.decoded <= start {
-            let Some(file) = self.video.next().await else {
+            let Some(frame) = self.decode().await else {
                 return Err(no_frame(start, self.decoded));
             };
-            let file = file?;
-            self.decoded += 1;
-            let is_wanted = backwards && start - (self.decoded - 1) <= count;
-            if is_wanted || self.decoded > start {
-                self.charge.grow(file.len())?;
-                self.bytes += file.len();
-                self.kept.push_back(file);
+            let frame = frame?;
+            let is_wanted = backwards && start - frame.number <= count;
+            if is_wanted || frame.number == start {
+                self.charge.grow(frame.file.len())?;
+                self.bytes += frame.file.len();
+                self.kept.push_back(frame);
             }
         }
         if backwards {

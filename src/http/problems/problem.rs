@@ -124,6 +124,12 @@ impl Problem {
         Self::new(Kind::TooManyFrames, detail)
     }
 
+    /// Says more.
+    pub fn and(mut self, more: &str) -> Self {
+        self.detail = format!("{} {more}", self.detail);
+        self
+    }
+
     /// Says which of `count` frames is meant.
     pub fn of_frame(mut self, index: usize, count: usize) -> Self {
         if count > 1 {

@@ -65,7 +65,7 @@ pub async fn respond_to_video(
     let video = request.upload.files.swap_remove(0);
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
-    let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place).await?);
+    let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place, 0).await?);
     respond_to(state, request, source).await
 }
 
@@ -117,16 +117,19 @@ impl FrameSequence for SessionFrames {
     type Answer = StreamAnswer;
 
     async fn next(&mut self) -> Option<Result<StreamAnswer, Problem>> {
-        let file = match &mut self.source {
+        let picture = match &mut self.source {
             FrameSource::Files(files, deadline) => {
                 let (file, deadline) = (files.next()?, *deadline);
                 let tracked = timeout_at(deadline, self.answer(file)).await;
                 return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
             }
-            FrameSource::Video(video) => video.next().await?,
+            FrameSource::Video(video) => match video.next().await? {
+                Err(problem) if video.has_given() => Err(problem.and("The frames before count.")),
+                picture => picture,
+            },
         };
-        Some(match file {
-            Ok(file) => self.answer(file).await,
+        Some(match picture {
+            Ok(picture) => self.answer(picture.jpeg.into()).await,
             Err(problem) => Err(problem),
         })
     }

@@ -113,7 +113,7 @@ async fn track_video(
     let (boxes, params) = begin(settings)?;
     let (place, queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let targets = boxes.as_slice().len();
-    let pictures = VideoFrames::decode(&state, video, format, place).await?;
+    let pictures = VideoFrames::decode(&state, video, format, place, range.passed_over()).await?;
     let charge = state.charge(&request.client);
     let video = VideoTrack {
         queue: queue.for_frames(targets),

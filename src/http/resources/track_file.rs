@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Bytes that a row and its part of the file take at most.
 const ROW_BYTES: usize = 1024;
-/// Frames a second, where the caller does not tell.
+/// Frames a second, where neither the caller nor the video tells.
 const USUAL_RATE: f64 = 25.0;
 
 /// What a file of tracked boxes says beside them.
@@ -23,8 +23,33 @@ pub struct TrackFile {
     names: Vec<String>,
     /// What the video is called.
     video: String,
-    /// Frames a second.
+    /// Frames a second, in place of the video's own times.
     rate: Option<f64>,
+}
+
+/// What is known of the video once it is tracked.
+#[derive(Debug, Default)]
+struct Seen {
+    size: (u32, u32),
+    /// The greatest number of a frame, and when that is shown, in seconds after frame 0.
+    furthest: (u64, f64),
+    /// Whether there is a frame after all that were tracked.
+    goes_on: bool,
+}
+
+impl Seen {
+    fn take(&mut self, frame: &TrackedFrame) {
+        self.size = frame.size;
+        if frame.number > self.furthest.0 {
+            self.furthest = (frame.number, frame.time);
+        }
+    }
+
+    /// Frames a second, on average.
+    fn rate(&self) -> Option<f64> {
+        let (number, time) = self.furthest;
+        (time > 0.0).then(|| number as f64 / time)
+    }
 }
 
 impl TrackFile {
@@ -71,12 +96,13 @@ impl TrackFile {
         mut selection: Selection<Row>,
         mut charge: Charge,
     ) -> Result<Response, Problem> {
-        let (mut rows, mut size) = (Vec::new(), (0, 0));
+        let (mut rows, mut seen) = (Vec::new(), Seen::default());
         while !selection.has_ended() {
-            let Some(frame) = video.next().await? else {
+            let next = video.next().await;
+            let Some(frame) = next.map_err(|problem| before(problem, video.frames.given()))? else {
                 break;
             };
-            size = frame.size;
+            seen.take(&frame);
             let new = selection.take(self.rows(&frame));
             charge.grow(ROW_BYTES * new.len())?;
             rows.extend(new);
@@ -84,9 +110,9 @@ impl TrackFile {
         let last = selection.finish();
         charge.grow(ROW_BYTES * last.len())?;
         rows.extend(last);
-        let goes_on = video.frames.go_on().await;
+        seen.goes_on = video.frames.go_on().await;
         let media_type = media_type(self.format);
-        let write = move |_: &mut WorkMeter| self.write(rows, size, goes_on);
+        let write = move |_: &mut WorkMeter| self.write(rows, &seen);
         let queue = video.queue.clone();
         let text = video.state.service.run(queue, write).await?;
         Ok(charged_body(media_type, text, charge).into_response())
@@ -98,7 +124,10 @@ impl TrackFile {
         let rows = estimates.map(|(target, estimate)| {
             let row = Row {
                 frame: frame.number,
-                time: self.rate.map(|rate| micros(frame.number as f64 / rate)),
+                time: Some(micros(match self.rate {
+                    Some(rate) => frame.number as f64 / rate,
+                    None => frame.time,
+                })),
                 file: None,
                 target,
                 estimate: *estimate,
@@ -108,20 +137,30 @@ impl TrackFile {
         rows.collect()
     }
 
-    fn write(self, rows: Vec<Row>, size: (u32, u32), goes_on: bool) -> Result<String, Problem> {
+    fn write(self, rows: Vec<Row>, seen: &Seen) -> Result<String, Problem> {
         let columns = Columns {
-            time: self.rate.is_some(),
+            time: true,
             target: self.names.len() > 1,
         };
         let clip = Clip {
             name: self.video,
-            size,
-            rate: self.rate.unwrap_or(USUAL_RATE),
+            size: seen.size,
+            rate: self.rate.or(seen.rate()).unwrap_or(USUAL_RATE),
             names: self.names,
-            goes_on,
+            goes_on: seen.goes_on,
         };
         let text = self.format.text(&clip, columns, rows);
         text.map_err(|error| Problem::internal(Arc::new(error)))
+    }
+}
+
+/// Says how the frames before the one that cannot be had are tracked.
+fn before(problem: Problem, given: u64) -> Problem {
+    match given.checked_sub(1) {
+        Some(count) if problem.kind().status() < 500 => problem.and(&format!(
+            "`count={count}` gives the file of the frames before it."
+        )),
+        _ => problem,
     }
 }
 

@@ -1,7 +1,7 @@
 //! `POST /track` with a video and a box: an answer for each frame, the first one being the box. Nothing is kept.
 
 use crate::http::extract::video_place::count_frame;
-use crate::http::extract::video_range::RangeFrames;
+use crate::http::extract::video_range::{RangeFrame, RangeFrames};
 use crate::http::problems::problem::Problem;
 use crate::http::quotas::client::Client;
 use crate::http::respond::answer::answer;
@@ -46,6 +46,8 @@ pub enum Track {
 pub struct TrackedFrame {
     /// Its number in the video.
     pub number: u64,
+    /// When it is shown, in seconds after the first frame of the video.
+    pub time: f64,
     /// Its width and height in pixels.
     pub size: (u32, u32),
     /// Where the targets are.
@@ -63,11 +65,12 @@ impl VideoTrack {
         let Some(next) = self.frames.next().await else {
             return Ok(None);
         };
-        let (number, file) = next?;
+        let RangeFrame { number, time, file } = next?;
         count_frame(&self.state, &self.client).await?;
         let (track, warnings) = self.step(file).await?;
         let frame = TrackedFrame {
             number,
+            time,
             size: track.source_size(),
             estimates: track.latest(),
             warnings,

@@ -25,8 +25,8 @@ const COMMENT: [u8; 2] = [0xFF, 0xFE];
 
 /// Get the frames of a video
 ///
-/// A video of any kind that the service's `ffmpeg` reads comes back as Motion JPEG, a JPEG file after the other: every
-/// frame once, in its own pixels, as soon as it is decoded. Each file begins with a comment that tells when the frame is
+/// A video (MP4, QuickTime, Matroska, WebM, GIF or Motion JPEG; H.264, H.265, VP8, VP9, AV1, MPEG-4, H.263) comes back as
+/// Motion JPEG, a JPEG file after the other: every frame once, in its own pixels, as soon as it is decoded. Each file begins with a comment that tells when the frame is
 /// shown, in seconds from the video's beginning, for example `time=1.533333`. The page asks for it where the browser
 /// cannot play a file. Where the rest cannot be decoded, the answer is cut off after the last whole frame, and not
 /// ended.
@@ -50,13 +50,13 @@ pub async fn post(
     mut request: StatelessRequest<DecodeSettings>,
 ) -> Result<Response, Problem> {
     let Some(format) = request.upload.video else {
-        let detail = "Send a video: MP4, WebM, GIF or Motion JPEG.";
+        let detail = "Send a video: MP4, WebM, GIF or Motion JPEG. `ffmpeg -i VIDEO clip.mp4` makes one of others.";
         return Err(Problem::new(Kind::UnsupportedImage, detail));
     };
     let file = request.upload.files.swap_remove(0);
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
-    let mut video = VideoFrames::decode(&state, file, format, place).await?;
+    let mut video = VideoFrames::decode(&state, file, format, place, 0).await?;
     let first = next(&state, &request, &mut video).await;
     let first = first.ok_or_else(Problem::missing_frame)??;
     let frames = stream::once(ready(Ok(first))).chain(rest(state, request, video));
@@ -69,7 +69,7 @@ async fn next(
     request: &StatelessRequest<DecodeSettings>,
     video: &mut VideoFrames,
 ) -> Option<Result<Bytes, Problem>> {
-    let frame = video.next_picture().await?;
+    let frame = video.next().await?;
     match count_frame(state, &request.client).await {
         Ok(()) => Some(frame.map(with_time)),
         Err(problem) => Some(Err(problem)),

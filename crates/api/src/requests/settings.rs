@@ -147,8 +147,7 @@ pub struct TrackSettings {
     /// With `format`, what the video is called in the file: its name, or for `label-studio` its address.
     #[param(value_type = String, required = false, nullable = false, max_length = 200)]
     pub video_name: Option<Name>,
-    /// With `format`, the video's frames a second, which give the times in the file. Without it `text`, `json` and `csv`
-    /// have no times, and `label-studio` those of 25 frames a second.
+    /// With `format`, frames a second, which give the times in the file. Without it they are the video's own.
     #[param(
         value_type = f64,
         required = false,

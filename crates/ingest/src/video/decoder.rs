@@ -1,13 +1,14 @@
 //! A video being decoded: the process, and the threads that feed it and hear what it says.
 
 use super::child::{self, Launcher};
-use super::error::VideoError;
+use super::error::{Cost, VideoError};
 use super::output::{self, VideoPicture};
+use super::said::{Fault, Said};
 use super::sniff::VideoFormat;
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::process::{Child, ChildStdout, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// The kinds of uploads that are read: MP4, Matroska and WebM, GIF, JPEG files in a row.
@@ -18,10 +19,9 @@ const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg
 const NAMELESS: &str = "file:/proc/self/fd/0";
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
-/// Most characters that are told of a line of what the program says.
-const MAX_SAID: usize = 200;
-/// Most bytes of a line that are held; the rest counts as a line of its own.
-const MAX_LINE: u64 = 4096;
+/// The system's signals for a process that has had its processor time: SIGKILL, SIGXCPU.
+#[cfg(unix)]
+const OUT_OF_TIME: [i32; 2] = [9, 24];
 
 /// What decoding a video may take.
 #[derive(Debug, Clone, Copy)]
@@ -202,8 +202,8 @@ impl VideoDecoder {
             return self.end();
         }
         // Pictures after damage have unknown numbers.
-        if let Some(reason) = self.said.damage() {
-            return Err(self.damaged(reason));
+        if let Some(fault) = self.said.fault() {
+            return Err(self.error(fault));
         }
         self.given += 1;
         Ok(picture)
@@ -216,30 +216,49 @@ impl VideoDecoder {
         };
         let _ = hearing.join();
         let ended = lock(&self.child).wait();
-        if let Some(reason) = self.said.damage() {
-            return Err(self.damaged(reason));
+        if let Some(fault) = self.said.fault() {
+            return Err(self.error(fault));
         }
-        let reason = match ended {
-            Ok(status) if status.success() => return Ok(None),
-            Ok(status) if status.code() == Some(child::NOT_STARTED) => {
-                return Err(VideoError::NoProgram {
-                    program: self.program.clone(),
-                    source: io::ErrorKind::NotFound.into(),
-                });
-            }
-            Ok(_) if self.said.is_unlisted() => {
-                "its codec is none of those that are read".to_owned()
-            }
-            Ok(status) => format!("the decoder ended ({status})"),
-            Err(error) => error.to_string(),
-        };
-        Err(self.damaged(reason))
+        match ended {
+            Ok(status) if status.success() => Ok(None),
+            Ok(status) if status.code() == Some(child::NOT_STARTED) => Err(VideoError::NoProgram {
+                program: self.program.clone(),
+                source: io::ErrorKind::NotFound.into(),
+            }),
+            Ok(_) if self.said.ends_with_unread_codec() => Err(VideoError::UnreadCodec),
+            Ok(status) if is_out_of_time(status) => Err(VideoError::TooCostly(Cost::Time)),
+            Ok(status) => Err(self.damaged(format!("the decoder ended ({status})"))),
+            Err(error) => Err(self.damaged(error.to_string())),
+        }
+    }
+
+    fn error(&self, fault: Fault) -> VideoError {
+        match fault {
+            Fault::NoPictures => VideoError::NoPictures,
+            Fault::UnreadCodec => VideoError::UnreadCodec,
+            Fault::Memory => VideoError::TooCostly(Cost::Memory),
+            Fault::Pixels => VideoError::TooCostly(Cost::Pixels(self.limits.max_pixels)),
+            Fault::Damage(reason) => self.damaged(reason),
+        }
     }
 
     fn damaged(&self, reason: String) -> VideoError {
         let picture = self.given + 1;
         VideoError::Damaged { picture, reason }
     }
+}
+
+/// Whether the system ended it, as it does after its processor time.
+#[cfg(unix)]
+fn is_out_of_time(status: ExitStatus) -> bool {
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+    signal.is_some_and(|signal| OUT_OF_TIME.contains(&signal))
+}
+
+/// Elsewhere its time is not limited.
+#[cfg(not(unix))]
+fn is_out_of_time(_status: ExitStatus) -> bool {
+    false
 }
 
 impl Drop for VideoDecoder {
@@ -260,56 +279,6 @@ fn end(child: &Mutex<Child>) {
     let _ = child.wait();
 }
 
-/// What the program says. Clones hear the same.
-#[derive(Debug, Clone, Default)]
-struct Said(Arc<Mutex<Heard>>);
-
-#[derive(Debug, Default)]
-struct Heard {
-    /// The last line that tells of damage.
-    damage: Option<String>,
-    /// Whether a codec was not read because it is none of the list.
-    unlisted: bool,
-}
-
-impl Said {
-    fn lock(&self) -> MutexGuard<'_, Heard> {
-        // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn damage(&self) -> Option<String> {
-        self.lock().damage.clone()
-    }
-
-    fn is_unlisted(&self) -> bool {
-        self.lock().unlisted
-    }
-
-    /// Hears all, so that the program never waits. Whatever it says, little is held.
-    fn hear(&self, mut said: impl BufRead) {
-        let mut line = Vec::new();
-        while said
-            .by_ref()
-            .take(MAX_LINE)
-            .read_until(b'\n', &mut line)
-            .is_ok_and(|count| count > 0)
-        {
-            let text = String::from_utf8_lossy(&line);
-            let text = text.trim();
-            // The cache says on every start that it cannot know the length of a pipe.
-            let is_noise = text.starts_with("[cache @") || text.contains("Last message repeated");
-            // Sound is not decoded, and its codecs are not read either.
-            let is_unlisted = text.contains("not on whitelist");
-            self.lock().unlisted |= is_unlisted;
-            if !is_noise && !is_unlisted && !text.is_empty() {
-                self.lock().damage = Some(text.chars().take(MAX_SAID).collect());
-            }
-            line.clear();
-        }
-    }
-}
-
 /// The pictures, and the damage, that a program tells which writes and says these bytes; so that fuzzing needs no program.
 ///
 /// # Errors
@@ -325,19 +294,4 @@ pub fn read_output(
     let mut stream = written;
     let pictures = std::iter::from_fn(|| output::next_picture(&mut stream, max_bytes).transpose());
     Ok((pictures.collect::<io::Result<_>>()?, heard.damage()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The whole line was held: as many bytes as the program has time for.
-    #[test]
-    fn of_a_line_without_an_end_little_is_held() {
-        let said = Said::default();
-        let endless = BufReader::new(io::repeat(b'x').take(64 << 20));
-        let used = allocation_counter::measure(|| said.hear(endless));
-        assert!(used.bytes_max < 64 << 10, "{used:?}");
-        assert_eq!(said.damage(), Some("x".repeat(MAX_SAID)));
-    }
 }

@@ -1,5 +1,7 @@
 //! Why a video has no further picture.
 
+use super::child::{MAX_CPU, MAX_MEMORY};
+
 /// Why a video has no further picture.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
@@ -11,7 +13,16 @@ pub enum VideoError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// The video is damaged, of an unknown kind, or takes more than it may.
+    /// The file has no stream of pictures.
+    #[error("the file has no pictures, but sound or other data")]
+    NoPictures,
+    /// The codec is none of those that are read.
+    #[error("the video's codec is not read here")]
+    UnreadCodec,
+    /// Decoding takes more than it may.
+    #[error("decoding the video takes more than {0}")]
+    TooCostly(Cost),
+    /// The video is damaged, or of an unknown kind.
     #[error("the video cannot be decoded from its picture {picture} on: {reason}")]
     Damaged {
         /// The first picture that cannot be had, counted from 1.
@@ -19,4 +30,18 @@ pub enum VideoError {
         /// What the program found.
         reason: String,
     },
+}
+
+/// What decoding may take only so much of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Cost {
+    /// The address space of its process.
+    #[error("{} MiB of memory", MAX_MEMORY >> 20)]
+    Memory,
+    /// Processor time.
+    #[error("{MAX_CPU} s of processor time")]
+    Time,
+    /// Pixels of a picture.
+    #[error("{0} pixels in a picture")]
+    Pixels(u64),
 }

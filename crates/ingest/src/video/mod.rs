@@ -7,21 +7,23 @@
 //! file or pipe and writes another, knows no other protocol, few formats and few codecs, and its memory, processor time,
 //! files and priority are limited (on Linux). It ends when its pictures are no longer wanted.
 //!
-//! What it says is damage: from the next picture on nothing is given, since nobody knows which picture of the video that
+//! What it says is a fault: from the next picture on nothing is given, since nobody knows which picture of the video that
 //! would be.
 //!
-//! What can go wrong: there is no `ffmpeg`, or it cannot decode the video; what it says then is told.
+//! What can go wrong: there is no `ffmpeg`, it cannot decode the video, or that takes more than it may. Of what it says the
+//! first line is told, which names the cause.
 
 mod child;
 mod decoder;
 mod error;
 mod output;
+mod said;
 mod sniff;
 
 pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
 #[cfg(fuzzing)]
 pub use decoder::read_output;
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
-pub use error::VideoError;
+pub use error::{Cost, VideoError};
 pub use output::VideoPicture;
 pub use sniff::{VideoFormat, video_format};

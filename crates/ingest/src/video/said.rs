@@ -1,0 +1,166 @@
+//! What the decoder's program says, and the fault that it tells.
+
+use std::io::{BufRead, Read};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Most characters that are told of a line.
+const MAX_SAID: usize = 200;
+/// Most bytes of a line that are held; the rest counts as a line of its own.
+const MAX_LINE: u64 = 4096;
+
+/// What is wrong with a video.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Fault {
+    /// It has no stream of pictures.
+    NoPictures,
+    /// Its codec is not among those that may be read.
+    UnreadCodec,
+    /// There is too little memory.
+    Memory,
+    /// A picture has too many pixels.
+    Pixels,
+    /// Something else: what the program says of it.
+    Damage(String),
+}
+
+/// What the program says. Clones hear the same.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Said(Arc<Mutex<Heard>>);
+
+#[derive(Debug, Default)]
+struct Heard {
+    /// The first one that tells more than that something failed.
+    fault: Option<Fault>,
+    /// Whether the last line was of a codec that may not be read.
+    is_unlisted: bool,
+}
+
+impl Said {
+    fn lock(&self) -> MutexGuard<'_, Heard> {
+        // Nothing panics while it is held.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What is wrong, once the program has said it.
+    pub(super) fn fault(&self) -> Option<Fault> {
+        self.lock().fault.clone()
+    }
+
+    /// Whether the last line was of a codec that may not be read.
+    pub(super) fn ends_with_unread_codec(&self) -> bool {
+        self.lock().is_unlisted
+    }
+
+    /// What the program says of damage.
+    #[cfg(fuzzing)]
+    pub(super) fn damage(&self) -> Option<String> {
+        match self.fault() {
+            Some(Fault::Damage(text)) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// Hears all, so that the program never waits. Whatever it says, little is held.
+    pub(super) fn hear(&self, mut said: impl BufRead) {
+        let mut line = Vec::new();
+        while said
+            .by_ref()
+            .take(MAX_LINE)
+            .read_until(b'\n', &mut line)
+            .is_ok_and(|count| count > 0)
+        {
+            let text = String::from_utf8_lossy(&line);
+            self.lock().take(text.trim());
+            line.clear();
+        }
+    }
+}
+
+impl Heard {
+    fn take(&mut self, line: &str) {
+        // The cache says on every start that it cannot know the length of a pipe.
+        let is_noise = line.starts_with("[cache @") || line.contains("Last message repeated");
+        if is_noise || line.is_empty() {
+            return;
+        }
+        // Sound is not decoded, and its codecs are not read either.
+        let was_unlisted = std::mem::take(&mut self.is_unlisted);
+        if line.contains("not on whitelist") {
+            self.is_unlisted = true;
+            return;
+        }
+        let fault = fault(line, was_unlisted);
+        // It is told after the lines of what fails for want of it.
+        if self.fault.is_none() || fault == Fault::Memory {
+            self.fault = Some(fault);
+        }
+    }
+}
+
+/// The fault that a line tells.
+fn fault(line: &str, was_unlisted: bool) -> Fault {
+    let says = |text: &str| line.contains(text);
+    // A part of the program names itself and its address before what it says.
+    let text = match line.split_once("] ") {
+        Some((part, text)) if part.starts_with('[') && !text.starts_with('[') => text,
+        _ => line,
+    };
+    if says("matches no streams") {
+        Fault::NoPictures
+    } else if says("exceeds specified max pixel count") {
+        Fault::Pixels
+    } else if says("Cannot allocate memory") || says("(-12 ") {
+        Fault::Memory
+    } else if was_unlisted && says("while opening decoder") {
+        Fault::UnreadCodec
+    } else if says("moov atom not found") {
+        Fault::Damage("its index is missing, as in a file that was cut off".to_owned())
+    } else {
+        Fault::Damage(text.trim_start().chars().take(MAX_SAID).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{self, BufReader};
+
+    /// The whole line was held: as many bytes as the program has time for.
+    #[test]
+    fn of_a_line_without_an_end_little_is_held() {
+        let said = Said::default();
+        let endless = BufReader::new(io::repeat(b'x').take(64 << 20));
+        let used = allocation_counter::measure(|| said.hear(endless));
+        assert!(used.bytes_max < 64 << 10, "{used:?}");
+        assert_eq!(said.fault(), Some(Fault::Damage("x".repeat(MAX_SAID))));
+    }
+
+    #[test]
+    fn the_first_line_is_told_but_for_memory() {
+        let fault = |lines: &[&str]| {
+            let said = Said::default();
+            said.hear(lines.join("\n").as_bytes());
+            said.fault()
+        };
+        let unlisted = "[aac @ 0x1] Codec (aac) not on whitelist 'h264'";
+        let damage = |text: &str| Some(Fault::Damage(text.to_owned()));
+        assert_eq!(
+            fault(&[unlisted, "    Last message repeated 1 times"]),
+            None
+        );
+        let lines = ["[h264 @ 0x1] Invalid NAL unit size", "Error while decoding"];
+        assert_eq!(fault(&lines), damage("Invalid NAL unit size"));
+        let lines = [
+            "[mjpeg @ 0x1] get_buffer() failed",
+            "[x @ 0x1] get_buffer() failed (-12 (nil))",
+        ];
+        assert_eq!(fault(&lines), Some(Fault::Memory));
+        let failed = "Error while opening decoder for input stream #0:0 : Invalid argument";
+        assert_eq!(fault(&[unlisted, failed]), Some(Fault::UnreadCodec));
+        // The sound's codec may not be read either, and says nothing of the pictures.
+        assert_eq!(
+            fault(&[unlisted, "[h264 @ 0x1] no extradata", failed]),
+            damage("no extradata")
+        );
+    }
+}
