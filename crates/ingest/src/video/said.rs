@@ -89,34 +89,44 @@ impl Heard {
             self.is_unlisted = true;
             return;
         }
-        let fault = fault(line, was_unlisted);
-        // It is told after the lines of what fails for want of it.
-        if self.fault.is_none() || fault == Fault::Memory {
-            self.fault = Some(fault);
+        match &self.fault {
+            None => self.fault = Some(fault(line, was_unlisted)),
+            // Memory may be told after what fails for want of it.
+            Some(Fault::Damage(_)) if is_memory(line) => self.fault = Some(Fault::Memory),
+            Some(_) => {}
         }
     }
 }
 
-/// The fault that a line tells.
+/// Whether a line says that memory cannot be had: that it is not allocated, or the number of the system's error.
+fn is_memory(line: &str) -> bool {
+    line.contains("allocat") || line.contains("(-12 ")
+}
+
+/// The fault that a line tells, the first one of all.
 fn fault(line: &str, was_unlisted: bool) -> Fault {
     let says = |text: &str| line.contains(text);
-    // A part of the program names itself and its address before what it says.
-    let text = match line.split_once("] ") {
-        Some((part, text)) if part.starts_with('[') && !text.starts_with('[') => text,
-        _ => line,
-    };
+    // Parts of the program name themselves and their addresses before what they say.
+    let mut text = line;
+    while text.starts_with('[')
+        && let Some((_, rest)) = text.split_once("] ")
+    {
+        text = rest;
+    }
     if says("matches no streams") {
         Fault::NoPictures
     } else if says("exceeds specified max pixel count") {
         Fault::Pixels
-    } else if says("Cannot allocate memory") || says("(-12 ") {
+    } else if is_memory(line) || says("get_buffer() failed") {
+        // Without a line before it that says what is wrong with the picture.
         Fault::Memory
     } else if was_unlisted && says("while opening decoder") {
         Fault::UnreadCodec
     } else if says("moov atom not found") {
         Fault::Damage("its index is missing, as in a file that was cut off".to_owned())
     } else {
-        Fault::Damage(text.trim_start().chars().take(MAX_SAID).collect())
+        let text = text.trim_matches(|sign: char| sign.is_whitespace() || sign == '.');
+        Fault::Damage(text.chars().take(MAX_SAID).collect())
     }
 }
 
@@ -150,11 +160,15 @@ mod tests {
         );
         let lines = ["[h264 @ 0x1] Invalid NAL unit size", "Error while decoding"];
         assert_eq!(fault(&lines), damage("Invalid NAL unit size"));
-        let lines = [
-            "[mjpeg @ 0x1] get_buffer() failed",
-            "[x @ 0x1] get_buffer() failed (-12 (nil))",
-        ];
-        assert_eq!(fault(&lines), Some(Fault::Memory));
+        let failed = "[mjpeg @ 0x1] get_buffer() failed";
+        assert_eq!(fault(&[failed]), Some(Fault::Memory));
+        let size = "[h264 @ 0x1] [IMGUTILS @ 0x2] Picture size 0x0 is invalid";
+        assert_eq!(
+            fault(&[size, failed]),
+            damage("Picture size 0x0 is invalid")
+        );
+        let encoded = ["Error submitting video frame", "Cannot allocate memory"];
+        assert_eq!(fault(&encoded), Some(Fault::Memory));
         let failed = "Error while opening decoder for input stream #0:0 : Invalid argument";
         assert_eq!(fault(&[unlisted, failed]), Some(Fault::UnreadCodec));
         // The sound's codec may not be read either, and says nothing of the pictures.
