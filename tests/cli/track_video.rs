@@ -230,7 +230,22 @@ fn the_start_is_a_frame_or_a_time_and_what_is_before_it_is_passed_over() {
 #[ignore = "needs ffmpeg"]
 fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     let parent = folder();
+    let open = "open-gop=1:keyint=20:min-keyint=20";
+    let open_265 = format!("log-level=none:{open}");
     for (name, coded) in [
+        // Frames before one that stands for itself are made from it, and from those before it.
+        (
+            "open.mp4",
+            ["-c:v", "libx264", "-x264-params", open, "-bf", "3"],
+        ),
+        (
+            "open.mkv",
+            ["-c:v", "libx264", "-x264-params", open, "-bf", "3"],
+        ),
+        (
+            "open.mov",
+            ["-c:v", "libx265", "-x265-params", &open_265, "-bf", "3"],
+        ),
         // With B-frames, and few frames that stand for themselves.
         ("b.mp4", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
         ("b.mkv", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),

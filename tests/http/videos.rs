@@ -338,6 +338,43 @@ async fn why_a_video_is_not_read_is_told_with_its_cure() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
+/// Players show it; it was refused as damaged from its first picture on.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_video_that_was_cut_in_an_open_group_of_pictures_is_decoded() {
+    let app = TestApplication::start().await;
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole.mp4");
+    let open = "-c:v libx264 -x264-params open-gop=1:keyint=30:bframes=3";
+    let source = "testsrc2=size=320x240:rate=30 -frames:v 150";
+    std::fs::write(&whole, made("whole.mp4", &format!("{source} {open}"))).unwrap();
+    // The group before second 1.3 begins at 1.0; what is shown before 1.3 is left out by an edit list of MP4 alone.
+    for (name, least) in [("cut.mp4", 111), ("cut.mkv", 111)] {
+        let cut = folder.path().join(name);
+        let mut command = Command::new("ffmpeg");
+        command
+            .args(["-v", "error", "-ss", "1.3", "-i"])
+            .arg(&whole);
+        assert!(
+            command
+                .args(["-c", "copy"])
+                .arg(&cut)
+                .status()
+                .unwrap()
+                .success()
+        );
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request
+            .body(std::fs::read(&cut).unwrap())
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status(), 200, "{name}");
+        let count = times(&answer.bytes().await.unwrap()).len();
+        assert!((least..=121).contains(&count), "{name}: {count}");
+    }
+}
+
 /// It was told that a picture of the file was damaged.
 #[tokio::test]
 #[ignore = "needs ffmpeg"]

@@ -115,9 +115,9 @@ impl Frames {
         let (pictures, next) = match direction {
             Direction::Forwards => {
                 let from = info.seek_to(first);
+                let next = from.as_ref().map_or(0, |_| first);
                 let decoder = VideoDecoder::of_file(FFMPEG, &path, from, limits)
                     .map_err(|error| format!("{error}; install ffmpeg"))?;
-                let next = from.map_or(0, |_| first);
                 (Pictures::Forwards(Box::new(decoder)), next)
             }
             Direction::Backwards => {

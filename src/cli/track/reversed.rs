@@ -41,9 +41,10 @@ impl Reversed {
     fn decode_run(&mut self, info: &VideoInfo) -> Result<(), Box<dyn Error>> {
         let begin = self.end.saturating_sub(RUN);
         let from = info.seek_to(begin);
+        let passed_over = from.as_ref().map_or(begin, |_| 0);
         let decoder = VideoDecoder::of_file(FFMPEG, &self.path, from, self.limits)
             .map_err(|error| format!("{error}; install ffmpeg"))?;
-        self.run = pictures(decoder, from.map_or(begin, |_| 0), self.end - begin)?;
+        self.run = pictures(decoder, passed_over, self.end - begin)?;
         self.end = begin;
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! What ffprobe tells about a video: its rate, and when each of its frames is shown.
 
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 use std::process::Command;
 
@@ -118,13 +119,15 @@ impl VideoInfo {
         }
     }
 
-    /// From when on the file is to be decoded so that frame `index` is the first, in seconds after its start time:
-    /// between this frame and the one before it. None where it has to be decoded from its beginning.
-    pub fn seek_to(&self, index: u64) -> Option<f64> {
+    /// Within which seconds after its start time the file is to be decoded so that frame `index` is the first: between
+    /// the frames beside it. None where it has to be decoded from its beginning.
+    pub fn seek_to(&self, index: u64) -> Option<Range<f64>> {
         let index = usize::try_from(index).ok()?;
+        let own = self.times.get(index)?;
         let before = self.times.get(index.checked_sub(1)?)?;
-        let middle = (before + self.times.get(index)?) / 2.0;
-        Some(middle - self.indexed_from?)
+        let after = self.times.get(index + 1).unwrap_or(&f64::INFINITY);
+        let start = self.indexed_from?;
+        Some((before + own) / 2.0 - start..(own + after) / 2.0 - start)
     }
 
     /// How many frames there are, where that is known.
@@ -176,9 +179,13 @@ mod tests {
         let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,10/1\n";
         let seek_to = |format: &str| {
             let info = VideoInfo::parse(&format!("{packets}{format}\n"));
-            [0, 1, 2, 3].map(|index| info.seek_to(index).map(|time| (time * 1e6).round() / 1e6))
+            let round = |time: f64| (time * 1e6).round() / 1e6;
+            [0, 1, 2, 3].map(|index| {
+                let range = info.seek_to(index);
+                range.map(|range| (round(range.start), round(range.end)))
+            })
         };
-        let expected = [None, Some(0.05), Some(0.25), None];
+        let expected = [None, Some((0.05, 0.25)), Some((0.25, f64::INFINITY)), None];
         assert_eq!(seek_to("format,\"mov,mp4,m4a\",1.000000"), expected);
         assert_eq!(seek_to("format,\"matroska,webm\",1.000000"), expected);
         assert_eq!(seek_to("format,avi,1.000000"), [None; 4]);

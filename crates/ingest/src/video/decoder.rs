@@ -5,7 +5,10 @@ use super::error::{Cost, VideoError};
 use super::output::{self, VideoPicture};
 use super::said::{Fault, Said};
 use super::sniff::VideoFormat;
+use bytes::Bytes;
 use std::io::{self, BufReader, Write};
+use std::mem;
+use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, ChildStdout, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,16 +37,40 @@ pub struct VideoLimits {
     pub max_pictures: usize,
 }
 
+/// What is decoded.
+#[derive(Debug, Clone)]
+enum Source {
+    /// Bytes, by a program that this starts.
+    Bytes(Launcher, Bytes, VideoFormat),
+    /// A file of this machine, from a picture on that is shown within these seconds after its start time.
+    File(String, Option<Range<f64>>),
+}
+
+/// What the program is to take for damage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Strictness {
+    /// All that it finds: it ends there, in place of leaving pictures out.
+    All,
+    /// All but a picture that others are made from and that is missing, as at the start of a video that was cut where
+    /// pictures before the cut are needed. The program leaves out those that it cannot make.
+    References,
+}
+
 /// A video being decoded. The process ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoDecoder {
+    source: Source,
+    limits: VideoLimits,
+    program: String,
+    strictness: Strictness,
     child: Arc<Mutex<Child>>,
     pictures: BufReader<ChildStdout>,
     said: Said,
     hearing: Option<JoinHandle<()>>,
-    limits: VideoLimits,
-    program: String,
-    given: usize,
+    /// Pictures that are shown before this are passed over, in seconds after the file's start time.
+    from: Option<f64>,
+    /// Pictures that were read, those that were passed over too.
+    read: usize,
 }
 
 /// Ends the process from elsewhere.
@@ -65,125 +92,77 @@ impl VideoDecoder {
     pub fn of_bytes(
         launcher: &Launcher,
         program: &str,
-        bytes: impl AsRef<[u8]> + Send + 'static,
+        bytes: Bytes,
         format: VideoFormat,
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
-        let is_container = format == VideoFormat::Container;
-        let file = match launcher.hides_files && is_container {
-            true => child::nameless(bytes.as_ref()),
-            false => None,
-        };
-        // MP4 files may have their index at the end. Without a file the cache makes it possible to go back in a pipe.
-        let (protocols, source) = match (is_container, &file) {
-            (false, _) => ("pipe", &["-f", "mjpeg", "-i", "pipe:0"][..]),
-            (true, Some(_)) => ("file", &["-i", NAMELESS][..]),
-            (true, None) => ("cache,pipe", &["-i", "cache:pipe:0"][..]),
-        };
-        let mut input = vec!["-protocol_whitelist", protocols];
-        input.extend(["-format_whitelist", FORMATS, "-codec_whitelist", CODECS]);
-        input.extend(source);
-        let decoder = (launcher, program);
-        match file {
-            Some(file) => Self::start(decoder, &input, file, limits),
-            None => Self::start_fed(decoder, &input, bytes, limits),
-        }
+        let source = Source::Bytes(launcher.clone(), bytes, format);
+        Self::start(source, program, limits, Strictness::All)
     }
 
-    /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown `from`
-    /// seconds after the file's start time or later. A file without an index may begin later than that.
+    /// Begins to decode a file of this machine: from its first picture, or from the first one that is shown within these
+    /// seconds after the file's start time. A file without an index may begin later than that.
     ///
     /// # Errors
     /// The program cannot be started.
     pub fn of_file(
         program: &str,
         path: &Path,
-        from: Option<f64>,
+        from: Option<Range<f64>>,
         limits: VideoLimits,
     ) -> Result<Self, VideoError> {
         let url = format!("file:{}", path.display());
-        let from = from.map(|seconds| format!("{seconds:.6}"));
-        let mut input = vec!["-protocol_whitelist", "file"];
-        if let Some(seconds) = &from {
-            input.extend(["-ss", seconds]);
-        }
-        input.extend(["-i", &url]);
-        let decoder = (&Launcher::default(), program);
-        Self::start(decoder, &input, Stdio::null(), limits)
-    }
-
-    /// Starts the program with a pipe that these bytes come through.
-    fn start_fed(
-        decoder: (&Launcher, &str),
-        input: &[&str],
-        bytes: impl AsRef<[u8]> + Send + 'static,
-        limits: VideoLimits,
-    ) -> Result<Self, VideoError> {
-        let decoder = Self::start(decoder, input, Stdio::piped(), limits)?;
-        let stdin = lock(&decoder.child).stdin.take();
-        let mut stdin = stdin.expect("the command says that it is a pipe");
-        // It does not outlive the process. A program that has seen enough closes its input.
-        thread::spawn(move || {
-            let _ = stdin.write_all(bytes.as_ref());
-        });
-        Ok(decoder)
+        let source = Source::File(url, from);
+        Self::start(source, program, limits, Strictness::All)
     }
 
     fn start(
-        (launcher, program): (&Launcher, &str),
-        input: &[&str],
-        stdin: Stdio,
+        source: Source,
+        program: &str,
         limits: VideoLimits,
+        strictness: Strictness,
     ) -> Result<Self, VideoError> {
-        let pixels = limits.max_pixels.to_string();
-        let count = limits.max_pictures.min(MAX_PICTURES) + 1;
-        let count = count.to_string();
-        let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
-        // It ends at damage, in place of leaving pictures out.
-        let strict = ["-xerror", "-err_detect", "explode"];
-        let limit = ["-max_pixels", &pixels];
-        let chosen = [
-            "-map",
-            "0:v:0",
-            "-vsync",
-            "passthrough",
-            "-frames:v",
-            &count,
-        ];
-        let coded = [
-            "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
-        ];
-        let arguments = [
-            &before[..],
-            &strict,
-            &limit,
-            input,
-            &chosen,
-            // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
-            &output::TIME_BASE,
-            &coded,
-            &output::FORMAT,
-        ]
-        .concat();
-        let mut child = child::start(launcher, program, arguments, stdin)?;
+        let mut child = source.start(program, limits, strictness)?;
         let piped = "the command says that it is a pipe";
         let (stdout, stderr) = (
             child.stdout.take().expect(piped),
             child.stderr.take().expect(piped),
         );
         // The thread does not outlive the process.
-        let said = Said::default();
+        let said = Said::new(strictness == Strictness::References);
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));
         Ok(Self {
+            source,
+            limits,
+            program: program.to_owned(),
+            strictness,
             child: Arc::new(Mutex::new(child)),
             pictures: BufReader::new(stdout),
             said,
             hearing: Some(hearing),
-            limits,
-            program: program.to_owned(),
-            given: 0,
+            from: None,
+            read: 0,
         })
+    }
+
+    /// Begins anew where first pictures could not be made. What stops the process goes on to do so.
+    fn start_again(&mut self) -> Result<(), VideoError> {
+        end(&self.child);
+        let (source, strictness, from) = match &self.source {
+            // They are wanted. From the file's beginning on all can be made.
+            Source::File(url, Some(from)) => {
+                let whole = Source::File(url.clone(), None);
+                (whole, Strictness::All, Some(from.start))
+            }
+            source => (source.clone(), Strictness::References, self.from),
+        };
+        let mut again = Self::start(source, &self.program, self.limits, strictness)?;
+        again.from = from;
+        mem::swap(&mut *lock(&self.child), &mut *lock(&again.child));
+        mem::swap(self, &mut again);
+        mem::swap(&mut self.child, &mut again.child);
+        Ok(())
     }
 
     /// What ends the process when it is dropped, also while another thread waits for a picture.
@@ -196,6 +175,39 @@ impl VideoDecoder {
     /// # Errors
     /// The rest cannot be decoded.
     pub fn next_picture(&mut self) -> Result<Option<VideoPicture>, VideoError> {
+        loop {
+            let picture = self.read_picture();
+            if self.misses_first(&picture) {
+                self.start_again()?;
+                continue;
+            }
+            match (picture?, self.from) {
+                (Some(picture), Some(from)) if picture.time < from => {}
+                (Some(VideoPicture { jpeg, time }), Some(from)) => {
+                    let time = time - from;
+                    return Ok(Some(VideoPicture { jpeg, time }));
+                }
+                (picture, _) => return Ok(picture),
+            }
+        }
+    }
+
+    /// Whether first pictures could not be made, and others can be had by beginning anew: a picture is missing that they
+    /// are made from, which H.264 tells and H.265 passes over.
+    fn misses_first(&self, picture: &Result<Option<VideoPicture>, VideoError>) -> bool {
+        match (&self.source, picture) {
+            (Source::File(_, Some(range)), Ok(Some(picture))) => {
+                self.read == 1 && picture.time >= range.end - range.start
+            }
+            (_, Ok(_)) => false,
+            (_, Err(_)) => {
+                let is_strict = self.strictness == Strictness::All;
+                is_strict && self.read == 0 && self.said.fault() == Some(Fault::Reference)
+            }
+        }
+    }
+
+    fn read_picture(&mut self) -> Result<Option<VideoPicture>, VideoError> {
         let read = output::next_picture(&mut self.pictures, self.limits.max_bytes);
         let picture = read.map_err(|error| self.damaged(error.to_string()))?;
         if picture.is_none() {
@@ -205,7 +217,7 @@ impl VideoDecoder {
         if let Some(fault) = self.said.fault() {
             return Err(self.error(fault));
         }
-        self.given += 1;
+        self.read += 1;
         Ok(picture)
     }
 
@@ -238,14 +250,104 @@ impl VideoDecoder {
             Fault::UnreadCodec => VideoError::UnreadCodec,
             Fault::Memory => VideoError::TooCostly(Cost::Memory),
             Fault::Pixels => VideoError::TooCostly(Cost::Pixels(self.limits.max_pixels)),
+            Fault::Reference => {
+                self.damaged("a picture that others are made from is missing".to_owned())
+            }
             Fault::Damage(reason) => self.damaged(reason),
         }
     }
 
     fn damaged(&self, reason: String) -> VideoError {
-        let picture = self.given + 1;
+        let picture = self.read + 1;
         VideoError::Damaged { picture, reason }
     }
+}
+
+impl Source {
+    /// Starts the program. What it reads comes by itself.
+    fn start(
+        &self,
+        program: &str,
+        limits: VideoLimits,
+        strictness: Strictness,
+    ) -> Result<Child, VideoError> {
+        let begin = |launcher: &Launcher, input: &[&str], stdin: Stdio| {
+            let arguments = arguments(input, limits, strictness);
+            child::start(launcher, program, arguments, stdin)
+        };
+        let (launcher, bytes, format) = match self {
+            Self::Bytes(launcher, bytes, format) => (launcher, bytes, *format),
+            Self::File(url, from) => {
+                let mut input = vec!["-protocol_whitelist", "file"];
+                let from = from.as_ref().map(|range| format!("{:.6}", range.start));
+                if let Some(seconds) = &from {
+                    input.extend(["-ss", seconds]);
+                }
+                input.extend(["-i", url]);
+                return begin(&Launcher::default(), &input, Stdio::null());
+            }
+        };
+        let is_container = format == VideoFormat::Container;
+        let file = match launcher.hides_files && is_container {
+            true => child::nameless(bytes),
+            false => None,
+        };
+        // MP4 files may have their index at the end. Without a file the cache makes it possible to go back in a pipe.
+        let (protocols, source) = match (is_container, &file) {
+            (false, _) => ("pipe", &["-f", "mjpeg", "-i", "pipe:0"][..]),
+            (true, Some(_)) => ("file", &["-i", NAMELESS][..]),
+            (true, None) => ("cache,pipe", &["-i", "cache:pipe:0"][..]),
+        };
+        let mut input = vec!["-protocol_whitelist", protocols];
+        input.extend(["-format_whitelist", FORMATS, "-codec_whitelist", CODECS]);
+        input.extend(source);
+        if let Some(file) = file {
+            return begin(launcher, &input, file);
+        }
+        let mut child = begin(launcher, &input, Stdio::piped())?;
+        let stdin = child.stdin.take();
+        let mut stdin = stdin.expect("the command says that it is a pipe");
+        let bytes = bytes.clone();
+        // It does not outlive the process. A program that has seen enough closes its input.
+        thread::spawn(move || {
+            let _ = stdin.write_all(&bytes);
+        });
+        Ok(child)
+    }
+}
+
+/// The program's arguments for this input.
+fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec<String> {
+    let pixels = limits.max_pixels.to_string();
+    let count = (limits.max_pictures.min(MAX_PICTURES) + 1).to_string();
+    let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
+    let detection = match strictness {
+        Strictness::All => &["-xerror", "-err_detect", "explode"][..],
+        Strictness::References => &["-xerror"],
+    };
+    let chosen = [
+        "-map",
+        "0:v:0",
+        "-vsync",
+        "passthrough",
+        "-frames:v",
+        &count,
+    ];
+    let coded = [
+        "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
+    ];
+    let arguments = [
+        &before[..],
+        detection,
+        &["-max_pixels", &pixels],
+        input,
+        &chosen,
+        // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
+        &output::TIME_BASE,
+        &coded,
+        &output::FORMAT,
+    ];
+    arguments.concat().into_iter().map(str::to_owned).collect()
 }
 
 /// Whether the system ended it, as it does after its processor time.

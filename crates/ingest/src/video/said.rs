@@ -19,6 +19,8 @@ pub(super) enum Fault {
     Memory,
     /// A picture has too many pixels.
     Pixels,
+    /// A picture that others are made from is missing.
+    Reference,
     /// Something else: what the program says of it.
     Damage(String),
 }
@@ -29,6 +31,8 @@ pub(super) struct Said(Arc<Mutex<Heard>>);
 
 #[derive(Debug, Default)]
 struct Heard {
+    /// Whether a picture that others are made from may be missing.
+    takes_missing_references: bool,
     /// The first one that tells more than that something failed.
     fault: Option<Fault>,
     /// Whether the last line was of a codec that may not be read.
@@ -36,6 +40,14 @@ struct Heard {
 }
 
 impl Said {
+    /// Nothing yet. A picture that others are made from is told as missing, or not.
+    pub(super) fn new(takes_missing_references: bool) -> Self {
+        Self(Arc::new(Mutex::new(Heard {
+            takes_missing_references,
+            ..Heard::default()
+        })))
+    }
+
     fn lock(&self) -> MutexGuard<'_, Heard> {
         // Nothing panics while it is held.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -89,6 +101,9 @@ impl Heard {
             self.is_unlisted = true;
             return;
         }
+        if self.takes_missing_references && is_reference(line) {
+            return;
+        }
         match &self.fault {
             None => self.fault = Some(fault(line, was_unlisted)),
             // Memory may be told after what fails for want of it.
@@ -101,6 +116,17 @@ impl Heard {
 /// Whether a line says that memory cannot be had: that it is not allocated, or the number of the system's error.
 fn is_memory(line: &str) -> bool {
     line.contains("allocat") || line.contains("(-12 ")
+}
+
+/// Whether a line says of H.264 or H.265 that a picture is missing which others are made from.
+fn is_reference(line: &str) -> bool {
+    let says = [
+        "eference picture",
+        "mmco: ",
+        "co located POCs",
+        "find ref with POC",
+    ];
+    says.iter().any(|text| line.contains(text))
 }
 
 /// The fault that a line tells, the first one of all.
@@ -122,6 +148,8 @@ fn fault(line: &str, was_unlisted: bool) -> Fault {
         Fault::Memory
     } else if was_unlisted && says("while opening decoder") {
         Fault::UnreadCodec
+    } else if is_reference(line) {
+        Fault::Reference
     } else if says("moov atom not found") {
         Fault::Damage("its index is missing, as in a file that was cut off".to_owned())
     } else {
@@ -166,6 +194,11 @@ mod tests {
         assert_eq!(
             fault(&[size, failed]),
             damage("Picture size 0x0 is invalid")
+        );
+        let missing = "[h264 @ 0x1] Missing reference picture, default is 65596";
+        assert_eq!(
+            fault(&[missing, "Error while decoding"]),
+            Some(Fault::Reference)
         );
         let encoded = ["Error submitting video frame", "Cannot allocate memory"];
         assert_eq!(fault(&encoded), Some(Fault::Memory));
