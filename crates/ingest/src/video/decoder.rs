@@ -59,7 +59,8 @@ enum Strictness {
 /// A video being decoded. The process ends when this is dropped.
 #[derive(Debug)]
 pub struct VideoDecoder {
-    source: Source,
+    /// What it can begin anew with, until a picture is there.
+    source: Option<Source>,
     limits: VideoLimits,
     program: String,
     strictness: Strictness,
@@ -133,7 +134,7 @@ impl VideoDecoder {
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));
         Ok(Self {
-            source,
+            source: Some(source),
             limits,
             program: program.to_owned(),
             strictness,
@@ -146,16 +147,16 @@ impl VideoDecoder {
         })
     }
 
-    /// Begins anew where first pictures could not be made. What stops the process goes on to do so.
-    fn start_again(&mut self) -> Result<(), VideoError> {
+    /// Begins anew with this, where first pictures could not be made. What stops the process goes on to do so.
+    fn start_again(&mut self, source: Source) -> Result<(), VideoError> {
         end(&self.child);
-        let (source, strictness, from) = match &self.source {
+        let (source, strictness, from) = match source {
             // They are wanted. From the file's beginning on all can be made.
             Source::File(url, Some(from)) => {
-                let whole = Source::File(url.clone(), None);
+                let whole = Source::File(url, None);
                 (whole, Strictness::All, Some(from.start))
             }
-            source => (source.clone(), Strictness::References, self.from),
+            source => (source, Strictness::References, self.from),
         };
         let mut again = Self::start(source, &self.program, self.limits, strictness)?;
         again.from = from;
@@ -177,8 +178,10 @@ impl VideoDecoder {
     pub fn next_picture(&mut self) -> Result<Option<VideoPicture>, VideoError> {
         loop {
             let picture = self.read_picture();
-            if self.misses_first(&picture) {
-                self.start_again()?;
+            if let Some(source) = self.source.take()
+                && self.misses_first(&source, &picture)
+            {
+                self.start_again(source)?;
                 continue;
             }
             match (picture?, self.from) {
@@ -194,15 +197,19 @@ impl VideoDecoder {
 
     /// Whether first pictures could not be made, and others can be had by beginning anew: a picture is missing that they
     /// are made from, which H.264 tells and H.265 passes over.
-    fn misses_first(&self, picture: &Result<Option<VideoPicture>, VideoError>) -> bool {
-        match (&self.source, picture) {
+    fn misses_first(
+        &self,
+        source: &Source,
+        picture: &Result<Option<VideoPicture>, VideoError>,
+    ) -> bool {
+        match (source, picture) {
             (Source::File(_, Some(range)), Ok(Some(picture))) => {
-                self.read == 1 && picture.time >= range.end - range.start
+                picture.time >= range.end - range.start
             }
             (_, Ok(_)) => false,
             (_, Err(_)) => {
                 let is_strict = self.strictness == Strictness::All;
-                is_strict && self.read == 0 && self.said.fault() == Some(Fault::Reference)
+                is_strict && self.said.fault() == Some(Fault::Reference)
             }
         }
     }
@@ -296,7 +303,10 @@ impl Source {
         let (protocols, source) = match (is_container, &file) {
             (false, _) => ("pipe", &["-f", "mjpeg", "-i", "pipe:0"][..]),
             (true, Some(_)) => ("file", &["-i", NAMELESS][..]),
-            (true, None) => ("cache,pipe", &["-i", "cache:pipe:0"][..]),
+            (true, None) => (
+                "cache,pipe",
+                &["-read_ahead_limit", "-1", "-i", "cache:pipe:0"][..],
+            ),
         };
         let mut input = vec!["-protocol_whitelist", protocols];
         input.extend(["-format_whitelist", FORMATS, "-codec_whitelist", CODECS]);
