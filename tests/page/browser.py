@@ -157,6 +157,15 @@ def rows(page):
     return list(csv.DictReader(io.StringIO(saved(page, "#save-csv").decode())))
 
 
+def rows_when(page, holds):
+    """The rows, once this holds of them: an answer may be under way."""
+    late = time.monotonic() + TO_THE_END / 1000
+    while not holds(table := rows(page)):
+        assert time.monotonic() < late, table[-1]
+        page.wait_for_timeout(200)
+    return table
+
+
 def kept_rows(page):
     """The rows, once the browser keeps them. The frame that was under way when the run was stopped may come late."""
     for _ in range(6):

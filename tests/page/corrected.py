@@ -2,7 +2,7 @@
 
 import json
 
-from browser import choose, drag, frames, numbers, rows, said, saved, slow, to_the_end
+from browser import choose, drag, frames, kept_rows, numbers, rows, rows_when, said, saved, slow, to_the_end
 from clips import FRAMES, H264
 from files import choose_file, sent_box
 from kept import kept_says
@@ -93,12 +93,10 @@ def undone_while_it_is_followed(checks):
         drag(page, truth[0])
         frames(page, 40)
         page.locator("#pause").click()
-        page.wait_for_timeout(300)
-        before = rows(page)
+        before = kept_rows(page)
         drag(page, OFF)
         said(page, "The box is corrected")
-        page.wait_for_timeout(300)
-        assert numbers(rows(page)[-1])[1] > 150
+        rows_when(page, lambda table: numbers(table[-1])[1] > 150)
         page.keyboard.press("Control+z")
         said(page, "is undone")
         assert values(rows(page)) == values(before)
@@ -118,8 +116,7 @@ def box_at_the_edge(checks):
     drag(page, checks.clips["card"]["truth"][0])
     frames(page, 40)
     page.locator("#pause").click()
-    page.wait_for_timeout(300)
-    before = rows(page)
+    before = kept_rows(page)
     to_frame(page, 20)
     page.locator("#picture").focus()
     for key in ["Enter", *["ArrowLeft"] * 90, *["Shift+ArrowDown"] * 90, "Enter"]:
@@ -141,8 +138,7 @@ def refused_box(checks):
     drag(page, checks.clips["card"]["truth"][0])
     frames(page, 40)
     page.locator("#pause").click()
-    page.wait_for_timeout(300)
-    before = rows(page)
+    before = kept_rows(page)
     problem = json.dumps({"type": "https://localhost/problems#invalid-box", "status": 422, "detail": "The box is refused."})
     opening = "**/sessions/*?*box=*"
     page.route(opening, lambda route: route.fulfill(status=422, content_type="application/problem+json", body=problem))
