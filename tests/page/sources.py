@@ -3,10 +3,11 @@
 import base64
 import io
 import json
+import time
 import zipfile
 
 from browser import DRAW, begin_at, distance, drag, rows, said, saved, to_the_end
-from clips import FRAMES, H264, MPEG4, VP8
+from clips import BITS, BLOCK, FRAMES, H264, MPEG4, SIZE, VP8
 from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
 COUNT = 20
@@ -254,6 +255,38 @@ def steps_of_varying_rate(checks):
     page.context.close()
 
 
+OPEN = ("-x264-params", "open-gop=1:keyint=20:min-keyint=20", "-bf", "3")
+"""Frames before one that decoding may begin with are made from it, and from those before it."""
+LOOKS = """(canvas, [bits, block, size]) => {
+    const side = (block * canvas.width) / size;
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const green = (x, y) => data[4 * (Math.floor(y) * canvas.width + Math.floor(x)) + 1];
+    const isLit = (bit) => green((bit + 0.5) * side, side / 2) > 127;
+    const number = Array.from({ length: bits }, (_, bit) => (isLit(bit) ? 2 ** bit : 0)).reduce((sum, one) => sum + one);
+    const some = Array.from({ length: 2000 }, (_, at) => green((at * 37) % canvas.width, (at * 53) % canvas.height));
+    return [number, some];
+}"""
+"""The number that is drawn into the picture, and some of its pixels."""
+
+
+def steps_in_open_groups(checks):
+    """Back and forth each step shows the same picture, also where decoding has to begin two groups of pictures before."""
+    page = checks.page(where="here")
+    choose_file(page, checks.files.file("open.mp4", 30, (*H264, *OPEN)))
+    looked = {}
+    for button, numbers in (("forward", range(1, 46)), ("back", range(44, 0, -1))):
+        for number in numbers:
+            page.locator(f"#{button}").click()
+            late = time.monotonic() + 10
+            while (looks := page.locator("#picture").evaluate(LOOKS, [BITS, BLOCK, SIZE[0]]))[0] != number:
+                assert time.monotonic() < late, (button, number, looks[0])
+                page.wait_for_timeout(20)
+            known = looked.setdefault(number, looks[1])
+            off = sum(abs(one - other) > 8 for one, other in zip(known, looks[1]))
+            assert off < 20, f"{button} to frame {number}: {off} of {len(known)} pixels differ"
+    page.context.close()
+
+
 TEXTS = """() => {
     window.texts = [];
     const fillText = CanvasRenderingContext2D.prototype.fillText;
@@ -280,6 +313,7 @@ ALL = [
     no_use_to_a_decoder,
     steps_of_varying_rate,
     size_while_drawing,
+    steps_in_open_groups,
     folder_of_images,
     folder_with_a_damaged_image,
     dropped_and_pasted,
