@@ -103,29 +103,28 @@ async fn work_whose_client_has_gone_stops_at_the_next_frame() {
     assert_eq!(view["frames"], 1, "what was done is undone");
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_threads() {
-    let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
+/// Times of a frame of forty megapixels after a replay: its own, and that of the slowest answer beside it. A replay takes
+/// next to no time; it once marked the session as one whose frames are cheap.
+async fn beside_a_large_frame(app: &TestApplication) -> (Duration, Duration) {
     let (first, next) = (heavy::large(10), heavy::large(20));
     let response = app.create(first.clone(), &[("box", LARGE_BOX)]).await;
     let created = expect(response, StatusCode::CREATED).await;
     let id = created["id"].as_str().unwrap();
-    // A replay takes next to no time; it once marked the session as one whose frames are cheap.
     let replayed = app
         .put_target(id, first, &[("box", LARGE_BOX), ("frame", "0")])
         .await;
     assert_eq!(replayed.headers()["replayed"], "true");
     let (done, mut is_done) = tokio::sync::oneshot::channel();
     let ask = async {
-        let mut slowest = Duration::ZERO;
-        let mut asked = 0;
+        let (mut slowest, mut asked) = (Duration::ZERO, 0);
         while is_done.try_recv().is_err() {
             let sent = Instant::now();
             expect(app.get("/healthz").await, StatusCode::OK).await;
             slowest = slowest.max(sent.elapsed());
             asked += 1;
         }
-        (asked, slowest)
+        assert!(asked > 10, "{asked} answers");
+        slowest
     };
     let post = async {
         let sent = Instant::now();
@@ -133,10 +132,21 @@ async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_t
         done.send(()).unwrap();
         sent.elapsed()
     };
-    let (took, (asked, slowest)) = tokio::join!(post, ask);
-    println!("{took:?} for the frame, {asked} answers of /healthz, the slowest after {slowest:?}");
-    assert!(
-        asked > 10 && slowest < took / 2,
-        "{asked} {slowest:?} of {took:?}"
-    );
+    tokio::join!(post, ask)
+}
+
+/// A busy machine may stop any process for a while; a service that stalls does so each time.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_frame_of_forty_megapixels_after_a_replay_does_not_stall_the_network_threads() {
+    let app = TestApplication::start_with(|config| config.workers = Some(1)).await;
+    let mut stalls = Vec::new();
+    while stalls.len() < 3 {
+        let (took, slowest) = beside_a_large_frame(&app).await;
+        println!("{took:?} for the frame, the slowest answer of /healthz after {slowest:?}");
+        if slowest < took / 2 {
+            return;
+        }
+        stalls.push((took, slowest));
+    }
+    panic!("{stalls:?}");
 }
