@@ -1,7 +1,6 @@
 """Video files in the page: every frame once, boxes in the file's own pixels, a video that can be saved."""
 
 import json
-import pathlib
 import statistics
 
 from browser import DRAW, distance, drag, frames, rows, said, saved, slow, to_the_end
@@ -230,14 +229,6 @@ def plain_http(checks):
     service.stop()
 
 
-def file_that_cannot_be_played(checks):
-    page = checks.page()
-    page.locator("#file").set_input_files(pathlib.Path(__file__))
-    said(page, "cannot play files.py")
-    assert page.locator("#stage video").count() == 0
-    page.context.close()
-
-
 ALL = [
     h264_file,
     vp8_file,
@@ -247,5 +238,4 @@ ALL = [
     service_killed,
     paused_past_the_expiry,
     plain_http,
-    file_that_cannot_be_played,
 ]
