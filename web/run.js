@@ -58,7 +58,7 @@ export class Run {
     /** @type {{box: Box, object: FollowedObject | undefined} | undefined} A box that was drawn, until the frames on their
      * way are answered: for an object, or for a new one. */
     this.drawn = undefined;
-    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back. */
+    /** @type {(() => Promise<void>) | undefined} Goes on with a run that was brought back, or stopped. */
     this.wake = undefined;
     /** Whether earlier frames are tracked anew. */
     this.isRedoing = false;

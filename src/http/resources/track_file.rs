@@ -4,6 +4,7 @@ use super::track_video::{TrackedFrame, VideoTrack};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::charged_body::charged_body;
 use axum::response::{IntoResponse, Response};
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::media_types::LINES;
 use bagtrack_api::requests::TrackSettings;
 use bagtrack_formats::{Clip, Columns, FileFormat, Row};
@@ -156,8 +157,12 @@ impl TrackFile {
 
 /// Says how the frames before the one that cannot be had are tracked.
 fn before(problem: Problem, given: u64) -> Problem {
+    let is_of_video = matches!(
+        problem.kind(),
+        Kind::FrameDamaged | Kind::FrameTooLarge | Kind::RequestTooCostly | Kind::TooManyFrames
+    );
     match given.checked_sub(1) {
-        Some(count) if problem.kind().status() < 500 => problem.and(&format!(
+        Some(count) if is_of_video => problem.and(&format!(
             "`count={count}` gives the file of the frames before it."
         )),
         _ => problem,

@@ -53,7 +53,7 @@ enum Strictness {
     All,
     /// All but a picture that others are made from and that is missing, as at the start of a video that was cut where
     /// pictures before the cut are needed. The program leaves out those that it cannot make.
-    References,
+    AllButReferences,
 }
 
 /// A video being decoded. The process ends when this is dropped.
@@ -130,7 +130,7 @@ impl VideoDecoder {
             child.stderr.take().expect(piped),
         );
         // The thread does not outlive the process.
-        let said = Said::new(strictness == Strictness::References);
+        let said = Said::new(strictness == Strictness::AllButReferences);
         let heard = said.clone();
         let hearing = thread::spawn(move || heard.hear(BufReader::new(stderr)));
         Ok(Self {
@@ -156,7 +156,7 @@ impl VideoDecoder {
                 let whole = Source::File(url, None);
                 (whole, Strictness::All, Some(from.start))
             }
-            source => (source, Strictness::References, self.from),
+            source => (source, Strictness::AllButReferences, self.from),
         };
         let mut again = Self::start(source, &self.program, self.limits, strictness)?;
         again.from = from;
@@ -333,7 +333,7 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
     let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
     let detection = match strictness {
         Strictness::All => &["-xerror", "-err_detect", "explode"][..],
-        Strictness::References => &["-xerror"],
+        Strictness::AllButReferences => &["-xerror"],
     };
     let chosen = [
         "-map",
