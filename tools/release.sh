@@ -26,7 +26,7 @@ files=$root/target/release-files
 mkdir -p "$files"
 # A copy has the same target folder, and so the same dependencies.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
-crates=(bagtrack-tracker bagtrack-api bagtrack-siamese bagtrack-ingest bagtrack-sessions bagtrack-net bagtrack-sample bagtrack-formats bagtrack-cli bagtrack-config bagtrack-access bagtrack-eval bagtrack bagtrack-client)
+crates=(bagtrack-tracker bagtrack-api bagtrack-siamese bagtrack-ingest bagtrack-sessions bagtrack-net bagtrack-sample bagtrack-formats bagtrack-cli bagtrack-config bagtrack-quotas bagtrack-access bagtrack-eval bagtrack bagtrack-client)
 
 # Goes to a copy of the commit with the URL of the repository in its manifests.
 name_repository() {

@@ -27,7 +27,6 @@ mod metrics;
 mod middleware;
 mod page;
 mod problems;
-mod quotas;
 mod resources;
 mod respond;
 mod server;
@@ -49,7 +48,7 @@ pub use bagtrack_config::{
 };
 #[cfg(feature = "tls")]
 pub use bagtrack_net::{Certificate, CertificateError};
-pub use quotas::client::Client;
+pub use bagtrack_quotas::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, Shutdown};
 pub use server::bind_error::BindError;

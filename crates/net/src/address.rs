@@ -1,7 +1,11 @@
 //! Which addresses are one customer's: a provider gives a customer a whole network of IPv6.
 
 use ipnet::Ipv6Net;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
+
+/// The address at the other end of a connection.
+#[derive(Debug, Clone, Copy)]
+pub struct Peer(pub SocketAddr);
 
 /// Bits of an IPv6 address that a provider gives to one customer at least (RFC 6177).
 const IPV6_PREFIX: u8 = 64;

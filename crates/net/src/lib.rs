@@ -22,7 +22,7 @@ mod handshake;
 mod least_rate;
 
 pub use activity::Activity;
-pub use address::{customer_address, wider_networks};
+pub use address::{Peer, customer_address, wider_networks};
 #[cfg(feature = "tls")]
 pub use certificate::{Certificate, CertificateError};
 pub use connection_hold::ConnectionHold;

@@ -4,8 +4,10 @@ use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use bagtrack_access::SessionToken;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::{Owner, SessionName};
 use std::io;
+use std::net::Ipv4Addr;
 use std::sync::Arc;
 use std::time::SystemTime;
 use uuid::Uuid;
@@ -74,6 +76,12 @@ impl Caller {
             Some(_) => Err(Problem::forbidden()),
         }
     }
+}
+
+/// The client of a request that has passed [the layer that notes it](crate::http::middleware::client_identity).
+pub fn client_of(parts: &Parts) -> Client {
+    let client = parts.extensions.get::<Client>().cloned();
+    client.unwrap_or_else(|| Client::at(Ipv4Addr::UNSPECIFIED.into()))
 }
 
 impl<S: Send + Sync> FromRequestParts<S> for Caller {

@@ -1,8 +1,8 @@
 //! A request to look at a session's state, on a worker.
 
+use super::caller::client_of;
 use super::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -31,7 +31,7 @@ impl<Q: FromRequestParts<AppState, Rejection = Problem> + Send> FromRequestParts
         let path = SessionPath::from_request_parts(parts, state).await?;
         let session = path.find(state).await?;
         let admission = &state.service.admission;
-        let client = Client::of(parts);
+        let client = client_of(parts);
         let account = state.clients.account(&client);
         admission.check_place(account.flow())?;
         let request = account.request()?;

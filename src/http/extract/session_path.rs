@@ -1,11 +1,11 @@
 //! The `{id}` of a session's path.
 
-use crate::http::extract::caller::Caller;
+use super::caller::{Caller, client_of};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::Session;
 use std::sync::Arc;
 use uuid::Uuid;
@@ -25,7 +25,7 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionPath {
         // Bytes that are not UTF-8 are the id of no session.
         let caller = Caller::from_request_parts(parts, state).await?;
         let path = Path::<String>::from_request_parts(parts, state).await;
-        let client = Client::of(parts);
+        let client = client_of(parts);
         path.map(|Path(id)| Self { id, caller, client })
             .map_err(|_| Problem::session_not_found())
     }

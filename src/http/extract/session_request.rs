@@ -1,5 +1,6 @@
 //! A request with frames for a live session.
 
+use super::caller::client_of;
 use super::instance::Instance;
 use super::texts::Texts;
 use super::uploaded::Upload;
@@ -7,10 +8,10 @@ use super::uploaded::admit;
 use crate::http::extract::answer_form::AnswerForm;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Request};
 use bagtrack_api::requests::Settings;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::{QueuePermit, SessionPermit};
 
 /// A request with frames for a live session, with its permits.
@@ -39,7 +40,7 @@ impl<S: Settings> FromRequest<AppState> for SessionRequest<S> {
         let (mut parts, body) = request.into_parts();
         let path = SessionPath::from_request_parts(&mut parts, state).await?;
         let permit = path.find(state).await?.enter()?;
-        let (client, form) = (Client::of(&parts), AnswerForm::of(&parts.headers));
+        let (client, form) = (client_of(&parts), AnswerForm::of(&parts.headers));
         let read = async {
             let admitted = admit(state, &parts)?;
             let request = Request::from_parts(parts, body);

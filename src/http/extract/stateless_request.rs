@@ -1,14 +1,14 @@
 //! A request that needs no session, with its place in the queue.
 
-use super::caller::Caller;
+use super::caller::{Caller, client_of};
 use super::instance::Instance;
 use super::texts::Texts;
 use super::uploaded::{Upload, admit};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Request};
 use bagtrack_api::requests::Settings;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::QueuePermit;
 
 /// A request with files and settings and no session. A session token does not do.
@@ -33,7 +33,7 @@ impl<S: Settings> FromRequest<AppState> for StatelessRequest<S> {
         let (mut parts, body) = request.into_parts();
         let caller = Caller::from_request_parts(&mut parts, state).await?;
         caller.require_key()?;
-        let client = Client::of(&parts);
+        let client = client_of(&parts);
         let admitted = admit(state, &parts)?;
         let request = Request::from_parts(parts, body);
         let (upload, queue) = Upload::read(state, admitted, texts, request).await?;

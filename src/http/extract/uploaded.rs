@@ -1,13 +1,12 @@
 //! The frames and settings of a request, whichever form they came in.
 
 use super::body;
+use super::caller::client_of;
 use super::json;
 use super::multipart;
 use super::pace::paced;
 use super::texts::{Fields, Texts};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::account::RequestPermit;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::Request;
@@ -17,6 +16,7 @@ use bagtrack_api::ProblemKind as Kind;
 use bagtrack_api::media_types::SNAPSHOT;
 use bagtrack_api::requests::{FrameCount, Settings};
 use bagtrack_ingest::video::{VideoFormat, video_format};
+use bagtrack_quotas::RequestPermit;
 use bagtrack_sessions::{Charge, ChargedBytes, QueuePermit, WorkMeter};
 use std::sync::Arc;
 
@@ -167,9 +167,9 @@ pub fn admit(state: &AppState, parts: &Parts) -> Result<RequestPermit, Problem> 
     if length.is_some_and(|length| length > max as u64) {
         return Err(Problem::body_too_large(max));
     }
-    let account = state.clients.account(&Client::of(parts));
+    let account = state.clients.account(&client_of(parts));
     state.service.admission.check_place(account.flow())?;
-    account.request()
+    Ok(account.request()?)
 }
 
 /// Whether bytes have lost all line breaks and zeros, as `curl -d` sends a file. No image of this length is without.

@@ -1,8 +1,8 @@
 //! Places for the processes that decode videos: a client has one at a time, so that another client gets the next.
 
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::{self, timeout_at};
 use bagtrack_sessions::{QueueFull, QueuePermit};
 use tokio::sync::OwnedSemaphorePermit;
@@ -21,7 +21,7 @@ pub struct VideoPlace {
 pub async fn count_frame(state: &AppState, client: &Client) -> Result<(), Problem> {
     let deadline = clock::now() + state.config.work_timeout;
     let account = state.clients.account(client);
-    account.count_frame_in_order(deadline).await
+    Ok(account.count_frame_in_order(deadline).await?)
 }
 
 impl VideoPlace {
@@ -38,9 +38,7 @@ impl VideoPlace {
         let config = &state.config;
         let deadline = clock::now() + config.work_timeout;
         let request = queue.yield_place();
-        let own = state.clients.account(client).videos().acquire_owned();
-        let own = timeout_at(deadline, own).await.ok().and_then(Result::ok);
-        let own = own.ok_or_else(|| Problem::quota_exceeded("videos at a time", 1))?;
+        let own = state.clients.account(client).video_until(deadline).await?;
         let all = timeout_at(deadline, state.videos.clone().acquire_owned()).await;
         let all = all.ok().and_then(Result::ok).ok_or(QueueFull)?;
         let requests = config.limits.max_video_frames.div_ceil(config.max_frames);

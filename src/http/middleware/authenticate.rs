@@ -5,7 +5,6 @@
 
 use crate::http::extract::caller::Caller;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE};
@@ -13,6 +12,7 @@ use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_access::{NotIdentified, TOKEN_PREFIX};
+use bagtrack_quotas::Client;
 
 /// What a request without a key or a token is told, and one whose token is not taken (RFC 6750, section 3).
 const CHALLENGE: HeaderValue = HeaderValue::from_static("Bearer realm=\"bagtrack\"");

@@ -1,13 +1,15 @@
 //! Notes which client a request is from, and tells the client what is left of its quotas.
 
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::{Client, Peer};
+use crate::http::respond::rate_limit::write_headers;
 use crate::http::state::AppState;
 use axum::extract::{Request, State};
 use axum::middleware::Next;
 use axum::response::Response;
 use bagtrack_api::ProblemKind as Kind;
+use bagtrack_net::Peer;
 use bagtrack_net::{client_address, is_forwarded, is_trusted};
+use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::sleep;
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Duration;
@@ -66,7 +68,7 @@ pub async fn identify(State(state): State<AppState>, mut request: Request, next:
         sleep(REFUSAL_DELAY).await;
     }
     if let Some(client) = client {
-        state.clients.write_headers(&client, response.headers_mut());
+        write_headers(&state.clients.account(&client), response.headers_mut());
     }
     response
 }

@@ -4,6 +4,7 @@
 //! known by its address: most of it needs no key. A trusted proxy that asks for itself is not counted.
 
 use super::client_identity::{REFUSAL_DELAY, client_at};
+use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::Method;
@@ -46,11 +47,11 @@ pub async fn bound_rate(State(state): State<AppState>, request: Request, next: N
     let count = || state.clients.account(&client).count_asked();
     let counts = Counts::of(&request);
     if counts == Counts::Always
-        && let Err(problem) = count()
+        && let Err(exceeded) = count()
     {
         // Whoever does not wait before it asks again is answered no faster.
         sleep(REFUSAL_DELAY).await;
-        return problem.into_response();
+        return Problem::from(exceeded).into_response();
     }
     let response = next.run(request).await;
     let counts_now = match counts {

@@ -3,6 +3,7 @@
 use super::problem::Problem;
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_ingest::IngestError;
+use bagtrack_quotas::RateExceeded;
 use bagtrack_sessions::{
     ActError, BudgetFull, FrameFault, FramesError, ImplausibleBox, NoSession, OpenError, QueueFull,
     QuotaExhausted, ReplayError, SessionBusy, SnapshotError, StartError, Stopped, StoreUnavailable,
@@ -189,7 +190,16 @@ impl From<WorkPanicked> for Problem {
 
 impl From<QuotaExhausted> for Problem {
     fn from(QuotaExhausted { what, limit }: QuotaExhausted) -> Self {
-        Self::quota_exceeded(what, limit)
+        let detail = format!(
+            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
+        );
+        Self::new(Kind::QuotaExceeded, detail)
+    }
+}
+
+impl From<RateExceeded> for Problem {
+    fn from(RateExceeded { what, limit, wait }: RateExceeded) -> Self {
+        Self::from(QuotaExhausted { what, limit }).retry_after(wait)
     }
 }
 

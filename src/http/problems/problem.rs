@@ -108,14 +108,6 @@ impl Problem {
         Self::new(Kind::RequestTooCostly, detail)
     }
 
-    /// The client has as many of something as one client may have.
-    pub fn quota_exceeded(what: &str, limit: usize) -> Self {
-        let detail = format!(
-            "One client may have {limit} {what} here. Try again after the time in `Retry-After`. Nothing was changed."
-        );
-        Self::new(Kind::QuotaExceeded, detail)
-    }
-
     /// The request has more frames than it may.
     pub fn too_many_frames(limit: usize) -> Self {
         let detail = format!(
@@ -171,11 +163,6 @@ impl Problem {
     pub fn retry_after(mut self, wait: Duration) -> Self {
         self.retry_after = Some(wait);
         self
-    }
-
-    /// When trying again makes sense, where it is known better than by the kind.
-    pub fn wait(&self) -> Option<Duration> {
-        self.retry_after
     }
 
     /// Seconds after which trying again makes sense, where it does; at least 1.

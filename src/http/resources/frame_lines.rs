@@ -8,7 +8,6 @@ use crate::http::extract::session_request::SessionRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::respond::answer::stream_answer;
 use crate::http::respond::ndjson::{self, FrameSequence};
 use crate::http::state::AppState;
@@ -17,6 +16,7 @@ use axum::response::Response;
 use bagtrack_api::StreamAnswer;
 use bagtrack_api::requests::FramesSettings;
 use bagtrack_ingest::video::VideoFormat;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::{self, Instant, timeout_at};
 use bagtrack_sessions::{
     Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,

@@ -1,14 +1,12 @@
 //! `POST /sessions` and `PUT /sessions/{id}`: a first frame and a box, or a snapshot, open a session.
 
-use crate::http::extract::caller::Caller;
+use crate::http::extract::caller::{Caller, client_of};
 use crate::http::extract::idempotency_key;
 use crate::http::extract::overrides;
 use crate::http::extract::texts::Texts;
 use crate::http::extract::uploaded::Upload;
 use crate::http::extract::uploaded::admit;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::account::{Account, ClientSessions};
-use crate::http::quotas::client::Client;
 use crate::http::respond::created_session::created;
 use crate::http::state::AppState;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request, State};
@@ -17,6 +15,7 @@ use axum::response::Response;
 use bagtrack_api::CreatedSession;
 use bagtrack_api::openapi::{create_description, example_frames};
 use bagtrack_api::requests::{BinaryBody, CreateSettings, FormBody, JsonBody};
+use bagtrack_quotas::{Account, Client, ClientSessions};
 use bagtrack_sessions::{CreationKey, OpenRequest, QueuePermit, Start, is_snapshot};
 use serde_json::json;
 use std::sync::Arc;
@@ -121,12 +120,12 @@ impl FromRequest<AppState> for CreateRequest {
             }
             (Some(id), None) => Some(CreationKey::Id(id)),
             (None, Some(key)) => {
-                let key = scoped(key, state, &Client::of(&parts));
+                let key = scoped(key, state, &client_of(&parts));
                 Some(CreationKey::Key(caller.owner().clone(), key))
             }
             (None, None) => None,
         };
-        let account = state.clients.account(&Client::of(&parts));
+        let account = state.clients.account(&client_of(&parts));
         // A request that comes again may have its answer already.
         if key.is_none() {
             let quota = ClientSessions(account.clone());

@@ -3,12 +3,12 @@
 use crate::http::extract::video_place::count_frame;
 use crate::http::extract::video_range::{RangeFrame, RangeFrames};
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::client::Client;
 use crate::http::respond::answer::answer;
 use crate::http::respond::ndjson::FrameSequence;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use bagtrack_api::Answer;
+use bagtrack_quotas::Client;
 use bagtrack_sessions::{
     Boxes, Estimates, QueuePermit, Selection, SessionState, Start, box_warnings,
 };

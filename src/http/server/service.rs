@@ -1,13 +1,13 @@
 //! The service without a network: its routes, and what goes on beside requests.
 
 use super::bind_error::BindError;
-use crate::http::quotas::client::Peer;
 use crate::http::server::connection_service::ConnectionService;
 use crate::http::server::router::router;
 use crate::http::state::AppState;
 use axum::{Extension, Router};
 use bagtrack_access::Access;
 use bagtrack_config::Config;
+use bagtrack_net::Peer;
 use bagtrack_net::Security;
 use bagtrack_sessions::clock::interval;
 use bagtrack_sessions::{Clock, Executor, SessionStore};

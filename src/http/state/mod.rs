@@ -5,11 +5,10 @@
 mod saturation;
 
 use crate::http::metrics::registry::Metrics;
-use crate::http::quotas::client::Client;
-use crate::http::quotas::clients::Clients;
 use axum::body::Bytes;
 use bagtrack_access::Access;
 use bagtrack_config::Config;
+use bagtrack_quotas::{Client, Clients};
 use bagtrack_sessions::clock::Instant;
 use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,

@@ -5,9 +5,9 @@ use super::waiting::{Arrived, ArrivedFrame, Waiting};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::overrides::rect;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::account::Account;
 use crate::http::state::AppState;
 use bagtrack_api::ProblemKind as Kind;
+use bagtrack_quotas::Account;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
     ActError, Estimates, FrameBatch, FramesError, QueueFull, QueuePermit, Session, SessionBusy,

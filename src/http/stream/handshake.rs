@@ -4,19 +4,18 @@ use super::frame_work::FrameWork;
 use super::session_stream::{SessionStream, Stand};
 use super::upgrade::{MessageLimits, Upgrade};
 use super::waiting::Waiting;
-use crate::http::extract::caller::Caller;
+use crate::http::extract::caller::{Caller, client_of};
 use crate::http::extract::instance::Instance;
 use crate::http::extract::query::QuerySettings;
 use crate::http::extract::session_path::SessionPath;
 use crate::http::problems::problem::Problem;
-use crate::http::quotas::account::Account;
-use crate::http::quotas::client::Client;
 use crate::http::state::AppState;
 use axum::extract::{FromRequestParts, State};
 use axum::http::request::Parts;
 use axum::response::Response;
 use bagtrack_api::requests::StreamSettings;
 use bagtrack_net::{ConnectionHold, LeastRate, Rates};
+use bagtrack_quotas::{Account, Client};
 use bagtrack_sessions::{Flow, ReplayError, Session, StreamPlace};
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -110,7 +109,7 @@ impl FromRequestParts<AppState> for StreamRequest {
             upgrade,
             connection,
             caller: Caller::from_request_parts(parts, state).await?,
-            client: Client::of(parts),
+            client: client_of(parts),
         })
     }
 }

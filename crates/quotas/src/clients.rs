@@ -1,10 +1,8 @@
-//! The accounts of all clients. Each is told its quotas in the headers `RateLimit-Policy` and `RateLimit`
-//! (draft-ietf-httpapi-ratelimit-headers).
+//! The accounts of all clients.
 
 use super::account::{Account, Quotas};
 use super::client::Client;
 use super::holdings::Holdings;
-use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use bagtrack_config::Config;
 use bagtrack_sessions::{Flow, MAX_LIST_BYTES};
 use ipnet::Ipv6Net;
@@ -12,11 +10,6 @@ use std::collections::HashMap;
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// The header with what is left of a client's quotas.
-pub const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
-/// The header with a client's quotas.
-pub const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// Accounts above which those with nothing in use are forgotten.
 const MAX_IDLE_ACCOUNTS: usize = 1024;
@@ -107,32 +100,6 @@ impl Clients {
             .entry(network)
             .or_insert_with(|| Arc::new(Holdings::of_network()))
             .clone()
-    }
-
-    /// Tells a client its quotas and what is left of them.
-    pub fn write_headers(&self, client: &Client, headers: &mut HeaderMap) {
-        let account = self.account(client);
-        let quotas = &account.quotas;
-        let mut policy = format!(
-            "\"requests\";q={};qu=\"concurrent-requests\", \"sessions\";q={};qu=\"sessions\"",
-            quotas.requests, quotas.sessions
-        );
-        let mut left = format!(
-            "\"requests\";r={}, \"sessions\";r={}",
-            account.requests_left(),
-            account.held.sessions.left()
-        );
-        if let Some((rate, burst)) = quotas.frames {
-            let window = burst.get().div_ceil(rate.get());
-            let frames_left = account.counting_frames().frames_left(rate, burst);
-            policy += &format!(", \"frames\";q={burst};w={window};qu=\"frames\"");
-            left += &format!(", \"frames\";r={frames_left};t={window}");
-        }
-        for (name, value) in [(RATE_LIMIT_POLICY, policy), (RATE_LIMIT, left)] {
-            if let Ok(value) = HeaderValue::from_str(&value) {
-                headers.insert(name, value);
-            }
-        }
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<Client, Arc<Account>>> {

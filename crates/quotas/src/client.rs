@@ -1,19 +1,13 @@
 //! Who a request comes from, as far as quotas and turns go.
 
-use axum::http::request::Parts;
 use bagtrack_net::{customer_address, wider_networks};
 use ipnet::Ipv6Net;
 use std::fmt;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::IpAddr;
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// The address at the other end of the connection.
-#[derive(Debug, Clone, Copy)]
-pub struct Peer(pub SocketAddr);
-
-/// A client: who shares quotas and turns. Whoever authenticates a request puts [`Client::Key`] or [`Client::Page`]
-/// into its extensions before its handler runs; else it is the address.
+/// A client: who shares quotas and turns.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Client {
     /// The name of an API key.
@@ -45,12 +39,6 @@ impl Client {
             Self::Key(name) | Self::Page(name, _) => Some(name),
             Self::Address(_) => None,
         }
-    }
-
-    /// The client of a request that has passed the layer that notes it.
-    pub fn of(parts: &Parts) -> Self {
-        let client = parts.extensions.get::<Self>().cloned();
-        client.unwrap_or_else(|| Self::at(Ipv4Addr::UNSPECIFIED.into()))
     }
 }
 

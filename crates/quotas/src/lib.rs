@@ -1,0 +1,23 @@
+//! What each client may use: sessions, requests and frames in a time, and work at once.
+//!
+//! In: who makes a request ([`Client`]). Out: its [`Account`], which gives a permit for it, or says why not
+//! ([`QuotaExhausted`](bagtrack_sessions::QuotaExhausted), [`RateExceeded`]).
+//!
+//! What can go wrong: a client changes its address to count as new. IPv6 addresses count by their network, and the
+//! table of clients is bounded.
+
+#![warn(clippy::disallowed_methods)]
+
+mod account;
+mod client;
+mod clients;
+mod holdings;
+mod rates;
+mod sessions;
+
+pub use account::{Account, RequestPermit};
+pub use client::Client;
+pub use clients::Clients;
+pub use holdings::Holdings;
+pub use rates::RateExceeded;
+pub use sessions::ClientSessions;
