@@ -126,7 +126,8 @@ function yolo(run) {
     name: `labels/train/${imageName(run, frame).replace(/\.[^./]*$/, "")}.txt`,
     text: text.map((line) => `${line}\n`).join(""),
   }));
-  return zip([{ name: "data.yaml", text: `path: .\ntrain: images/train\nnames:\n${names}` }, ...texts]);
+  const about = `train: images/train\n# To train, add other frames to validate with: val: images/val\nnames:\n${names}`;
+  return zip([{ name: "data.yaml", text: about }, ...texts]);
 }
 
 /** Whether the video has a frame after the last row of an object, as far as is known.

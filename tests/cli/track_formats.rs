@@ -271,6 +271,8 @@ fn labels_of_yolo_go_to_a_new_folder() {
     let with = [&flags[..], &["-o", text(&out)]].concat();
     assert_eq!(succeeds(&with), "");
     let about = fs::read_to_string(out.join("data.yaml")).expect("it was written");
+    // With a `path` of its own it would be found from one folder only.
+    assert!(about.starts_with("train: images/train\n"), "{about}");
     assert!(
         about.ends_with("names:\n  0: \"Object 1\"\n  1: \"Object 2\"\n"),
         "{about}"

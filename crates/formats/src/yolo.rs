@@ -7,9 +7,14 @@ use super::clip::{Clip, image_name};
 use super::row::Row;
 use std::path::Path;
 
+/// Without `path` the folder of the file is meant, wherever it lies. Ultralytics does not train without `val`; were it the
+/// same frames, readers of annotations would have each box twice.
+const BEGINNING: &str =
+    "train: images/train\n# To train, add other frames to validate with: val: images/val\nnames:\n";
+
 /// The texts of rows in the order of frames.
 pub fn folder(clip: &Clip, rows: &[Row]) -> serde_json::Result<Vec<TextFile>> {
-    let mut about = "path: .\ntrain: images/train\nnames:\n".to_owned();
+    let mut about = BEGINNING.to_owned();
     let classes = clip.classes();
     for (class, name) in classes.iter().enumerate() {
         // A text of JSON is one of YAML.
