@@ -98,13 +98,13 @@ def played_again(checks):
     frames(page, 60)
     page.locator("#stop").click()
     said(page, "Stopped")
-    page.wait_for_timeout(300)
     table = rows(page)
     at = lambda: int(page.locator("#timeline").get_attribute("aria-valuenow"))
     page.keyboard.press("Space")
-    page.wait_for_timeout(1000)
+    playing = "const now = Number(document.getElementById('timeline').ariaValueNow); return now >= 3 && now < LAST"
+    page.wait_for_function("() => {" + playing.replace("LAST", str(len(table) - 1)) + "}")
     page.keyboard.press("Space")
-    page.wait_for_timeout(200)
+    page.locator("#pause", has_text="Play").wait_for()
     paused = at()
     assert 3 <= paused < len(table) - 1, paused
     page.wait_for_timeout(300)

@@ -14,7 +14,7 @@ settings! {
         # "Uploads"
         /// Most pixels of the frames of one post together; a post of one frame has the limit of a frame.
         max_request_pixels: u64 = 160_000_000, positive;
-        /// Most frames of a video.
+        /// Most frames of a video that a request takes. Those before its `start` do not count.
         max_video_frames: usize = 3600, positive;
         /// The program that decodes videos: its name or path. `off` refuses videos.
         ffmpeg: String = "ffmpeg".to_owned();
