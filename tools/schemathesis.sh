@@ -25,7 +25,7 @@ until url=$(grep --only-matching --max-count=1 'http://127[0-9.:]*' "$log"); do
     sleep 0.1
 done
 
-# A stream begins with a WebSocket handshake, which schemathesis does not speak; tests/http/stream.rs does.
+# A stream begins with a WebSocket handshake, which schemathesis does not speak; tests/http/streams does.
 options=(--exclude-path '/sessions/{id}/stream')
 [ -z "$seconds" ] || options+=(--max-time "$seconds")
 BAGTRACK_URL=$url SCHEMATHESIS_HOOKS=tools/schemathesis_hooks.py PYTHONPATH=tools \

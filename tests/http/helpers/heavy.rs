@@ -1,0 +1,97 @@
+//! Requests that keep a worker busy: many frames, for sessions with the most expensive parameters there are.
+
+use crate::application::{BOX, TestApplication};
+use crate::helpers::raw::RawConnection;
+use crate::pictures;
+use crate::requests::forms::form;
+use bagtrack_testing::within::within;
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
+use reqwest::multipart::Form;
+use reqwest::{Method, RequestBuilder, StatusCode};
+use std::io::Cursor;
+use tokio::task::JoinSet;
+
+/// Frames of one request that take the worker some seconds.
+pub const FRAMES: usize = 200;
+
+/// The most expensive parameters.
+pub const PARAMS: &str = r#"{"particles": 260, "patch_width": 64, "patch_height": 64, "bag_size": 32,
+    "update_every": 1, "history": 10, "basis_dim": 6}"#;
+
+/// A lossless WebP of 8192 x 4094 equal pixels: some kilobytes that take a worker tenths of a second, in one piece.
+pub fn bomb() -> Vec<u8> {
+    let picture = RgbImage::from_pixel(8192, 4094, Rgb([77; 3]));
+    let mut bytes = Cursor::new(Vec::new());
+    let picture = DynamicImage::ImageRgb8(picture);
+    picture.write_to(&mut bytes, ImageFormat::WebP).unwrap();
+    bytes.into_inner()
+}
+
+/// A picture of 40 megapixels.
+pub fn large(value: u8) -> Vec<u8> {
+    let picture = GrayImage::from_fn(8000, 5000, |x, y| {
+        Luma([value + ((x / 80) ^ (y / 50)) as u8 % 90])
+    });
+    pictures::encode(picture, ImageFormat::Png)
+}
+
+/// Opens a session whose frames take long; gives its path.
+pub async fn open(app: &TestApplication) -> String {
+    let query = [("box", BOX), ("preset", "paper"), ("parameters", PARAMS)];
+    loop {
+        let response = app.create(pictures::png(0), &query).await;
+        // A busy machine may take longer for it than the time that a test gives its requests.
+        if response.status() == StatusCode::CREATED {
+            return response.headers()["location"].to_str().unwrap().to_owned();
+        }
+    }
+}
+
+/// The request with so many frames for this session.
+pub fn post(app: &TestApplication, session: &str, frames: usize) -> RequestBuilder {
+    let request = app.request(Method::POST, &format!("{session}/frames"), &[]);
+    request.multipart(same_frames(frames))
+}
+
+fn same_frames(count: usize) -> Form {
+    form(vec![pictures::png(1); count])
+}
+
+/// Keeps the only place in the queue taken until the returned value is dropped.
+pub async fn fill_queue(app: &TestApplication) -> JoinSet<()> {
+    let session = open(app).await;
+    let mut busy = JoinSet::new();
+    let (client, url) = (
+        app.client.clone(),
+        format!("http://{}{session}/frames", app.address),
+    );
+    busy.spawn(async move {
+        // The place may be the other request's below when this one comes.
+        while let Ok(_answered) = client
+            .post(&url)
+            .multipart(same_frames(FRAMES))
+            .send()
+            .await
+        {}
+    });
+    let full = async { while app.get(&format!("{session}/snapshot")).await.status() != 503 {} };
+    within(full, "the queue is full").await;
+    busy
+}
+
+/// Sends a request with a body for this path by hand.
+pub async fn send_raw(app: &TestApplication, path: &str, request: RequestBuilder) -> RawConnection {
+    let mut request = request.build().unwrap();
+    let body = request.body_mut().take().expect("it has a body");
+    let body = http_body_util::BodyExt::collect(body).await.unwrap();
+    let body = body.to_bytes();
+    let media_type = request.headers()["content-type"].to_str().unwrap();
+    let length = body.len();
+    let head = format!(
+        "POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\n\r\n"
+    );
+    let mut client = RawConnection::open(app.address).await;
+    client.send(head).await;
+    client.send(body).await;
+    client
+}

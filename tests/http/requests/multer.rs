@@ -1,0 +1,84 @@
+//! A fault of multer, and that forms are read without it. See docs/upstream/multer.md.
+
+use crate::helpers::raw::RawConnection;
+use crate::program::Program;
+use axum::body::Bytes;
+use bagtrack_testing::cpu_time;
+use futures_util::FutureExt;
+use multer::Multipart;
+use std::convert::Infallible;
+use std::task::Poll;
+
+const PIECE: &[u8] = b"xxxx";
+
+/// Seconds of this thread's processor time that multer takes for so many pieces before the first part, which come one
+/// by one.
+fn multer_alone(pieces: usize) -> f64 {
+    let look = || {
+        let (mut left, mut comes) = (pieces, false);
+        // Each piece comes after the parser has done what it can with those before it.
+        let body = futures_util::stream::poll_fn(move |cx| {
+            comes = !comes;
+            if !comes {
+                cx.waker().wake_by_ref();
+                return Poll::Pending;
+            }
+            left = left.saturating_sub(1);
+            Poll::Ready((left > 0).then(|| Ok::<_, Infallible>(Bytes::from_static(PIECE))))
+        });
+        let mut form = Multipart::new(body, "b");
+        let next = async { form.next_field().await.is_err() };
+        let mut next = Box::pin(next);
+        while next.as_mut().now_or_never().is_none() {}
+    };
+    cpu_time::medians(3, vec![Box::new(look)])[0]
+}
+
+/// When this fails multer has been mended: then `Stepwise` and the limit of heads in `multipart.rs` can go.
+#[test]
+fn multer_alone_looks_through_all_that_it_has_for_each_piece() {
+    let (short, long) = (multer_alone(16_000), multer_alone(64_000));
+    println!("{:.1} and {:.1} ms", short * 1e3, long * 1e3);
+    assert!(long > 7.0 * short, "{short} s and {long} s: in proportion?");
+}
+
+/// Seconds of the service's processor time for a form with a file of so many bytes, in pieces of four.
+async fn cost(service: &Program, bytes: usize) -> f64 {
+    let head = "POST /sessions?box=1,1,9,9 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
+        Content-Type: multipart/form-data; boundary=b\r\nTransfer-Encoding: chunked\r\n\r\n";
+    let part = b"--b\r\nContent-Disposition: form-data; name=\"frame\"; filename=\"a\"\r\n\r\n";
+    // Its lines begin as the boundary does.
+    let file = b"\r\n--a".iter().copied().cycle().take(bytes);
+    let form: Vec<u8> = part
+        .iter()
+        .copied()
+        .chain(file)
+        .chain(*b"\r\n--b--\r\n")
+        .collect();
+    let mut request = head.as_bytes().to_vec();
+    for piece in form.chunks(PIECE.len()) {
+        request.extend(format!("{:x}\r\n", piece.len()).bytes());
+        request.extend_from_slice(piece);
+        request.extend_from_slice(b"\r\n");
+    }
+    request.extend_from_slice(b"0\r\n\r\n");
+    let before = cpu_time::of_process(service.process_id());
+    let mut connection = RawConnection::open(service.address).await;
+    connection.send(&request).await;
+    let answer = connection.read_to_end().await;
+    assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
+    cpu_time::of_process(service.process_id()) - before
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_form_in_pieces_of_four_bytes_takes_time_in_proportion_to_its_size() {
+    let service = Program::start(&[], &[]);
+    cost(&service, 64 << 10).await;
+    let (short, long) = (
+        cost(&service, 512 << 10).await,
+        cost(&service, 4 << 20).await,
+    );
+    println!("{short:.2} and {long:.2} s");
+    // Eight times the bytes; 64 times as much where each piece is looked through with all before it.
+    assert!(long < 20.0 * short.max(0.05), "{short} s and {long} s");
+}

@@ -1,0 +1,113 @@
+//! What bodies hold while they arrive: memory as far as they have come, and no place in the queue.
+
+use crate::application::{TestApplication, expect, expect_problem};
+use crate::helpers::raw::RawConnection;
+use crate::limits::connections::expect_body_timeouts;
+use crate::pictures;
+use bagtrack_testing::within::within;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use reqwest::{Method, StatusCode};
+use serde_json::json;
+use std::time::Duration;
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn bodies_that_are_announced_and_never_sent_close_the_service_to_nobody() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let mut held = Vec::new();
+    // More than there are places in the queue, and with more bytes than all uploads may have.
+    for client in 1..=5 {
+        for which in 0..60 {
+            let length = match which % 3 {
+                0 => "Transfer-Encoding: chunked",
+                1 => "Content-Length: 33554432",
+                _ => "Content-Length: 100",
+            };
+            let lines = format!("X-Forwarded-For: 198.51.100.{client}\r\n{length}");
+            let open = RawConnection::hold_with(app.address, "POST", "/sessions", &lines);
+            held.push(open.await);
+        }
+    }
+    expect(app.post_frame(&id, pictures::png(1)).await, StatusCode::OK).await;
+    drop(held);
+}
+
+#[tokio::test]
+async fn the_bodies_of_all_requests_together_are_bounded_by_what_has_arrived() {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 50_000;
+        config.max_upload_bytes = 100_000;
+        config.limits.client_upload_bytes = Some(200_000);
+    });
+    let app = app.await;
+    let (id, other, third) = (app.open().await, app.open().await, app.open().await);
+    let target = format!("/sessions/{other}/frames");
+    let post = || app.post_frame(&id, pictures::png(1));
+    let mut held = RawConnection::hold(app.address, "POST", &target, 49_000).await;
+    let target = format!("/sessions/{third}/frames");
+    let mut more = RawConnection::hold(app.address, "POST", &target, 49_000).await;
+    expect(post().await, StatusCode::OK).await;
+    held.send([7; 48_000]).await;
+    more.send([7; 48_000]).await;
+    let full = async { while post().await.status() == StatusCode::OK {} };
+    within(full, "what has arrived is counted").await;
+    expect_problem(post().await, "queue-full").await;
+    drop((held, more));
+    let freed = async { while post().await.status() != StatusCode::OK {} };
+    within(freed, "what has gone is not").await;
+}
+
+#[tokio::test]
+async fn json_counts_with_the_copies_that_parsing_makes() {
+    let app = TestApplication::start_with(|config| {
+        config.max_body_bytes = 100_000;
+        config.max_upload_bytes = 150_000;
+        config.limits.client_upload_bytes = Some(150_000);
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let mut padded = pictures::png(1);
+    padded.resize(45_000, 0);
+    let text = BASE64_STANDARD.encode(&padded);
+    let path = format!("/sessions/{id}/frames");
+    let post = || app.request(Method::POST, &path, &[]);
+    let response = post().json(&json!({ "frame": text })).send().await.unwrap();
+    expect_problem(response, "quota-exceeded").await;
+    let response = post().body(padded).send().await.unwrap();
+    expect(response, StatusCode::OK).await;
+}
+
+#[tokio::test]
+async fn a_body_slower_than_the_least_rate_is_408_in_every_form() {
+    let app = TestApplication::start_with(|config| {
+        // The time for a whole body ends with the same answer, so it must not be what ends these.
+        config.body_timeout = Duration::from_secs(600);
+        config.limits.body_grace = Duration::from_millis(50);
+        config.limits.min_body_rate = 1_000_000;
+    });
+    let app = app.await;
+    let id = app.open().await;
+    let timeouts = expect_body_timeouts(&app, &id);
+    tokio::time::timeout(Duration::from_secs(30), timeouts)
+        .await
+        .expect("each ends by its rate, within a moment");
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+#[tokio::test]
+async fn a_length_over_the_limit_is_refused_before_the_body_is_sent() {
+    let app = TestApplication::start().await;
+    let id = app.open().await;
+    let mut connection = RawConnection::open(app.address).await;
+    let head = format!(
+        "POST /sessions/{id}/frames HTTP/1.1\r\nHost: localhost\r\nContent-Length: 629145600\r\n\r\n"
+    );
+    connection.send(head).await;
+    let answer = connection.read_answer().await;
+    assert!(answer.starts_with("HTTP/1.1 413"), "{answer}");
+    assert!(answer.contains("/docs/problems#body-too-large"), "{answer}");
+}

@@ -1,0 +1,4 @@
+//! Frames over a WebSocket.
+
+pub mod stream;
+pub mod stream_memory;

@@ -1,0 +1,6 @@
+//! Whole videos: tracked, propagated between key frames, and against what was annotated.
+
+pub mod footage;
+pub mod propagation;
+pub mod track_video;
+pub mod videos;

@@ -1,0 +1,528 @@
+//! Videos as bodies. Most need ffmpeg.
+
+use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::helpers::heavy;
+use crate::pictures;
+use crate::program::Program;
+use crate::requests::lines::lines;
+use image::ImageFormat;
+use reqwest::{Client, Method, Response};
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+pub const FRAMES: u32 = 12;
+
+/// The drawn frames 1 to [`FRAMES`] as a video of this kind.
+pub fn video(extension: &str) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("video").with_extension(extension);
+    let mut command = Command::new("ffmpeg");
+    command.args([
+        "-v",
+        "error",
+        "-f",
+        "image2pipe",
+        "-framerate",
+        "25",
+        "-c:v",
+        "png",
+    ]);
+    command.args(["-i", "pipe:0"]);
+    if extension != "gif" {
+        command.args(["-pix_fmt", "yuv420p", "-b:v", "2M"]);
+    }
+    let mut child = command.arg(&file).stdin(Stdio::piped()).spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    for t in 1..=FRAMES {
+        input.write_all(&pictures::png(t)).unwrap();
+    }
+    drop(input);
+    assert!(child.wait().unwrap().success(), "{extension}");
+    std::fs::read(file).unwrap()
+}
+
+/// A file that ffmpeg makes of these arguments.
+fn made(name: &str, arguments: &str) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join(name);
+    let mut command = Command::new("ffmpeg");
+    command.args(["-v", "error", "-f", "lavfi", "-i"]);
+    command.args(arguments.split(' ')).arg(&file);
+    assert!(command.status().unwrap().success(), "{arguments}");
+    std::fs::read(file).unwrap()
+}
+
+/// So many pictures of ffmpeg's own test pattern, 320 by 240 pixels, as a video of this kind, with further arguments.
+fn pattern(extension: &str, pictures: u32, arguments: &str) -> Vec<u8> {
+    let source = format!("testsrc2=size=320x240:rate=30 {arguments}-frames:v {pictures} -b:v 2M");
+    made(&format!("pattern.{extension}"), &source)
+}
+
+pub fn motion_jpeg() -> Vec<u8> {
+    let frames = (1..=FRAMES).map(|t| pictures::encode(pictures::scene(t), ImageFormat::Jpeg));
+    frames.flatten().collect()
+}
+
+/// What begins as an MP4 file does, and has nothing in it.
+pub fn empty_mp4() -> Vec<u8> {
+    [b"\0\0\0\x18ftypmp42".to_vec(), vec![0; 400]].concat()
+}
+
+async fn post(app: &TestApplication, id: &str, media_type: &str, video: Vec<u8>) -> Response {
+    let path = format!("/sessions/{id}/frames");
+    let request = app.request(Method::POST, &path, &[]);
+    let request = request.header("content-type", media_type);
+    request.body(video).send().await.unwrap()
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_video_is_tracked_and_answered_line_by_line() {
+    let app = TestApplication::start().await;
+    for (media_type, video) in [
+        // Its index is at the end.
+        ("video/mp4", video("mp4")),
+        ("video/webm", video("webm")),
+        ("image/gif", video("gif")),
+        ("video/x-motion-jpeg", motion_jpeg()),
+        // As curl labels what it is not told about.
+        ("application/x-www-form-urlencoded", video("mp4")),
+    ] {
+        let id = app.open().await;
+        let answers = lines(post(&app, &id, media_type, video).await).await;
+        assert_eq!(answers.len(), FRAMES as usize, "{media_type}: {answers:?}");
+        for (answer, t) in answers.iter().zip(1..) {
+            assert_eq!(answer["frame"], t);
+            let x = answer["box"]["x"].as_f64().unwrap();
+            assert!(
+                (x - f64::from(20 + 2 * t)).abs() < 3.0,
+                "{media_type}: {answer}"
+            );
+        }
+        assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+    }
+}
+
+#[tokio::test]
+async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
+    for program in ["off", "/nowhere/ffmpeg"] {
+        let app = TestApplication::start_with(|config| config.limits.ffmpeg = program.to_owned());
+        let app = app.await;
+        let id = app.open().await;
+        let refused = post(&app, &id, "video/mp4", empty_mp4()).await;
+        let problem = expect_problem(refused, "unsupported-image").await;
+        assert_eq!(problem["status"], 415);
+        assert!(
+            problem["detail"].as_str().unwrap().contains("ffmpeg"),
+            "{problem}"
+        );
+        assert_eq!(app.frames_of(&id).await, 1);
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_video_comes_back_frame_by_frame() {
+    let app = TestApplication::start().await;
+    for extension in ["mp4", "webm"] {
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request.body(video(extension)).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{extension}");
+        assert_eq!(answer.headers()["content-type"], "video/x-motion-jpeg");
+        let bytes = answer.bytes().await.unwrap();
+        // They are taken again as what they are, and show what was sent: the target goes right by 2 pixels a frame.
+        let id = app.open().await;
+        let answers = lines(post(&app, &id, "video/x-motion-jpeg", bytes.to_vec()).await).await;
+        assert_eq!(answers.len(), FRAMES as usize, "{extension}");
+        for (answer, t) in answers.iter().zip(1..) {
+            let x = answer["box"]["x"].as_f64().unwrap();
+            assert!((x - f64::from(20 + 2 * t)).abs() < 3.0, "{answer}");
+        }
+    }
+    let request = app.request(Method::POST, "/frames", &[]);
+    let refused = request.body(pictures::png(1)).send().await.unwrap();
+    let problem = expect_problem(refused, "unsupported-image").await;
+    assert!(problem["detail"].as_str().unwrap().contains("Send a video"));
+    let request = app.request(Method::POST, "/frames", &[]);
+    expect_problem(
+        request.body(empty_mp4()).send().await.unwrap(),
+        "frame-damaged",
+    )
+    .await;
+}
+
+/// The times that JPEG files which follow each other tell in their first comments.
+fn times(motion_jpeg: &[u8]) -> Vec<f64> {
+    let begins = |window: &[u8]| window == b"\xFF\xD8\xFF\xFE";
+    let files = (0..motion_jpeg.len() - 4).filter(|at| begins(&motion_jpeg[*at..at + 4]));
+    let comment = |at: usize| {
+        let length = u16::from_be_bytes([motion_jpeg[at + 4], motion_jpeg[at + 5]]);
+        let comment = str::from_utf8(&motion_jpeg[at + 6..at + 4 + usize::from(length)]).unwrap();
+        comment.strip_prefix("time=").unwrap().parse().unwrap()
+    };
+    files.map(comment).collect()
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn frames_of_a_video_of_a_changing_rate_tell_when_they_are_shown() {
+    let app = TestApplication::start().await;
+    for extension in ["mp4", "webm"] {
+        // Of 30 frames a second the first two, and then every third.
+        let selected = "-vf select=eq(n\\,1)+not(mod(n\\,3)) -vsync vfr ";
+        let video = pattern(extension, 5, selected);
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request.body(video).send().await.unwrap();
+        let times = times(&answer.bytes().await.unwrap());
+        let expected = [0, 1, 3, 6, 9].map(|frame| f64::from(frame) / 30.0);
+        assert_eq!(times.len(), expected.len(), "{extension}: {times:?}");
+        // A WebM file counts milliseconds.
+        let apart = times
+            .iter()
+            .zip(expected)
+            .map(|(time, expected)| time - expected);
+        assert!(
+            apart.into_iter().all(|apart| apart.abs() < 0.001),
+            "{extension}: {times:?}"
+        );
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn frames_of_a_damaged_video_end_before_the_damage_and_the_answer_is_cut_off() {
+    let app = TestApplication::start().await;
+    // Before the damage are more pictures than a pipe holds: ffmpeg waits there until the first ones are taken.
+    let mut damaged = pattern("webm", 100, "");
+    let (start, end) = (damaged.len() * 6 / 10, damaged.len() * 8 / 10);
+    damaged[start..end].fill(0);
+    let request = app.request(Method::POST, "/frames", &[]);
+    let answer = request.body(damaged).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    // A whole answer would say that the video has no more.
+    let cut_off = answer.bytes().await.unwrap_err();
+    assert!(cut_off.is_body() || cut_off.is_decode(), "{cut_off:?}");
+}
+
+#[tokio::test]
+async fn a_session_is_opened_with_a_picture() {
+    let app = TestApplication::start().await;
+    let gif = [b"GIF89a".to_vec(), vec![0; 400]].concat();
+    let problem = expect_problem(
+        app.create(gif.clone(), &[("box", BOX)]).await,
+        "unsupported-image",
+    );
+    let detail = problem.await["detail"].as_str().unwrap().to_owned();
+    assert!(
+        detail.contains("/frames") && detail.contains("picture"),
+        "{detail}"
+    );
+    let id = app.open().await;
+    let request = app.request(
+        Method::POST,
+        &format!("/sessions/{id}/frames"),
+        &[("draw", "")],
+    );
+    let drawn = request.body(gif).send().await.unwrap();
+    expect_problem(drawn, "malformed-request").await;
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn what_is_wrong_with_a_video_is_told() {
+    let app = TestApplication::start_with(|config| config.limits.max_video_frames = 5).await;
+    let id = app.open().await;
+    let whole = video("mp4");
+    let mut got = lines(post(&app, &id, "video/mp4", whole.clone()).await).await;
+    let last = got.pop().unwrap();
+    assert_eq!(last["type"], "/docs/problems#too-many-frames");
+    assert_eq!(got.len(), 5);
+    assert_eq!(app.frames_of(&id).await, 6);
+    // The index is missing.
+    let cut = whole[..whole.len() / 2].to_vec();
+    let problem = expect_problem(post(&app, &id, "video/mp4", cut).await, "frame-damaged").await;
+    assert!(
+        problem["detail"].as_str().unwrap().contains("video"),
+        "{problem}"
+    );
+    assert_eq!(app.frames_of(&id).await, 6);
+    // A playlist is no video, whatever its label says.
+    let playlist = b"#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n".to_vec();
+    expect_problem(
+        post(&app, &id, "video/mp4", playlist).await,
+        "unsupported-image",
+    )
+    .await;
+
+    let created = app.create(pictures::png_of(64, 48), &[("box", BOX)]).await;
+    let created = expect(created, reqwest::StatusCode::CREATED).await;
+    let other = created["id"].as_str().unwrap();
+    expect_problem(
+        post(&app, other, "video/mp4", whole).await,
+        "frame-size-mismatch",
+    )
+    .await;
+}
+
+/// What was told was the last line of ffmpeg, such as "To ignore this, add a trailing '?' to the map".
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn why_a_video_is_not_read_is_told_with_its_cure() {
+    const SMALL: &str = "testsrc2=size=320x240:rate=10 -frames:v 10";
+    let app = TestApplication::start_with(|config| config.max_frame_pixels = 1 << 20).await;
+    let id = app.open().await;
+    let whole = video("mp4");
+    for (video, slug, words) in [
+        (
+            made("sound.mp4", "sine=duration=1"),
+            "frame-damaged",
+            "no pictures",
+        ),
+        (
+            made("clip.mov", &format!("{SMALL} -c:v prores")),
+            "unsupported-image",
+            "codec",
+        ),
+        (
+            made("clip.mkv", &format!("{SMALL} -c:v ffv1")),
+            "unsupported-image",
+            "H.264",
+        ),
+        (
+            made("large.mp4", "testsrc2=size=1920x1080 -frames:v 2"),
+            "frame-too-large",
+            "scale=",
+        ),
+        (
+            whole[..whole.len() / 2].to_vec(),
+            "frame-damaged",
+            "cut off",
+        ),
+        (
+            made("clip.ts", SMALL),
+            "unsupported-image",
+            "`ffmpeg -i VIDEO clip.mp4`",
+        ),
+        (made("clip.avi", SMALL), "unsupported-image", "AVI"),
+        (made("clip.flv", SMALL), "unsupported-image", "FLV"),
+        (
+            b"\x1F\x8B\x08\0\0\0\0\0\0\x03packed".to_vec(),
+            "unsupported-image",
+            "not packed",
+        ),
+    ] {
+        let problem = expect_problem(post(&app, &id, "", video).await, slug).await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(words), "{words}: {detail}");
+        assert!(
+            !detail.contains("frames before"),
+            "there are none: {detail}"
+        );
+    }
+    assert_eq!(app.frames_of(&id).await, 1);
+}
+
+/// Players show it; it was refused as damaged from its first picture on.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_video_that_was_cut_in_an_open_group_of_pictures_is_decoded() {
+    let app = TestApplication::start().await;
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole.mp4");
+    let open = "-c:v libx264 -x264-params open-gop=1:keyint=30:bframes=3";
+    let source = "testsrc2=size=320x240:rate=30 -frames:v 150";
+    std::fs::write(&whole, made("whole.mp4", &format!("{source} {open}"))).unwrap();
+    // The group before second 1.3 begins at 1.0; what is shown before 1.3 is left out by an edit list of MP4 alone.
+    for (name, expected) in [("cut.mp4", 111..=111), ("cut.mkv", 111..=121)] {
+        let cut = folder.path().join(name);
+        let mut command = Command::new("ffmpeg");
+        command
+            .args(["-v", "error", "-ss", "1.3", "-i"])
+            .arg(&whole);
+        assert!(
+            command
+                .args(["-c", "copy"])
+                .arg(&cut)
+                .status()
+                .unwrap()
+                .success()
+        );
+        let request = app.request(Method::POST, "/frames", &[]);
+        let answer = request
+            .body(std::fs::read(&cut).unwrap())
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status(), 200, "{name}");
+        let count = times(&answer.bytes().await.unwrap()).len();
+        assert!(expected.contains(&count), "{name}: {count}");
+    }
+}
+
+/// It was told that a picture of the file was damaged.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn of_a_video_that_needs_too_much_memory_it_is_told_how_to_make_it_smaller() {
+    let app = TestApplication::start().await;
+    let encoder = "-c:v libx264 -preset ultrafast -refs 4 -bf 2 -pix_fmt yuv420p";
+    let source = "testsrc2=size=7680x4320:rate=10 -frames:v 6";
+    let large = made("8k.mp4", &format!("{source} {encoder}"));
+    let query = [("box", "2000,1500,400,400")];
+    let request = app.request(Method::POST, "/track", &query);
+    let answer = request.body(large).send().await.unwrap();
+    let told = match answer.status().is_success() {
+        true => lines(answer).await.pop().expect("a line"),
+        false => expect_problem(answer, "frame-too-large").await,
+    };
+    assert_eq!(told["type"], "/docs/problems#frame-too-large", "{told}");
+    let detail = told["detail"].as_str().unwrap();
+    assert!(
+        detail.contains("768 MiB") && detail.contains("scale="),
+        "{detail}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs ffmpeg"]
+async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place() {
+    let app = TestApplication::start_with(|config| {
+        config.workers = Some(1);
+        config.work_timeout = Duration::from_secs(2);
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+    });
+    let app = app.await;
+    let send = async |session: String, client: &str, video: Vec<u8>| {
+        let request = app.request(Method::POST, &format!("{session}/frames"), &[]);
+        let request = request
+            .header("content-type", "video/x-motion-jpeg")
+            .body(video);
+        request
+            .header("x-forwarded-for", client)
+            .send()
+            .await
+            .unwrap()
+    };
+    let (long, short) = (motion_jpeg().repeat(200), motion_jpeg());
+    let session = heavy::open(&app).await;
+    let mut held = send(session, "198.51.100.1", long).await;
+    held.chunk().await.unwrap().expect("a line");
+    let again = send(
+        format!("/sessions/{}", app.open().await),
+        "198.51.100.1",
+        short.clone(),
+    );
+    expect_problem(again.await, "quota-exceeded").await;
+    let other = send(
+        format!("/sessions/{}", app.open().await),
+        "198.51.100.2",
+        short,
+    );
+    assert_eq!(lines(other.await).await.len(), FRAMES as usize);
+    // It was at work all the time.
+    held.chunk().await.unwrap().expect("another line");
+    drop(held);
+}
+
+/// The lines up to the problem that ends them, which must name this many pictures before it.
+async fn until_damage(app: &TestApplication, video: Vec<u8>) -> usize {
+    let id = app.open().await;
+    let answer = post(app, &id, "video/mp4", video).await;
+    let mut got = match answer.status().is_success() {
+        true => lines(answer).await,
+        // Where the first picture cannot be had nothing was begun.
+        false => vec![expect_problem(answer, "frame-damaged").await],
+    };
+    let last = got.pop().expect("a line");
+    assert_eq!(last["type"], "/docs/problems#frame-damaged", "{last}");
+    let detail = last["detail"].as_str().unwrap();
+    let named = format!("from its picture {} on", got.len() + 1);
+    assert!(detail.contains(&named), "{named}: {detail}");
+    for (answer, t) in got.iter().zip(1..) {
+        let x = answer["box"]["x"].as_f64().unwrap();
+        assert!(
+            (x - f64::from(20 + 2 * t)).abs() < 3.0,
+            "frame {t}: {answer}"
+        );
+    }
+    assert_eq!(app.frames_of(&id).await, 1 + got.len() as u64);
+    got.len()
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn damage_in_the_middle_of_a_video_is_told_and_nothing_after_it_is_numbered() {
+    let app = TestApplication::start().await;
+    let whole = video("mkv");
+    let at = |part: f64| (whole.len() as f64 * part) as usize;
+    // Each of these once was 200 with fewer lines and no problem, or with frames of wrong numbers.
+    let mut zeros = whole.clone();
+    zeros[at(0.4)..at(0.6)].fill(0);
+    assert!(until_damage(&app, zeros).await < FRAMES as usize);
+    assert!(until_damage(&app, whole[..at(0.6)].to_vec()).await < FRAMES as usize);
+    let mut noise = video("mp4");
+    let middle = noise.len() / 3;
+    noise[middle..middle + 500]
+        .iter_mut()
+        .for_each(|byte| *byte ^= 0x5A);
+    assert!(until_damage(&app, noise).await < FRAMES as usize);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
+    let program = env!("CARGO_BIN_EXE_bagtrack");
+    let service = Program::start(&[], &[]);
+    let mut said = service.said().iter();
+    if said.any(|line| line.contains("Landlock or seccomp is not to be had")) {
+        return eprintln!("left out: this kernel has no Landlock or no seccomp");
+    }
+    let run = |command: &[&str]| {
+        let mut confined = Command::new(program);
+        let output = confined.arg("confined").args(command).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    assert_eq!(run(&["true"]).0, Some(0));
+    let (code, said) = run(&["cat", concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    // Nor does it read or write where all may.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "text").unwrap();
+    let (code, said) = run(&["cat", file.to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (code, said) = run(&["touch", folder.path().join("other").to_str().unwrap()]);
+    assert!(
+        code == Some(1) && said.contains("Permission denied"),
+        "{said}"
+    );
+    let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
+    assert!(said.contains("Operation not permitted"), "{said}");
+    assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn the_program_decodes_a_video_with_few_rights_and_without_ffmpeg_says_so() {
+    for (program, status) in [("ffmpeg", 200), ("/nowhere/ffmpeg", 415)] {
+        let (service, client) = (Program::start(&["--ffmpeg", program], &[]), Client::new());
+        let create = client.post(service.url(&format!("/sessions?box={BOX}")));
+        let created = create.body(pictures::png(0)).send().await.unwrap();
+        let created = expect(created, reqwest::StatusCode::CREATED).await;
+        let url = format!("/sessions/{}/frames", created["id"].as_str().unwrap());
+        // Its index is at the end, so the decoder goes back in it.
+        let post = client.post(service.url(&url)).body(video("mp4"));
+        let answer = post.send().await.unwrap();
+        assert_eq!(answer.status(), status);
+        if status == 200 {
+            assert_eq!(lines(answer).await.len(), FRAMES as usize);
+        }
+    }
+}
