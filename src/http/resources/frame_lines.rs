@@ -13,8 +13,8 @@ use crate::http::respond::ndjson::{self, FrameSequence};
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
-use bagtrack_api::StreamAnswer;
 use bagtrack_api::requests::FramesSettings;
+use bagtrack_api::{ProblemKind as Kind, StreamAnswer};
 use bagtrack_ingest::video::VideoFormat;
 use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::{self, Instant, timeout_at};
@@ -88,6 +88,7 @@ async fn respond_to(
         client: request.client,
         source,
         number,
+        too_old: None,
     };
     ndjson::respond(state, request.instance, frames).await
 }
@@ -111,31 +112,63 @@ struct SessionFrames {
     source: FrameSource,
     /// The number of the next frame, where it is known.
     number: Option<u64>,
+    /// Why the last picture of a video has no line: its answer is no longer stored.
+    too_old: Option<Problem>,
 }
 
 impl FrameSequence for SessionFrames {
     type Answer = StreamAnswer;
 
     async fn next(&mut self) -> Option<Result<StreamAnswer, Problem>> {
-        let picture = match &mut self.source {
-            FrameSource::Files(files, deadline) => {
-                let (file, deadline) = (files.next()?, *deadline);
-                let tracked = timeout_at(deadline, self.answer(file)).await;
-                return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
+        if let FrameSource::Files(files, deadline) = &mut self.source {
+            let (file, deadline) = (files.next()?, *deadline);
+            let tracked = timeout_at(deadline, self.answer(file)).await;
+            return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
+        }
+        loop {
+            let file = match self.picture().await? {
+                Ok(file) => file,
+                Err(problem) => return Some(Err(problem)),
+            };
+            match self.answer(file).await {
+                // A long video that is sent again goes on: pictures of which no answer is stored get no line.
+                Err(problem) if self.is_too_old(&problem) => self.pass_over(problem),
+                answer => {
+                    self.too_old = None;
+                    return Some(answer);
+                }
             }
-            FrameSource::Video(video) => match video.next().await? {
-                Err(problem) if video.has_given() => Err(problem.and("The frames before count.")),
-                picture => picture,
-            },
-        };
-        Some(match picture {
-            Ok(picture) => self.answer(picture.jpeg.into()).await,
-            Err(problem) => Err(problem),
-        })
+        }
     }
 }
 
 impl SessionFrames {
+    /// The next picture of the video; after the last the problem of one that has no line, where no later one has.
+    async fn picture(&mut self) -> Option<Result<Bytes, Problem>> {
+        let FrameSource::Video(video) = &mut self.source else {
+            return None;
+        };
+        match video.next().await {
+            Some(Ok(picture)) => Some(Ok(picture.jpeg.into())),
+            Some(Err(problem)) if video.has_given() => {
+                Some(Err(problem.and("The frames before count.")))
+            }
+            Some(Err(problem)) => Some(Err(problem)),
+            None => self.too_old.take().map(Err),
+        }
+    }
+
+    fn is_too_old(&self, problem: &Problem) -> bool {
+        let latest = self.permit.session().latest_frame();
+        problem.kind() == Kind::FrameOutOfOrder
+            && self.number.is_some_and(|number| number <= latest)
+    }
+
+    fn pass_over(&mut self, problem: Problem) {
+        self.too_old = Some(problem);
+        self.number = self.number.map(|number| number + 1);
+    }
+
     async fn answer(&mut self, file: Bytes) -> Result<StreamAnswer, Problem> {
         if let Some(number) = self.number
             && number <= self.permit.session().latest_frame()

@@ -104,6 +104,44 @@ async fn a_video_is_tracked_and_answered_line_by_line() {
     }
 }
 
+/// A video of which more was tracked than answers are stored could once not go on: its first number was out of order.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_long_video_that_is_sent_again_goes_on() {
+    let stored = 4;
+    let app = TestApplication::start_with(|config| config.max_frames = stored).await;
+    let id = app.open().await;
+    let whole = motion_jpeg();
+    let seventh = pictures::encode(pictures::scene(7), ImageFormat::Jpeg);
+    let at = whole.windows(seventh.len()).position(|at| at == seventh);
+    let (first_six, rest) = whole.split_at(at.unwrap());
+    let send = async |number: &str, video: &[u8]| {
+        let path = format!("/sessions/{id}/frames");
+        let request = app.request(Method::POST, &path, &[("frame", number)]);
+        let request = request.header("content-type", "video/x-motion-jpeg");
+        request.body(video.to_vec()).send().await.unwrap()
+    };
+    let told = |answers: &[serde_json::Value]| -> Vec<(u64, bool)> {
+        let told = answers.iter();
+        told.map(|it| (it["frame"].as_u64().unwrap(), it["replayed"] == true))
+            .collect()
+    };
+    assert_eq!(lines(send("1", first_six).await).await.len(), 6);
+    let again = lines(send("1", &whole).await).await;
+    let expected: Vec<_> = (3..=FRAMES.into())
+        .map(|frame| (frame, frame <= 6))
+        .collect();
+    assert_eq!(told(&again), expected);
+    assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+
+    // What reaches none of the stored answers, or others than they are of, is refused as before.
+    let problem = expect_problem(send("1", first_six).await, "frame-out-of-order").await;
+    assert_eq!(problem["expected_frame"], FRAMES + 1);
+    let other = [rest, first_six].concat();
+    expect_problem(send("1", &other).await, "frame-differs").await;
+    assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+}
+
 #[tokio::test]
 async fn without_ffmpeg_a_video_is_refused_and_the_session_unchanged() {
     for program in ["off", "/nowhere/ffmpeg"] {
