@@ -98,11 +98,16 @@ impl SessionPermit {
         self.overlaps
     }
 
-    /// Whether frame `number` comes a little before its turn and may wait here. The last free place of the session is
-    /// left to the frame whose turn it is.
+    /// Whether frame `number` comes a little before its turn.
     pub fn is_early(&self, number: u64) -> bool {
         let early = number.saturating_sub(self.session.latest_frame() + 1);
-        (1..=MAX_EARLY).contains(&early) && self.session.permits.available_permits() > 0
+        (1..=MAX_EARLY).contains(&early)
+    }
+
+    /// Whether a frame that has come now may wait for its turn: the last free place of the session is left to the frame
+    /// whose turn it is.
+    pub fn may_wait(&self) -> bool {
+        self.session.permits.available_permits() > 0
     }
 
     /// Waits for the turn of frame `number` where it comes a little early, at most so long.

@@ -7,7 +7,7 @@
 use super::error::FramesError;
 use super::service::SessionService;
 use crate::clock;
-use crate::{QueuePermit, SessionPermit};
+use crate::{QueuePermit, SessionBusy, SessionPermit};
 use std::time::Duration;
 
 /// How long an early frame waits for its turn.
@@ -21,8 +21,8 @@ impl SessionService {
     /// the queue.
     ///
     /// # Errors
-    /// It has no number, and another request with frames was at the session when it came; or the session has ended, the
-    /// store gives no answer, or the queue is full after the wait.
+    /// It has no number, and another request with frames was at the session when it came; or it is early, and has the last
+    /// place at the session; or the session has ended, the store gives no answer, or the queue is full after the wait.
     pub async fn wait_for_turn(
         &self,
         permit: &SessionPermit,
@@ -37,6 +37,9 @@ impl SessionService {
         };
         if !permit.is_early(number) {
             return Ok(queue);
+        }
+        if !permit.may_wait() {
+            return Err(SessionBusy.into());
         }
         let flow = queue.flow();
         let request = queue.yield_place();

@@ -1,7 +1,7 @@
 //! Frames of one session in several requests at once: which waits for which.
 
 use crate::world::{FIRST, FLOW, open, pictures, place, post_numbered, service};
-use bagtrack_sessions::{Boxes, Clock, FrameBatch, FramesError, QueueFull, clock};
+use bagtrack_sessions::{ActError, Boxes, Clock, FrameBatch, FramesError, QueueFull, clock};
 use std::time::Duration;
 
 /// How long an early frame waits.
@@ -97,9 +97,21 @@ async fn the_last_place_at_a_session_is_left_to_the_frame_whose_turn_it_is() {
     let service = service(&Clock::default());
     let session = open(&service, Boxes::One(FIRST)).await;
     let mut permits: Vec<_> = (0..3).map(|_| session.enter().unwrap()).collect();
-    assert!(permits[0].is_early(2));
+    let early = permits[0].share();
+    let waiting = service.wait_for_turn(&early, place(&service), Some(2));
+    let mut waiting = Box::pin(waiting);
+    assert!(futures_util::poll!(&mut waiting).is_pending());
     permits.push(session.enter().unwrap());
-    assert!(!permits[0].is_early(2));
+    let refused = service.wait_for_turn(&permits[3], place(&service), Some(3));
+    let refused = refused.await.map(drop).unwrap_err();
+    assert!(
+        matches!(refused, FramesError::Act(ActError::Busy(_))),
+        "{refused}"
+    );
+    // Who waits already goes on waiting.
+    assert!(futures_util::poll!(&mut waiting).is_pending());
+    drop(waiting);
+    drop(early);
     assert!(session.enter().is_err() && session.read_permit().is_err());
     assert!(session.is_busy());
     // A place that is shared is the same one.
