@@ -12,7 +12,9 @@ const REPLACED: u16 = OF_STATUS + 409;
 /// Why a stream ends.
 #[derive(Debug)]
 pub enum End {
-    /// The client closed it, or has gone.
+    /// The client closed it.
+    Closed,
+    /// The client has gone.
     Gone,
     /// The client has not answered a ping.
     Silent,
@@ -28,7 +30,8 @@ impl End {
     /// What the log says.
     pub fn reason(&self) -> &'static str {
         match self {
-            Self::Gone => "the client closed it",
+            Self::Closed => "the client closed it",
+            Self::Gone => "the client has gone",
             Self::Silent => "the client is silent",
             Self::Shutdown => "the service ends",
             Self::Replaced => "a newer stream took its place",
@@ -36,10 +39,10 @@ impl End {
         }
     }
 
-    /// The close frame, where the client still reads.
+    /// The close frame, where the client still reads and has not closed first.
     pub fn close_frame(&self) -> Option<CloseFrame> {
         let code = match self {
-            Self::Gone | Self::Silent => return None,
+            Self::Closed | Self::Gone | Self::Silent => return None,
             Self::Shutdown => CloseCode::Away.into(),
             Self::Replaced => REPLACED,
             Self::Problem(problem) => OF_STATUS + problem.kind().status(),

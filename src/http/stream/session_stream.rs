@@ -181,7 +181,8 @@ impl SessionStream {
         header: &mut Result<FrameHeader, Problem>,
     ) -> Option<End> {
         match message {
-            None | Some(Ok(Message::Close(_))) => return Some(End::Gone),
+            None => return Some(End::Gone),
+            Some(Ok(Message::Close(_))) => return Some(End::Closed),
             Some(Ok(Message::Text(text))) => {
                 drop(socket.get_mut().take_charge());
                 *header = message::parse(&text);
@@ -257,6 +258,10 @@ impl SessionStream {
             let _ = self.send_problem(&mut socket, problem).await;
         }
         let Some(frame) = end.close_frame() else {
+            if matches!(end, End::Closed) {
+                // The close of the client is answered when the next message is asked for.
+                while let Some(Ok(_)) = socket.next().await {}
+            }
             return;
         };
         let is_readable = !socket.is_terminated();

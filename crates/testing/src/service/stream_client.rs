@@ -10,6 +10,8 @@ use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::client_async;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::http::Response;
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::{Error, Message};
 
 pub struct StreamClient {
@@ -136,9 +138,15 @@ impl StreamClient {
         }
     }
 
-    /// Asks for a close and waits for it.
+    /// Closes the stream as it should be done (RFC 6455, section 7.1.2): both sides say so before the line ends.
     pub async fn close(mut self) {
-        self.socket.close(None).await.unwrap();
-        while let Some(Ok(_)) = self.socket.next().await {}
+        let normal = CloseFrame {
+            code: CloseCode::Normal,
+            reason: "".into(),
+        };
+        self.socket.close(Some(normal)).await.unwrap();
+        assert_eq!(self.close_code().await, 1000);
+        let rest = within(self.socket.next(), "the line ends").await;
+        assert!(rest.is_none(), "{rest:?}");
     }
 }
