@@ -1,8 +1,8 @@
 //! Frame numbers: which request holds the next frame, and which is an old one that was sent again.
 //!
 //! A client whose connection broke does not know whether its frame was taken. If it numbers its frames it can send the
-//! request again: the same bytes under the same number get the stored answer. The answers to the last request are kept,
-//! so a request with several frames can be repeated too.
+//! request again: the same bytes under the same number get the stored answer. The answers to the last requests are kept,
+//! so a request with several frames can be repeated too, and one after which others were answered.
 
 use super::per_target::PerTarget;
 use super::planted::PlantedFault;
@@ -92,10 +92,9 @@ pub enum ReplayError {
 }
 
 /// Decides about a request with the frames `posted`, which the client numbers from `number` on. `recent` are the
-/// answers to the last request, at least one. `given` is the box, where the request corrects it.
+/// answers to the last frames, at least one. `given` is the box, where the request corrects it.
 ///
-/// A request is a replay if its last frame is the session's last frame, all its frames are in the last request, and
-/// their bytes (and the box) are the same.
+/// A request is a replay if the answers to all its frames are stored, and their bytes (and the box) are the same.
 ///
 /// # Errors
 /// See [`ReplayError`].
@@ -114,10 +113,9 @@ pub(super) fn decide(
         Some(number) if number == expected => return Ok(ReplayDecision::Process),
         Some(number) => number,
     };
-    if got.checked_add(posted.len() as u64) != Some(expected) || posted.len() > recent.len() {
-        return Err(ReplayError::OutOfOrder { got, expected });
-    }
-    let stored = &recent[recent.len() - posted.len()..];
+    let first = recent.iter().position(|stored| stored.frame() == got);
+    let stored = first.and_then(|first| recent[first..].get(..posted.len()));
+    let stored = stored.ok_or(ReplayError::OutOfOrder { got, expected })?;
     let mut pairs = stored.iter().zip(posted);
     if pairs.all(|(stored, posted)| stored.is_of(*posted, given)) {
         if PlantedFault::TracksTwice.is_here() {
@@ -192,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_batch_or_its_tail_is_replayed() {
+    fn a_batch_or_a_part_of_it_is_replayed() {
         let recent = [answered(5, b"a"), answered(6, b"b"), answered(7, b"c")];
         let frames = |decision| -> Vec<u64> {
             match decision {
@@ -204,8 +202,12 @@ mod tests {
         };
         let all = decide(&recent, Some(5), &prints(&[b"a", b"b", b"c"]), None);
         assert_eq!(frames(all), vec![5, 6, 7]);
-        let tail = decide(&recent, Some(7), &prints(&[b"c"]), None);
-        assert_eq!(frames(tail), vec![7]);
+        for (number, file) in [(7, b"c"), (6, b"b"), (5, b"a")] {
+            let one = decide(&recent, Some(number), &prints(&[file]), None);
+            assert_eq!(frames(one), vec![number]);
+        }
+        let begin = decide(&recent, Some(5), &prints(&[b"a", b"b"]), None);
+        assert_eq!(frames(begin), vec![5, 6]);
     }
 
     #[test]
@@ -220,7 +222,9 @@ mod tests {
             })
         );
         for (number, posted) in [
-            (6, prints(&[b"b"])),
+            (5, prints(&[b"a"])),
+            // The last of these is new.
+            (7, prints(&[b"c", b"d"])),
             (9, prints(&[b"c"])),
             (u64::MAX, prints(&[b"c"])),
             (5, prints(&[b"a", b"b", b"c"])),

@@ -10,8 +10,8 @@ use bagtrack_api::ProblemKind as Kind;
 use bagtrack_quotas::Account;
 use bagtrack_sessions::clock::{self, Instant, sleep, timeout_at};
 use bagtrack_sessions::{
-    ActError, Estimates, FrameBatch, FramesError, QueueFull, QueuePermit, Session, SessionBusy,
-    SessionPermit, StreamPlace, Tracked, box_warnings,
+    ActError, Estimates, FrameBatch, FramesError, KEPT_ANSWERS, QueueFull, QueuePermit, Session,
+    SessionBusy, SessionPermit, StreamPlace, Tracked, box_warnings,
 };
 use bagtrack_tracker::Diagnostics;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,8 +20,6 @@ use uuid::Uuid;
 
 /// How long to wait before the store is tried again.
 const STORE_RETRY: Duration = Duration::from_millis(250);
-/// The last answers that are kept for a client that takes up after a broken line.
-pub const MAX_KEPT: usize = 32;
 
 /// What the frames of one stream have in common.
 #[derive(Debug)]
@@ -176,7 +174,7 @@ impl FrameWork {
                 number,
                 files: vec![file.clone()],
                 correction: message::correction(&header),
-                min_answers: MAX_KEPT.min(config.max_frames),
+                min_answers: KEPT_ANSWERS,
                 with_diagnostics: header.see,
                 stream: Some(self.place.clone()),
             };

@@ -13,6 +13,10 @@ use bagtrack_tracker::{Diagnostics, Frame, FrameFormat, Rect, TrackerError};
 use bytes::Bytes;
 use std::sync::Arc;
 
+/// The last answers that are kept, for a client that takes up where its line broke, and for requests on their way whose
+/// answers were lost.
+pub const KEPT_ANSWERS: usize = 32;
+
 /// The next frames of a session, as they were received.
 #[derive(Debug, Default)]
 pub struct FrameBatch {
@@ -22,7 +26,7 @@ pub struct FrameBatch {
     pub files: Vec<Bytes>,
     /// The box in the only frame, where the user corrects it.
     pub correction: Option<GivenBox>,
-    /// How many of the last answers are kept at least, for a client that takes up where its line broke.
+    /// How many of the last answers are kept at least: [`KEPT_ANSWERS`], or more.
     pub min_answers: usize,
     /// Whether the client wants to know what the trackers saw.
     pub with_diagnostics: bool,
@@ -83,6 +87,7 @@ impl FrameBatch {
             number,
             files,
             correction,
+            min_answers: KEPT_ANSWERS,
             ..Self::default()
         }
     }

@@ -30,7 +30,9 @@ mod work;
 
 pub use box_check::{ImplausibleBox, box_warnings};
 pub use error::{ActError, FrameFault, FramesError, OpenError, QuotaExhausted, TrackError};
-pub use frames::{FrameBatch, GivenBox, RequestLimits, Tracked, check_readable_pixels};
+pub use frames::{
+    FrameBatch, GivenBox, KEPT_ANSWERS, RequestLimits, Tracked, check_readable_pixels,
+};
 pub use idempotency::{CreationKey, IdempotencyStore};
 pub use open::{OpenRequest, Opened, SessionQuota};
 pub use service::{ServiceParts, ServiceSettings, SessionService};

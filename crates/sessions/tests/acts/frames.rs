@@ -5,8 +5,9 @@ use crate::world::{
     post_numbered, request, service, small_picture,
 };
 use bagtrack_sessions::{
-    ActError, Boxes, Clock, Fingerprint, FrameBatch, FrameFault, FramesError, GivenBox, PerTarget,
-    ReplayError, Session, SessionService, Start, check_readable_pixels, is_snapshot,
+    ActError, Boxes, Clock, Fingerprint, FrameBatch, FrameFault, FramesError, GivenBox,
+    KEPT_ANSWERS, PerTarget, ReplayError, Session, SessionService, Start, check_readable_pixels,
+    is_snapshot,
 };
 use bagtrack_tracker::{Rect, Status, TrackerError};
 use metrics::Counter;
@@ -38,8 +39,16 @@ async fn frames_are_answered_once_and_again_under_the_same_number() {
     assert!(again.replayed);
     assert_eq!(again.estimates, first.estimates);
     assert_eq!(session.latest_frame(), 3);
+    // Its frames for themselves, too: answers of requests on their way may be lost.
+    for (number, files) in [(1, pictures(1..3)), (2, pictures(2..3))] {
+        let count = files.len();
+        let part = post_numbered(&service, &session, number, files).await;
+        let (from, part) = (number as usize - 1, part.unwrap());
+        assert!(part.replayed);
+        assert_eq!(part.estimates, first.estimates[from..from + count]);
+    }
     for (number, files) in [
-        (1, pictures(1..3)),
+        (2, pictures(2..5)),
         (3, pictures(1..2)),
         (5, pictures(5..6)),
     ] {
@@ -219,34 +228,39 @@ async fn stored_from(
 }
 
 #[tokio::test]
-async fn the_answers_to_the_last_request_are_kept_and_more_where_that_is_asked_for() {
+async fn the_last_answers_are_kept_and_more_where_that_is_asked_for() {
     let service = service(&Clock::default());
     let session = open(&service, Boxes::One(FIRST)).await;
     post_numbered(&service, &session, 1, pictures(1..4))
         .await
         .unwrap();
     assert_eq!(
-        stored_from(&service, &session, 1).await,
-        Some(vec![1, 2, 3])
+        stored_from(&service, &session, 0).await,
+        Some(vec![0, 1, 2, 3])
     );
-    assert_eq!(stored_from(&service, &session, 0).await, None);
     assert_eq!(stored_from(&service, &session, 4).await, Some(vec![]));
     assert_eq!(stored_from(&service, &session, 5).await, None);
+    // Those of further requests, up to so many.
+    let (kept, last) = (KEPT_ANSWERS as u64, KEPT_ANSWERS as u64 + 6);
+    for number in 4..=last {
+        post_numbered(&service, &session, number, pictures(4..5))
+            .await
+            .unwrap();
+    }
+    let first = last + 1 - kept;
+    let stored: Vec<u64> = (first..=last).collect();
+    assert_eq!(stored_from(&service, &session, first).await, Some(stored));
+    assert_eq!(stored_from(&service, &session, first - 1).await, None);
+    // Each of them is given again, and changes nothing.
+    let again = post_numbered(&service, &session, first, pictures(4..5));
+    assert!(again.await.unwrap().replayed);
+    assert_eq!(session.latest_frame(), last);
     let keeps = FrameBatch {
-        min_answers: 3,
-        ..FrameBatch::posted(Some(4), pictures(4..5), None)
+        min_answers: KEPT_ANSWERS + 2,
+        ..FrameBatch::posted(Some(last + 1), pictures(5..6), None)
     };
     post(&service, &session, keeps).await.unwrap();
-    assert_eq!(
-        stored_from(&service, &session, 2).await,
-        Some(vec![2, 3, 4])
-    );
-    assert_eq!(stored_from(&service, &session, 1).await, None);
-    post_numbered(&service, &session, 5, pictures(5..6))
-        .await
-        .unwrap();
-    assert_eq!(stored_from(&service, &session, 4).await, None);
-    assert_eq!(stored_from(&service, &session, 5).await, Some(vec![5]));
+    assert!(stored_from(&service, &session, first).await.is_some());
 }
 
 #[tokio::test]
@@ -273,9 +287,9 @@ async fn a_stored_answer_is_given_for_the_same_bytes_alone() {
     let (got, expected) = (1, 3);
     let other = replay(asked(1, picture(2)).await);
     assert_eq!(other, ReplayError::Differs { got, expected });
-    let (got, expected) = (0, 3);
-    let old = replay(asked(0, picture(0)).await);
-    assert_eq!(old, ReplayError::OutOfOrder { got, expected });
+    let (got, expected) = (4, 3);
+    let early = replay(asked(4, picture(4)).await);
+    assert_eq!(early, ReplayError::OutOfOrder { got, expected });
 }
 
 #[tokio::test]
