@@ -28,6 +28,8 @@ let canvas;
  * @returns {Promise<Pixels | Planes>} */
 export async function pixelsOf(image) {
   if ("luma" in image || "data" in image) return image;
+  if (typeof OffscreenCanvas === "undefined")
+    throw new Error("Files and pictures are decoded by browsers: here give pixels { width, height, data }, or planes.");
   if (!(image instanceof Blob)) return draw(image);
   const bitmap = await createImageBitmap(image);
   try {

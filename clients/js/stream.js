@@ -234,6 +234,8 @@ export class FrameStream {
       if (this.isEnded) return;
       const url = client.transport.at(`sessions/${id}/stream`, { from: frame + 1, drop: this.live ? "true" : undefined });
       url.protocol = url.protocol.replace("http", "ws");
+      if (!client.WebSocket)
+        throw new Error("This platform has no WebSocket, as Node.js before 22: new Client(url, { WebSocket }) takes one.");
       const socket = new client.WebSocket(url, token ? ["bagtrack", token] : ["bagtrack"]);
       this.socket = socket;
       socket.onmessage = (event) => {

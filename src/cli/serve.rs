@@ -10,9 +10,11 @@ use super::memory_limit;
 use super::open_files;
 use super::signals::{self, Reloaded, Signals};
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
+use bagtrack_config::OFF;
 use bagtrack_ingest::video::Launcher;
 use std::error::Error;
 use std::net::SocketAddr;
+use std::process::{Command, Stdio};
 
 /// Flags of `serve`.
 #[derive(Debug, clap::Args)]
@@ -50,7 +52,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     confine_decoders(&mut config);
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
-    let base_path = config.base_path.clone();
+    let (base_path, ffmpeg) = (config.base_path.clone(), config.limits.ffmpeg.clone());
     let application = Application::bind(config).await?;
     let reloaded = Reloaded::of(&application);
     let mut signals = Signals::listen()?;
@@ -72,6 +74,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         mib(bound.total())
     );
     memory_limit::check(bound.total());
+    check_ffmpeg(&ffmpeg);
     tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload(reloaded));
@@ -89,6 +92,21 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     match ended {
         true => Ok(()),
         false => Err("requests were cut off".into()),
+    }
+}
+
+/// Warns where videos will be refused.
+fn check_ffmpeg(program: &str) {
+    if program == OFF {
+        return;
+    }
+    let mut version = Command::new(program);
+    let version = version
+        .arg("-version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    if let Err(error) = version.stdin(Stdio::null()).status() {
+        tracing::warn!(%error, "videos are refused: there is no program {program} (--ffmpeg; `off` says that none is meant)");
     }
 }
 

@@ -46,6 +46,33 @@ fn the_default_is_a_table_with_score_and_status() {
     assert_eq!(lines.len(), 25);
 }
 
+/// A table was written into them.
+#[test]
+fn the_name_of_the_file_says_its_format() {
+    let parent = folder();
+    let dir = clip(parent.path(), "clip", &[]);
+    for (name, format) in [
+        ("boxes.csv", "csv"),
+        ("boxes.jsonl", "json"),
+        ("boxes.xml", "cvat"),
+        ("boxes.txt", "text"),
+    ] {
+        let file = parent.path().join(name);
+        let flags = ["track", text(&dir), ONE, "--count", "4"];
+        assert_eq!(succeeds(&[&flags[..], &["-o", text(&file)]].concat()), "");
+        let written = fs::read_to_string(&file).expect("it was written");
+        let expected = succeeds(&[&flags[..], &["--format", format]].concat());
+        assert_eq!(written, expected, "{name}");
+    }
+    let file = parent.path().join("boxes.json");
+    let line = fails(&["track", text(&dir), ONE, "-o", text(&file)]);
+    assert!(
+        line.contains("--format json, coco or label-studio"),
+        "{line}"
+    );
+    assert!(!file.exists());
+}
+
 #[test]
 fn otb_and_mot_count_from_one() {
     let parent = folder();
@@ -290,7 +317,7 @@ fn labels_of_yolo_go_to_a_new_folder() {
     }
     let line = fails(&["track", text(&dir), ONE, "--name", "a", "--name", "b"]);
     assert!(
-        line.contains("--name is given 2 times, for 1 boxes"),
+        line.contains("--name is given 2 times, for 1 box\n"),
         "{line}"
     );
 }

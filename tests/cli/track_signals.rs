@@ -59,6 +59,8 @@ fn a_signal_ends_the_drawn_video_properly_and_keeps_the_rows() {
     for (signal, status, name) in [
         (Signal::INT, 130, "stopped.mp4"),
         (Signal::TERM, 143, "stopped.avi"),
+        // The terminal has closed.
+        (Signal::HUP, 129, "stopped.mkv"),
     ] {
         let drawn = parent.path().join(name);
         let (csv, said, ended) = stop_by(signal, &[text(&video), "--draw", text(&drawn)]);

@@ -392,4 +392,17 @@ fn what_is_no_video_is_told_in_one_line() {
     );
     let line = fails(&["track", text(&file)]);
     assert!(line.contains("--box x,y,width,height is needed"), "{line}");
+    for (name, start, told) in [
+        (
+            "photo.mov",
+            &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
+            "is a photo (HEIC)",
+        ),
+        ("clip.zip", b"PK\x03\x04\x14\0", "is packed (ZIP)"),
+    ] {
+        let file = parent.path().join(name);
+        fs::write(&file, start).expect("the folder is writable");
+        let line = fails(&["track", text(&file), "--box", "1,2,30,40"]);
+        assert!(line.contains(name) && line.contains(told), "{line}");
+    }
 }

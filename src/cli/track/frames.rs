@@ -4,10 +4,11 @@ use super::reversed::Reversed;
 use super::start::Start;
 use super::video_info::{FFMPEG, Rate, VideoInfo};
 use bagtrack_cli::frames;
-use bagtrack_ingest::Limits;
 use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
+use bagtrack_ingest::{Limits, unread_type};
 use std::error::Error;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::vec::IntoIter;
 
@@ -97,6 +98,7 @@ impl Frames {
     /// Frames before the start are passed over where the file has no index.
     fn of_video(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
+        check_is_video(path)?;
         let path = path.canonicalize()?;
         let info = VideoInfo::read(&path);
         let first = match start {
@@ -247,4 +249,16 @@ fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
         file: Some(file.to_string_lossy().into_owned()),
         bytes,
     })
+}
+
+/// Tells photos and archives, of which ffmpeg would say that they are damaged videos.
+fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
+    let mut start = Vec::new();
+    fs::File::open(path)?.take(4096).read_to_end(&mut start)?;
+    let told = match unread_type(&start) {
+        Some(name @ ("HEIC" | "HEIF" | "AVIF")) => format!("is a photo ({name}), not a video"),
+        Some(name @ ("gzip" | "ZIP")) => format!("is packed ({name}): unpack it first"),
+        _ => return Ok(()),
+    };
+    Err(format!("{} {told}", path.display()).into())
 }

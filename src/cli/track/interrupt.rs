@@ -1,6 +1,7 @@
-//! SIGINT (Ctrl-C) and SIGTERM while a command works: it ends after the frame at hand, and closes its files.
+//! SIGINT (Ctrl-C), SIGTERM and SIGHUP (a terminal or a line that closes) while a command works: it ends after the frame
+//! at hand, and closes its files.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::io;
 use std::process::ExitCode;
@@ -19,7 +20,8 @@ impl Interrupt {
     pub fn listen() -> io::Result<Self> {
         let came = Arc::new(AtomicUsize::new(0));
         let is_second = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
+        let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
             // They act in this order.
             flag::register_conditional_default(signal, is_second.clone())?;
             flag::register(signal, is_second.clone())?;
@@ -41,4 +43,13 @@ impl Interrupt {
             Err(_) => ExitCode::FAILURE,
         }
     }
+}
+
+/// Whether whoever started the program has it ignore a signal, as `nohup` does with SIGHUP. Where the system does not
+/// tell, it does not.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }

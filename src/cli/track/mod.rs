@@ -28,6 +28,7 @@ use interrupt::Interrupt;
 use rows::Rows;
 use start::Start;
 use std::error::Error;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -52,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "FRAME|TIME", value_parser = start::parse)]
     start: Option<Start>,
     /// Tracks at most so many frames after the first one.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", visible_alias = "count")]
     frames: Option<u64>,
     /// Tracks from the first frame back to the beginning of the video or folder.
     #[arg(long)]
@@ -71,9 +72,10 @@ pub struct Args {
     /// Seed of all random draws: the same seed gives the same boxes.
     #[arg(long)]
     seed: Option<u64>,
-    /// How boxes are written. Frames and targets count from 0 but for otb, mot, and what COCO and Label Studio count.
-    #[arg(long, value_enum, default_value_t = Format::File(FileFormat::Text))]
-    format: Format,
+    /// How boxes are written [default: text; csv, json or cvat where the output ends with .csv, .jsonl or .xml]. Frames
+    /// and targets count from 0 but for otb, mot, and what COCO and Label Studio count.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
     /// Writes the boxes to a new file, not to standard output; with --format yolo to a new folder.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -89,7 +91,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
     let interrupt = Interrupt::listen()?;
     let mut params = args.params.params()?;
     params.seed = args.seed.unwrap_or(params.seed);
-    check(&args)?;
+    let format = check(&args)?;
     let expert = args.model.load()?;
     let destination = args.draw.as_deref().map(Destination::of).transpose()?;
     let direction = match args.backwards {
@@ -106,7 +108,7 @@ pub fn run(args: Args) -> Result<ExitCode, Box<dyn Error>> {
         time: frames.have_times(),
         target: boxes.len() > 1,
     };
-    let rows = Rows::open(args.output.as_deref(), args.format, columns)?;
+    let rows = Rows::open(args.output.as_deref(), format, columns)?;
     let bar = match rows.are_on_terminal() {
         // The rows tell how far it is, and a bar would be among them.
         true => indicatif::ProgressBar::hidden(),
@@ -140,15 +142,19 @@ fn left(frames: &Frames, most: Option<u64>) -> Option<u64> {
     frames.left().into_iter().chain(wanted).min()
 }
 
-/// What can be told before any file is opened.
-fn check(args: &Args) -> Result<(), String> {
+/// How boxes are written, and what else can be told before any file is opened.
+fn check(args: &Args) -> Result<Format, String> {
     let count = args.boxes.len();
     if count > MAX_TARGETS {
         return Err(format!(
             "--box is given {count} times; {MAX_TARGETS} targets are followed at most"
         ));
     }
-    let fits = args.format.check(count, args.keyframes);
+    let format = match args.format {
+        Some(format) => format,
+        None => format_of(args.output.as_deref())?,
+    };
+    let fits = format.check(count, args.keyframes);
     fits.map_err(|unfit| match unfit {
         Unfit::Targets => format!("--format {unfit}"),
         Unfit::KeyFrames => format!("--keyframes: {unfit}"),
@@ -157,7 +163,22 @@ fn check(args: &Args) -> Result<(), String> {
         let text = "--backwards goes from --start to the first frame: give --start, a frame's number or time";
         return Err(text.to_owned());
     }
-    Ok(())
+    Ok(format)
+}
+
+/// What the ending of the output's name says of its format.
+fn format_of(output: Option<&Path>) -> Result<Format, String> {
+    let ending = output.and_then(Path::extension).and_then(OsStr::to_str);
+    Ok(Format::File(match ending {
+        Some("csv") => FileFormat::Csv,
+        Some("jsonl") => FileFormat::Json,
+        Some("xml") => FileFormat::Cvat,
+        Some("json") => {
+            let text = "several formats are .json: give --format json, coco or label-studio";
+            return Err(text.to_owned());
+        }
+        _ => FileFormat::Text,
+    }))
 }
 
 /// The name of a file or folder, whatever way led to it.
@@ -171,8 +192,9 @@ fn name_of(path: &Path) -> String {
 fn names_of(given: &[String], count: usize) -> Result<Vec<String>, String> {
     if given.len() > count {
         return Err(format!(
-            "--name is given {} times, for {count} boxes",
-            given.len()
+            "--name is given {} times, for {count} box{}",
+            given.len(),
+            if count == 1 { "" } else { "es" }
         ));
     }
     let made = (given.len()..count).map(|target| format!("Object {}", target + 1));

@@ -12,6 +12,7 @@ use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use bagtrack_access::{NotIdentified, TOKEN_PREFIX};
+use bagtrack_api::ProblemKind as Kind;
 use bagtrack_quotas::Client;
 
 /// What a request without a key or a token is told, and one whose token is not taken (RFC 6750, section 3).
@@ -39,7 +40,7 @@ pub async fn authenticate(
             request.extensions_mut().insert(caller);
             next.run(request).await
         }
-        Err(refused) => unauthorized(&refused),
+        Err(refused) => unauthorized(&refused, request.headers()),
     }
 }
 
@@ -56,22 +57,42 @@ pub async fn authenticate_metrics(
     let digest = |text: &str| blake3::hash(text.as_bytes());
     let presented = bearer(request.headers()).map(digest);
     if presented != Some(digest(key.text())) {
-        return unauthorized(&NotIdentified::Key);
+        return unauthorized(&NotIdentified::Key, request.headers());
     }
     let reader = Caller::with_key(Default::default(), None);
     request.extensions_mut().insert(reader);
     next.run(request).await
 }
 
-fn unauthorized(refused: &NotIdentified) -> Response {
+fn unauthorized(refused: &NotIdentified, headers: &HeaderMap) -> Response {
     let (problem, challenge) = match refused {
-        NotIdentified::Key => (Problem::unauthorized(), CHALLENGE),
+        NotIdentified::Key => (not_identified(headers), CHALLENGE),
         #[cfg(feature = "jwt")]
         NotIdentified::Token(error) => (Problem::invalid_token(error), INVALID_TOKEN),
     };
     let mut response = problem.into_response();
     response.headers_mut().insert(WWW_AUTHENTICATE, challenge);
     response
+}
+
+/// What is wrong with what a request came with.
+fn not_identified(headers: &HeaderMap) -> Problem {
+    let presented = bearer(headers).or_else(|| offered_token(headers));
+    let detail = match presented {
+        Some(text) if text.starts_with(TOKEN_PREFIX) => {
+            "The session token has ended, or its key has, or it is from before a restart: they stay good with \
+                `--snapshot-keys`. Make a new one: `POST /sessions/{id}/token`."
+        }
+        Some(text) if text.contains(':') => {
+            "The key is not known here. Of a line `name:key` of the service's keys, send the part after the colon."
+        }
+        Some(_) => "The key is not known here.",
+        None if headers.contains_key(AUTHORIZATION) => {
+            "The header must be `Authorization: Bearer …`, once, with an API key or a session token."
+        }
+        None => return Problem::unauthorized(),
+    };
+    Problem::new(Kind::Unauthorized, detail)
 }
 
 async fn caller(state: &AppState, headers: &HeaderMap) -> Result<Caller, NotIdentified> {

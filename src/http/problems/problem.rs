@@ -94,8 +94,10 @@ impl Problem {
 
     /// The body has more bytes than it may.
     pub fn body_too_large(limit: usize) -> Self {
-        let detail =
-            format!("A body may have at most {limit} bytes; send smaller or fewer frames.");
+        let detail = format!(
+            "A body may have at most {limit} bytes here (`--max-body-bytes`). Send smaller or fewer frames, or a \
+                smaller video: `ffmpeg -i VIDEO -vf scale=1280:-2 clip.mp4` makes one."
+        );
         Self::new(Kind::BodyTooLarge, detail)
     }
 
@@ -133,6 +135,14 @@ impl Problem {
             self.index = Some(index);
         }
         self
+    }
+
+    /// Says in which file of the request it is, counted from 0, where those before it count.
+    pub fn at_frame(self, index: usize) -> Self {
+        Self {
+            index: Some(index),
+            ..self
+        }
     }
 
     /// Says which of `count` targets is meant.
@@ -236,6 +246,10 @@ fixed! {
     missing_box: MissingBox
         "Send the target's box in the pixels of the frame: `box=x,y,width,height` in the query or as a field; for \
             several targets `boxes=x,y,width,height;x,y,width,height`.";
+    /// No box came with a correction.
+    missing_corrected_box: MissingBox
+        "Send where the target is in this frame, in its pixels: `box=x,y,width,height` in the query or as a field. Where \
+            the session has several targets, `target=N` says which one.";
     /// No route has this path.
     route_not_found: RouteNotFound "See /docs for the paths there are.";
     /// The request has no key, or none that is valid.
@@ -249,7 +263,8 @@ fixed! {
     host_not_allowed: HostNotAllowed "Start the service with this host in --allowed-hosts (BAGTRACK_ALLOWED_HOSTS).";
     /// No live session of the client has this id.
     session_not_found: SessionNotFound
-        "The session was never opened here with this key, or was deleted; open a new one with POST /sessions.";
+        "No session of yours has this id here: it was never opened with this key, was deleted, or the service was \
+            started again without a store. Open a new one with POST /sessions.";
     /// The session was not used for too long.
     session_expired: SessionExpired
         "No frame came in time; `expires_at` tells how long a session waits. Open a new one with POST /sessions.";
@@ -260,7 +275,6 @@ fixed! {
     session_exists: SessionExists
         "A live session has this id, and another frame, other settings or another key opened it. Make a new id.";
     /// The route has other methods.
-    method_not_allowed: MethodNotAllowed "The header `Allow` lists the methods there are.";
     /// The frame has no number, and came while another request was at the session.
     not_in_order: NotInOrder
         "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each answer. \
@@ -281,6 +295,8 @@ fixed! {
     too_many_connections: QuotaExceeded
         "This address has as many connections as one may, all of them busy. Use them again, or try again after the \
             time in `Retry-After`.";
+    /// The route has other methods.
+    method_not_allowed: MethodNotAllowed "The header `Allow` lists the methods there are.";
     /// The body did not arrive in time.
     body_timeout: BodyTimeout "Send the whole body faster, or a smaller frame. The session is unchanged.";
 }

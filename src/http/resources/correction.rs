@@ -75,7 +75,7 @@ pub async fn put(
 
 /// The number of the frame, and the box in it.
 fn asked(settings: &TargetSettings) -> Result<(Option<u64>, GivenBox), Problem> {
-    let to = rect(settings.r#box.ok_or_else(Problem::missing_box)?);
+    let to = rect(settings.r#box.ok_or_else(Problem::missing_corrected_box)?);
     let target = settings.target.map(|number| number.as_index());
     let number = settings.frame.map(|number| number.0);
     Ok((number, GivenBox { target, to }))

@@ -49,8 +49,10 @@ pub async fn respond(state: AppState, mut request: FramesRequest) -> Result<Resp
     let checked = state
         .service
         .run::<_, Problem, _>(request.queue.clone(), check);
-    let source = FrameSource::Files(checked.await?.into_iter(), deadline);
-    respond_to(state, request, source).await
+    let files = checked.await?;
+    let count = files.len();
+    let source = FrameSource::Files(files.into_iter(), deadline);
+    respond_to(state, request, source, count).await
 }
 
 /// Answers the pictures of the only file by lines.
@@ -66,13 +68,14 @@ pub async fn respond_to_video(
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place, 0).await?);
-    respond_to(state, request, source).await
+    respond_to(state, request, source, 1).await
 }
 
 async fn respond_to(
     state: AppState,
     request: FramesRequest,
     source: FrameSource,
+    count: usize,
 ) -> Result<Response, Problem> {
     let session = request.permit.session().clone();
     let number = request.number();
@@ -87,6 +90,7 @@ async fn respond_to(
         permit: request.permit,
         client: request.client,
         source,
+        count,
         number,
         too_old: None,
     };
@@ -110,6 +114,8 @@ struct SessionFrames {
     queue: QueuePermit,
     client: Client,
     source: FrameSource,
+    /// How many files the request has.
+    count: usize,
     /// The number of the next frame, where it is known.
     number: Option<u64>,
     /// Why the last picture of a video has no line: its answer is no longer stored.
@@ -121,9 +127,13 @@ impl FrameSequence for SessionFrames {
 
     async fn next(&mut self) -> Option<Result<StreamAnswer, Problem>> {
         if let FrameSource::Files(files, deadline) = &mut self.source {
-            let (file, deadline) = (files.next()?, *deadline);
+            let (left, file, deadline) = (files.len(), files.next()?, *deadline);
             let tracked = timeout_at(deadline, self.answer(file)).await;
-            return Some(tracked.unwrap_or_else(|_| Err(Problem::work_timeout())));
+            let tracked = tracked.unwrap_or_else(|_| Err(Problem::work_timeout()));
+            return Some(tracked.map_err(|problem| match self.count {
+                1 => problem,
+                count => problem.at_frame(count - left),
+            }));
         }
         loop {
             let file = match self.picture().await? {

@@ -24,8 +24,8 @@ type FramesJson = JsonBody<FramesSettings>;
 /// opened with `boxes` an answer has an array `targets`, in the order of the boxes, and its own box is the first's.
 ///
 /// Numbered frames can be sent again: `?frame=N` says that the (first) frame of this request is frame N. The next
-/// number is processed, one that comes a little early waits for its turn, and the last request's numbers with the same
-/// bytes get the stored answers again, with the header `Replayed: true`.
+/// number is processed, one that comes a little early waits for its turn, and those of the last 32 frames, or of the
+/// last request, with the same bytes get the stored answers again, with the header `Replayed: true`.
 ///
 /// With `Accept: application/x-ndjson` each frame is answered by a line of JSON as soon as it is tracked. Frames before
 /// one that is refused count then; its problem document is the last line. So is a video answered, where the service has

@@ -21,6 +21,7 @@ use bagtrack_api::Tracked;
 use bagtrack_api::openapi::example_frames;
 use bagtrack_api::requests::{BinaryBody, FormBody, JsonBody, Switch, TrackSettings};
 use bagtrack_ingest::video::VideoFormat;
+use bagtrack_ingest::{IngestError, unread_type};
 use bagtrack_sessions::{Boxes, Charge, GivenBox, Selection, TrackFrom, TrackedAway};
 use bagtrack_tracker::Params;
 use base64::Engine;
@@ -176,6 +177,10 @@ fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
 fn asked(upload: Upload<TrackSettings>) -> Result<(TrackFrom, Vec<Bytes>), Problem> {
     let (settings, files) = (upload.settings, upload.files);
     let Some(snapshot) = upload.snapshot else {
+        // A video that is not read is told as that, not as no video.
+        if let Some(name) = files.first().and_then(|file| unread_type(file)) {
+            return Err(IngestError::UnreadFormat(name).into());
+        }
         check_no_range(&settings)?;
         let (boxes, params) = begin(settings)?;
         return Ok((TrackFrom::Start(boxes, params), files));

@@ -78,6 +78,7 @@ async fn frames_before_a_bad_one_count_and_its_problem_is_the_last_line() {
     assert_eq!(got, expected[..3]);
     assert_eq!(last["type"], "/docs/problems#unsupported-image");
     assert_eq!(last["status"], 415);
+    assert_eq!(last["index"], 3);
     assert_eq!(last["instance"], format!("/sessions/{id}/frames"));
     assert_eq!(app.frames_of(&id).await, 4);
 

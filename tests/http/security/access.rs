@@ -71,6 +71,33 @@ async fn nothing_is_done_without_a_valid_key() {
     assert_eq!(app.frames_of(&id).await, 1);
 }
 
+/// All of these once had one text, whose cure was that of another mistake.
+#[tokio::test]
+async fn what_is_wrong_with_a_key_is_told() {
+    let mut app = two_clients().await;
+    app.key = None;
+    for (header, told) in [
+        (None, "Send an API key"),
+        (Some(ANN), "must be `Authorization: Bearer"),
+        (Some("Basic YW5uOg=="), "must be `Authorization: Bearer"),
+        (Some("Bearer 0123456789abcdeF"), "is not known"),
+        (Some("Bearer ann:0123456789abcdef"), "after the colon"),
+        (
+            Some("Bearer bagtrack-session.x"),
+            "POST /sessions/{id}/token",
+        ),
+    ] {
+        let mut request = app.request(Method::GET, "/metrics", &[]);
+        if let Some(header) = header {
+            request = request.header("authorization", header);
+        }
+        let refused = request.send().await.unwrap();
+        let problem = expect_problem(refused, "unauthorized").await;
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.contains(told), "{header:?}: {detail}");
+    }
+}
+
 #[tokio::test]
 async fn a_session_is_not_there_for_other_clients() {
     let mut app = two_clients().await;

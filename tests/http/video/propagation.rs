@@ -269,22 +269,27 @@ async fn a_file_of_a_damaged_video_is_had_of_the_frames_before_the_damage() {
     let middle = bytes.len() / 2;
     bytes[middle..middle + 500].fill(0x5A);
     std::fs::write(&video, bytes).unwrap();
-    let query = [("box", BOXES[0]), ("format", "csv")];
-    let refused = track(&app, &video, &query).await;
-    let problem = expect_problem(refused, "frame-damaged").await;
-    let detail = problem["detail"].as_str().unwrap();
-    let (_, rest) = detail
-        .split_once("`count=")
-        .unwrap_or_else(|| panic!("{detail}"));
-    let (count, _) = rest.split_once('`').unwrap();
-    let answer = track(&app, &video, &[&query[..], &[("count", count)]].concat()).await;
-    assert_eq!(answer.status(), 200, "{detail}");
-    let rows = answer.text().await.unwrap().lines().count();
-    assert_eq!(
-        rows,
-        count.parse::<usize>().unwrap() + 2,
-        "a head, the first frame, and these"
-    );
+    let mut counts: Vec<usize> = Vec::new();
+    let rows = loop {
+        let count = counts.last().map(usize::to_string);
+        let mut query = vec![("box", BOXES[0]), ("format", "csv")];
+        query.extend(count.as_deref().map(|count| ("count", count)));
+        let answer = track(&app, &video, &query).await;
+        if answer.status().is_success() {
+            break answer.text().await.unwrap().lines().count();
+        }
+        let problem = expect_problem(answer, "frame-damaged").await;
+        let detail = problem["detail"].as_str().unwrap();
+        let (_, rest) = detail
+            .split_once("`count=")
+            .unwrap_or_else(|| panic!("{detail}"));
+        counts.push(rest.split_once('`').unwrap().0.parse().unwrap());
+        // ffmpeg's words and pictures come by two pipes: on a busy machine it is heard of damage some pictures earlier.
+        assert!(counts.is_sorted_by(|one, next| one > next), "{counts:?}");
+        assert!(counts.len() < 5, "{counts:?}");
+    };
+    let count = counts.last().expect("the video is damaged");
+    assert_eq!(rows, count + 2, "a head, the first frame, and these");
 }
 
 #[tokio::test]

@@ -106,6 +106,15 @@ async fn what_is_wrong_with_the_video_or_the_box_is_told() {
         let refused = track(&app, query, "video/mp4", mp4.clone()).await;
         expect_problem(refused, slug).await;
     }
+    // It is a video, but none that is read.
+    let avi = [&b"RIFF\0\0\0\0AVI LIST"[..], &[0; 100]].concat();
+    let of_video = [("box", FIRST), ("count", "2")];
+    let refused = track(&app, &of_video, "video/x-msvideo", avi).await;
+    let problem = expect_problem(refused, "unsupported-image").await;
+    assert!(
+        problem["detail"].as_str().unwrap().contains("AVI"),
+        "{problem}"
+    );
     let cut = mp4[..mp4.len() / 2].to_vec();
     let refused = track(&app, &first, "video/mp4", cut).await;
     expect_problem(refused, "frame-damaged").await;
