@@ -27,7 +27,7 @@ async fn frames_to_both_replicas_in_turns_get_the_boxes_of_one() {
         let view = pair.view(replica).await;
         assert_eq!(json(view, StatusCode::OK).await["frames"], 20);
     }
-    let early = json(pair.post(0, 30 - 12).await, StatusCode::CONFLICT).await;
+    let early = json(pair.post_as(0, 60, 1).await, StatusCode::CONFLICT).await;
     assert_eq!(early["expected_frame"], 20);
 }
 
