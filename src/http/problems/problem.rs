@@ -274,7 +274,6 @@ fixed! {
     /// A live session that another request opened has the id.
     session_exists: SessionExists
         "A live session has this id, and another frame, other settings or another key opened it. Make a new id.";
-    /// The route has other methods.
     /// The frame has no number, and came while another request was at the session.
     not_in_order: NotInOrder
         "Another request with frames was at this session. Number the frames (`?frame=N`), or wait for each answer. \
