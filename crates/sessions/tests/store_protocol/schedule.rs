@@ -129,8 +129,10 @@ impl World {
                 let history = found.expect(&message).clone();
                 if arrives {
                     self.next[sender] = frame + 1;
-                    if checkpoint > self.promised.len() {
-                        self.promised = history[..checkpoint].to_vec();
+                    // A stored answer tells nothing of the frames after its own.
+                    let told = checkpoint.min(history.len());
+                    if told > self.promised.len() {
+                        self.promised = history[..told].to_vec();
                     }
                 }
             }
@@ -158,7 +160,11 @@ impl World {
         // may tell what another has replaced.
         let told = request.promised.max(checkpoint).min(history.len());
         let shared = told.min(self.promised.len());
-        let promised = request.promised.min(self.promised.len());
+        let mut promised = request.promised.min(self.promised.len());
+        if let Asked::Frame(_, number) = request.asked {
+            // An earlier frame gets its stored answer.
+            promised = promised.min(number as usize);
+        }
         history[..shared] == self.promised[..shared] && history.len() >= promised
     }
 
