@@ -1,15 +1,14 @@
 //! What a connection goes through from when it is accepted to its end.
 
+#[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
 use bagtrack_config::MAX_BUFFER_BYTES;
-use bagtrack_net::Peer;
 use bagtrack_net::{
-    Begun, ClientLimits, ConnectionHold, ConnectionIo, Security, Transport, is_trusted,
+    Begun, ClientLimits, ConnectionHold, ConnectionIo, Peer, Security, Transport, is_trusted,
 };
-#[cfg(feature = "tls")]
 use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::timeout;
 use hyper::Request;
