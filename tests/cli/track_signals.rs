@@ -14,7 +14,15 @@ const FRAMES: usize = 12 * 100;
 
 /// `bagtrack track` as a terminal starts it: with a process group of its own, whose members all get Ctrl-C.
 fn start(args: &[&str]) -> (Child, BufReader<ChildStdout>) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    let program = env!("CARGO_BIN_EXE_bagtrack");
+    let mut command = match cfg!(target_os = "linux") {
+        // The tests may run under nohup, whose programs ignore SIGHUP.
+        true => Command::new("env"),
+        false => Command::new(program),
+    };
+    if cfg!(target_os = "linux") {
+        command.args(["--default-signal=HUP", program]);
+    }
     command.args(["track", "--format", "csv", "--box=21,50,23,28"]);
     command.args(args).process_group(0);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
