@@ -74,7 +74,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
         mib(bound.total())
     );
     memory_limit::check(bound.total());
-    check_ffmpeg(&ffmpeg);
+    tokio::task::spawn_blocking(move || check_ffmpeg(&ffmpeg));
     tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
     let reloads = tokio::spawn(signals::reload(reloaded));
@@ -106,7 +106,7 @@ fn check_ffmpeg(program: &str) {
         .stdout(Stdio::null())
         .stderr(Stdio::null());
     if let Err(error) = version.stdin(Stdio::null()).status() {
-        tracing::warn!(%error, "videos are refused: there is no program {program} (--ffmpeg; `off` says that none is meant)");
+        tracing::warn!(%error, "videos are refused, for want of {program} (--ffmpeg)");
     }
 }
 

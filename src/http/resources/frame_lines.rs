@@ -19,7 +19,7 @@ use bagtrack_ingest::video::VideoFormat;
 use bagtrack_quotas::Client;
 use bagtrack_sessions::clock::{self, Instant, timeout_at};
 use bagtrack_sessions::{
-    Fingerprint, FrameBatch, QueuePermit, SessionPermit, SessionState, WorkMeter,
+    Fingerprint, FrameBatch, KEPT_ANSWERS, QueuePermit, SessionPermit, SessionState, WorkMeter,
     check_readable_pixels,
 };
 use std::vec::IntoIter;
@@ -190,7 +190,7 @@ impl SessionFrames {
         }
         let mut next = FrameBatch::posted(self.number, vec![file], None);
         // So that the request can be sent again when its line breaks.
-        next.min_answers = self.state.config.max_frames;
+        next.min_answers = self.state.config.max_frames.max(KEPT_ANSWERS);
         let (service, queue) = (&self.state.service, self.queue.clone());
         let tracked = service.advance(self.permit.share(), queue, next).await?;
         let estimates = &tracked.estimates[0];

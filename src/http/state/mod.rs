@@ -11,8 +11,8 @@ use bagtrack_config::Config;
 use bagtrack_quotas::{Client, Clients};
 use bagtrack_sessions::clock::Instant;
 use bagtrack_sessions::{
-    Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, Lease, OpenStreams,
-    Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
+    Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, KEPT_ANSWERS, Lease,
+    OpenStreams, Registry, ServiceParts, ServiceSettings, Session, SessionService, SessionStore,
 };
 use bagtrack_tracker::Expert;
 use saturation::Saturation;
@@ -201,7 +201,7 @@ fn settings(config: &Config) -> ServiceSettings {
         max_request_cpu: config.limits.max_request_cpu,
         frame: config.frame_limits(),
         max_request_pixels: config.limits.max_request_pixels,
-        max_frames: config.max_frames,
+        max_answers: config.max_frames.max(KEPT_ANSWERS),
         store_every: config.store.store_every,
     }
 }

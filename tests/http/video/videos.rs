@@ -5,6 +5,7 @@ use crate::helpers::heavy;
 use crate::pictures;
 use crate::program::Program;
 use crate::requests::lines::lines;
+use bagtrack_sessions::KEPT_ANSWERS;
 use image::ImageFormat;
 use reqwest::{Client, Method, Response};
 use std::io::Write;
@@ -108,13 +109,11 @@ async fn a_video_is_tracked_and_answered_line_by_line() {
 #[tokio::test]
 #[ignore = "needs ffmpeg"]
 async fn a_long_video_that_is_sent_again_goes_on() {
-    let stored = 4;
-    let app = TestApplication::start_with(|config| config.max_frames = stored).await;
+    let app = TestApplication::start_with(|config| config.max_frames = 4).await;
     let id = app.open().await;
-    let whole = motion_jpeg();
-    let seventh = pictures::encode(pictures::scene(7), ImageFormat::Jpeg);
-    let at = whole.windows(seventh.len()).position(|at| at == seventh);
-    let (first_six, rest) = whole.split_at(at.unwrap());
+    let (part, rest) = (motion_jpeg().repeat(3), motion_jpeg());
+    let (tracked, all) = (3 * u64::from(FRAMES), 4 * u64::from(FRAMES));
+    let whole = [&part[..], &rest].concat();
     let send = async |number: &str, video: &[u8]| {
         let path = format!("/sessions/{id}/frames");
         let request = app.request(Method::POST, &path, &[("frame", number)]);
@@ -126,20 +125,20 @@ async fn a_long_video_that_is_sent_again_goes_on() {
         told.map(|it| (it["frame"].as_u64().unwrap(), it["replayed"] == true))
             .collect()
     };
-    assert_eq!(lines(send("1", first_six).await).await.len(), 6);
+    assert_eq!(lines(send("1", &part).await).await.len() as u64, tracked);
     let again = lines(send("1", &whole).await).await;
-    let expected: Vec<_> = (3..=FRAMES.into())
-        .map(|frame| (frame, frame <= 6))
-        .collect();
-    assert_eq!(told(&again), expected);
-    assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+    let first = tracked + 1 - KEPT_ANSWERS as u64;
+    let expected = (first..=all).map(|frame| (frame, frame <= tracked));
+    assert_eq!(told(&again), expected.collect::<Vec<_>>());
+    assert_eq!(app.frames_of(&id).await, all + 1);
 
     // What reaches none of the stored answers, or others than they are of, is refused as before.
-    let problem = expect_problem(send("1", first_six).await, "frame-out-of-order").await;
-    assert_eq!(problem["expected_frame"], FRAMES + 1);
-    let other = [rest, first_six].concat();
-    expect_problem(send("1", &other).await, "frame-differs").await;
-    assert_eq!(app.frames_of(&id).await, u64::from(FRAMES) + 1);
+    let problem = expect_problem(send("1", &rest).await, "frame-out-of-order").await;
+    assert_eq!(problem["expected_frame"], all + 1);
+    let before = pictures::encode(pictures::scene(5), ImageFormat::Jpeg);
+    let shifted = [&before[..], &whole].concat();
+    expect_problem(send("1", &shifted).await, "frame-differs").await;
+    assert_eq!(app.frames_of(&id).await, all + 1);
 }
 
 #[tokio::test]

@@ -1,18 +1,14 @@
 //! The decoder's process, and what it may take.
 
-use super::error::VideoError;
+use super::error::{MAX_CPU, MAX_MEMORY, VideoError};
 use std::ffi::{OsStr, OsString};
 use std::process::{Child, Command, Stdio};
 
-/// Most bytes of addresses of a decoder, which needs some ten pictures. Those of 4096 x 2304 pixels fit, not all of 8K.
-pub const MAX_MEMORY: u64 = 768 << 20;
 /// By how much lower its priority is: that of other slow work.
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
 /// What the launcher ends with where it cannot start the program.
 pub(super) const NOT_STARTED: i32 = 127;
-/// Most processor time in seconds.
-pub(super) const MAX_CPU: u64 = 300;
 /// Most bytes of a file that it writes: what it keeps of a pipe, to go back in it.
 #[cfg(target_os = "linux")]
 const MAX_FILE: u64 = 1 << 30;

@@ -1,6 +1,9 @@
 //! Why a video has no further picture.
 
-use super::child::{MAX_CPU, MAX_MEMORY};
+/// Most bytes of addresses of a decoder, which needs some ten pictures. Those of 4096 x 2304 pixels fit, not all of 8K.
+pub const MAX_MEMORY: u64 = 768 << 20;
+/// Most processor time in seconds.
+pub(super) const MAX_CPU: u64 = 300;
 
 /// Why a video has no further picture.
 #[derive(Debug, thiserror::Error)]

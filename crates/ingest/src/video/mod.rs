@@ -20,10 +20,10 @@ mod output;
 mod said;
 mod sniff;
 
-pub use child::{Launcher, MAX_MEMORY as MAX_DECODER_MEMORY};
+pub use child::Launcher;
 #[cfg(fuzzing)]
 pub use decoder::read_output;
 pub use decoder::{Stop, VideoDecoder, VideoLimits};
-pub use error::{Cost, VideoError};
+pub use error::{Cost, MAX_MEMORY as MAX_DECODER_MEMORY, VideoError};
 pub use output::VideoPicture;
 pub use sniff::{VideoFormat, video_format};

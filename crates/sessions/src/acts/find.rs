@@ -135,7 +135,7 @@ impl SessionService {
     {
         let queue = self.admission.enter(flow, Box::new(()))?;
         let reader = StateReader {
-            max_recent: self.settings.max_frames,
+            max_recent: self.settings.max_answers,
             expert: self.expert.clone(),
         };
         self.run(queue, move |_| work(&reader)).await

@@ -25,8 +25,8 @@ pub struct ServiceSettings {
     pub frame: bagtrack_ingest::Limits,
     /// Most pixels of the frames of one request together.
     pub max_request_pixels: u64,
-    /// Most frames of a request, and most stored answers.
-    pub max_frames: usize,
+    /// Most stored answers of a session.
+    pub max_answers: usize,
     /// The state is written to the store at every so many frames.
     pub store_every: u64,
 }

@@ -52,7 +52,7 @@ impl Start {
         let expert = service.expert.as_ref();
         let (file, boxes, params) = match self {
             Self::Snapshot(bytes) => {
-                let max_recent = service.settings.max_frames;
+                let max_recent = service.settings.max_answers;
                 return Ok(SessionState::restore(
                     bytes,
                     &service.keys,

@@ -44,7 +44,7 @@ pub fn parts(registry: Registry, admission: Admission, limit: Duration) -> Servi
             max_request_cpu: limit,
             frame: bagtrack_ingest::Limits::default(),
             max_request_pixels: u64::MAX,
-            max_frames: 64,
+            max_answers: 64,
             store_every: 1,
         },
         registry,
