@@ -32,6 +32,10 @@ use std::time::SystemTime;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 
+/// Bytes of an answer that the system takes while it waits to send them. With more, a client that reads slowly but steadily
+/// would for a long time seem to take nothing.
+#[cfg(target_os = "linux")]
+const MAX_UNSENT: u32 = 64 << 10;
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);
 
@@ -80,7 +84,7 @@ impl Application {
         let security = security(&config.tls)?;
         #[cfg(not(feature = "tls"))]
         let security = Security::Plain;
-        let listener = TcpListener::bind(address).await;
+        let listener = listen(address).await;
         let listener = listener.map_err(|source| BindError::Listen { address, source })?;
         let store = config.store.connect(clock.clone()).await?;
         let load = |files: &ModelFiles| files.load(config.model_in_doubt);
@@ -193,6 +197,14 @@ impl Application {
         service.flush().await;
         ended.is_ok()
     }
+}
+
+/// Listens. The sockets that it accepts have its options.
+async fn listen(address: SocketAddr) -> io::Result<TcpListener> {
+    let listener = TcpListener::bind(address).await?;
+    #[cfg(target_os = "linux")]
+    socket2::SockRef::from(&listener).set_tcp_notsent_lowat(MAX_UNSENT)?;
+    Ok(listener)
 }
 
 /// Reads the keys. They may come from a slow file system, or over the network.

@@ -54,6 +54,28 @@ async fn a_client_that_reads_too_slowly_loses_its_connection() {
     expect(app.get("/healthz").await, StatusCode::OK).await;
 }
 
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_that_reads_slowly_but_steadily_gets_all_of_its_answers() {
+    let app = TestApplication::start_with(|config| {
+        config.limits.write_timeout = Duration::from_secs(1);
+        config.limits.min_answer_rate = 64 << 10;
+    });
+    let app = app.await;
+    let length = app.get("/openapi.json").await.bytes().await.unwrap().len();
+    // More than the buffers of its system and of the service's take.
+    let count = (6 << 20) / length;
+    let ask = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n";
+    let asks = [
+        format!("{ask}\r\n").repeat(count),
+        format!("{ask}Connection: close\r\n\r\n"),
+    ];
+    let connection = RawConnection::open(app.address).await;
+    // Some 600 KB a second, nine times the least rate.
+    let trickle = connection.trickle(asks.concat(), 16 << 10, Duration::from_millis(25));
+    let read = within(trickle, "the answers come").await;
+    assert!(read > (count + 1) * length, "{read} of {count} * {length}");
+}
+
 #[tokio::test]
 async fn when_all_connections_are_taken_an_idle_one_makes_room() {
     let app = TestApplication::start_with(|config| {
