@@ -14,6 +14,7 @@ mod clients;
 mod holdings;
 mod rates;
 mod sessions;
+mod video_places;
 
 pub use account::{Account, RequestPermit};
 pub use client::Client;
@@ -21,3 +22,4 @@ pub use clients::Clients;
 pub use holdings::Holdings;
 pub use rates::RateExceeded;
 pub use sessions::ClientSessions;
+pub use video_places::VideoPlaces;

@@ -3,7 +3,7 @@
 use crate::http::problems::problem::Problem;
 use crate::http::state::AppState;
 use bagtrack_quotas::Client;
-use bagtrack_sessions::clock::{self, timeout_at};
+use bagtrack_sessions::clock;
 use bagtrack_sessions::{QueueFull, QueuePermit};
 use tokio::sync::OwnedSemaphorePermit;
 
@@ -39,8 +39,7 @@ impl VideoPlace {
         let deadline = clock::now() + config.work_timeout;
         let request = queue.yield_place();
         let own = state.clients.account(client).video_until(deadline).await?;
-        let all = timeout_at(deadline, state.videos.clone().acquire_owned()).await;
-        let all = all.ok().and_then(Result::ok).ok_or(QueueFull)?;
+        let all = state.videos.take_until(deadline).await.ok_or(QueueFull)?;
         let requests = config.limits.max_video_frames.div_ceil(config.max_frames);
         let requests = u32::try_from(requests).unwrap_or(u32::MAX);
         let queue = state.service.admission.rejoin(request)?;

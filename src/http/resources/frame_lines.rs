@@ -10,6 +10,7 @@ use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
 use crate::http::respond::answer::stream_answer;
 use crate::http::respond::ndjson::{self, FrameSequence};
+use crate::http::respond::video_answer;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::response::Response;
@@ -68,7 +69,8 @@ pub async fn respond_to_video(
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
     let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place, 0).await?);
-    respond_to(state, request, source, 1).await
+    let answer = respond_to(state.clone(), request, source, 1).await?;
+    Ok(video_answer::to_reader(&state, answer))
 }
 
 async fn respond_to(

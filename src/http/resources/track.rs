@@ -13,6 +13,7 @@ use crate::http::respond::answer::{answer_bytes, answers};
 use crate::http::respond::charged_body::ChargedBody;
 use crate::http::respond::json;
 use crate::http::respond::ndjson;
+use crate::http::respond::video_answer;
 use crate::http::state::AppState;
 use axum::body::Bytes;
 use axum::extract::State;
@@ -132,7 +133,8 @@ async fn track_video(
         selection: Selection::new(targets, until_lost, keyframes),
         end: None,
     };
-    ndjson::respond(state, request.instance, answers).await
+    let answer = ndjson::respond(state.clone(), request.instance, answers).await?;
+    Ok(video_answer::to_reader(&state, answer))
 }
 
 /// Which frames of a video are tracked.

@@ -4,6 +4,7 @@ use crate::http::extract::stateless_request::StatelessRequest;
 use crate::http::extract::video_frames::VideoFrames;
 use crate::http::extract::video_place::{VideoPlace, count_frame};
 use crate::http::problems::problem::Problem;
+use crate::http::respond::video_answer;
 use crate::http::state::AppState;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
@@ -59,8 +60,10 @@ pub async fn post(
     let mut video = VideoFrames::decode(&state, file, format, place, 0).await?;
     let first = next(&state, &request, &mut video).await;
     let first = first.ok_or_else(Problem::missing_frame)??;
+    let held = state.clone();
     let frames = stream::once(ready(Ok(first))).chain(rest(state, request, video));
-    Ok(([(CONTENT_TYPE, MOTION_JPEG)], Body::from_stream(frames)).into_response())
+    let answer = ([(CONTENT_TYPE, MOTION_JPEG)], Body::from_stream(frames));
+    Ok(video_answer::to_reader(&held, answer.into_response()))
 }
 
 /// The next frame, which counts as one of the client's.

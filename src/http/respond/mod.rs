@@ -10,3 +10,4 @@ pub mod created_session;
 pub mod json;
 pub mod ndjson;
 pub mod rate_limit;
+pub mod video_answer;

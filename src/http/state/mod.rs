@@ -8,7 +8,7 @@ use crate::http::metrics::registry::Metrics;
 use axum::body::Bytes;
 use bagtrack_access::Access;
 use bagtrack_config::Config;
-use bagtrack_quotas::{Client, Clients};
+use bagtrack_quotas::{Client, Clients, VideoPlaces};
 use bagtrack_sessions::clock::Instant;
 use bagtrack_sessions::{
     Admission, Budget, Charge, Clock, Executor, Flow, IdempotencyStore, KEPT_ANSWERS, Lease,
@@ -19,7 +19,6 @@ use saturation::Saturation;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::SystemTime;
-use tokio::sync::Semaphore;
 
 /// What all handlers share; clones are the same state.
 #[derive(Debug, Clone)]
@@ -43,7 +42,7 @@ pub struct Shared {
     /// The text of `/metrics` that was rendered last, and when that began.
     pub rendered_metrics: tokio::sync::Mutex<Option<(Instant, Bytes)>>,
     /// Places for the processes that decode videos.
-    pub videos: Arc<Semaphore>,
+    pub videos: VideoPlaces,
     /// Whether `/readyz` has found the queue full.
     pub queue_saturation: Saturation,
     /// Whether `/readyz` has found the memory of uploads used up.
@@ -97,7 +96,7 @@ impl AppState {
             metrics,
             rendered_metrics: tokio::sync::Mutex::default(),
             // A client has one at a time, and no client all of them.
-            videos: Arc::new(Semaphore::new(config.video_places())),
+            videos: VideoPlaces::new(config.video_places()),
             queue_saturation: Saturation::default(),
             upload_saturation: Saturation::default(),
             clock,
@@ -131,9 +130,6 @@ impl AppState {
         let workers = config.worker_count();
         let (sessions, busy) = (self.service.registry.len(), admission.busy_workers());
         let (held, is_draining) = (self.clients.all(), usize::from(self.is_draining()));
-        let videos = config
-            .video_places()
-            .saturating_sub(self.videos.available_permits());
         for (name, description, value) in [
             ("bagtrack_sessions", "Sessions in memory.", sessions),
             (
@@ -157,7 +153,11 @@ impl AppState {
                 "Bytes of bodies that have come, and of answers that are not taken.",
                 self.uploads.held(),
             ),
-            ("bagtrack_videos", "Videos that are decoded.", videos),
+            (
+                "bagtrack_videos",
+                "Videos that are decoded.",
+                self.videos.taken(),
+            ),
             (
                 "bagtrack_session_bytes",
                 "Bytes that the states of sessions in memory may take.",

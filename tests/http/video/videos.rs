@@ -6,6 +6,8 @@ use crate::pictures;
 use crate::program::Program;
 use crate::requests::lines::lines;
 use bagtrack_sessions::KEPT_ANSWERS;
+use bagtrack_testing::within::within;
+use futures_util::future::join_all;
 use image::ImageFormat;
 use reqwest::{Client, Method, Response};
 use std::io::Write;
@@ -459,6 +461,45 @@ async fn one_client_has_a_video_at_a_time_and_another_client_gets_the_next_place
     // It was at work all the time.
     held.chunk().await.unwrap().expect("another line");
     drop(held);
+}
+
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
+    let app = TestApplication::start_with(|config| {
+        config.workers = Some(1);
+        config.work_timeout = Duration::from_secs(1);
+        config.limits.write_timeout = Duration::from_secs(1000);
+        config.limits.trusted_proxies = vec!["127.0.0.0/8".parse().unwrap()];
+    });
+    let app = app.await;
+    let source = "testsrc2=size=1280x720:rate=30 -frames:v 300 -c:v mpeg4 -q:v 9";
+    let long = made("long.mp4", source);
+    let frames_of = async |client: &str, video: &[u8]| {
+        let request = app.request(Method::POST, "/frames", &[]);
+        let request = request.header("x-forwarded-for", client);
+        request.body(video.to_vec()).send().await.unwrap()
+    };
+    let held = [
+        frames_of("198.51.100.1", &long).await,
+        frames_of("198.51.100.2", &long).await,
+    ];
+    let short = video("mp4");
+    let other = async {
+        loop {
+            let answer = frames_of("198.51.100.3", &short).await;
+            if answer.status() == 200 {
+                return answer.bytes().await.unwrap();
+            }
+            expect_problem(answer, "queue-full").await;
+        }
+    };
+    let other = within(other, "a place is given up").await;
+    assert_eq!(times(&other).len(), FRAMES as usize);
+    // The other one keeps its place, as nobody waits for it any more: its answer is whole.
+    let ends = join_all(held.map(Response::bytes)).await;
+    let whole = ends.iter().flatten().map(|bytes| times(bytes).len());
+    assert_eq!(whole.collect::<Vec<_>>(), [300]);
 }
 
 /// The lines up to the problem that ends them, which must name this many pictures before it.

@@ -1,0 +1,73 @@
+//! The answer to a video, which keeps a place for as long as its reader takes.
+//!
+//! A reader may keep the service waiting for some time in all. After that its place goes to a video that waits for one,
+//! and the answer is cut off: else a few readers that take a little now and then would hold all places.
+
+use crate::http::state::AppState;
+use axum::body::{Body, BodyDataStream, Bytes};
+use axum::response::Response;
+use bagtrack_quotas::VideoPlaces;
+use bagtrack_sessions::clock;
+use futures_util::{StreamExt, stream};
+use std::io;
+use std::time::Duration;
+use tokio::sync::mpsc;
+use tracing::Instrument;
+
+/// How often a reader may use up the time that a request may take.
+const READER_PATIENCE: u32 = 4;
+
+/// Gives the answer, whose body holds a place for a video, to a reader that may be slow.
+pub fn to_reader(state: &AppState, answer: Response) -> Response {
+    let (head, body) = answer.into_parts();
+    let (sender, receiver) = mpsc::channel(1);
+    let patience = state.config.work_timeout * READER_PATIENCE;
+    let sent = send(
+        body.into_data_stream(),
+        sender,
+        state.videos.clone(),
+        patience,
+    );
+    tokio::spawn(sent.in_current_span());
+    let parts = stream::unfold(Some(receiver), |receiver| async {
+        let mut receiver = receiver?;
+        match receiver.recv().await {
+            Some(Some(part)) => Some((Ok(part), Some(receiver))),
+            Some(None) => None,
+            None => Some((Err(io::Error::other("the answer was given up")), None)),
+        }
+    });
+    Response::from_parts(head, Body::from_stream(parts))
+}
+
+/// Sends the parts of an answer, each when the one before was taken, and nothing after the last. An answer that is given
+/// up has no last one.
+async fn send(
+    mut answer: BodyDataStream,
+    sender: mpsc::Sender<Option<Bytes>>,
+    places: VideoPlaces,
+    mut patience: Duration,
+) {
+    loop {
+        let since = clock::now();
+        let room = tokio::select! {
+            biased;
+            room = sender.reserve() => room,
+            () = places.wanted_from(since + patience) => {
+                tracing::info!("an answer is taken too slowly, and a video waits for its place");
+                return;
+            }
+        };
+        let Ok(room) = room else { return };
+        patience = patience.saturating_sub(since.elapsed());
+        let part = tokio::select! {
+            part = answer.next() => part.transpose(),
+            () = sender.closed() => return,
+        };
+        match part {
+            Ok(Some(part)) => room.send(Some(part)),
+            Ok(None) => return room.send(None),
+            Err(_) => return,
+        }
+    }
+}
