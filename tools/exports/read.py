@@ -45,8 +45,8 @@ def pictures(folder: pathlib.Path) -> None:
     """The frames as pictures with the names that both give them."""
     into = folder / "pictures"
     into.mkdir()
-    command = ["ffmpeg", "-v", "error", "-i", folder / "clip.mp4", "-start_number", "0", into / "frame_%06d.jpg"]
-    subprocess.run(command, check=True)
+    command = ["ffmpeg", "-v", "error", "-i", folder / "clip.mp4", "-vf", "settb=1/30,setpts=N", "-r", "30"]
+    subprocess.run([*command, "-start_number", "0", into / "frame_%06d.jpg"], check=True)
 
 
 def same_texts(mine: pathlib.Path, other: pathlib.Path) -> None:
