@@ -42,9 +42,16 @@ impl SessionQuota for ClientSessions {
         let Account {
             all, held, quotas, ..
         } = &*self.0;
+        let limit = quotas.sessions;
+        if targets > limit {
+            return Err(OpenError::TooManyTargets {
+                count: targets,
+                limit,
+            });
+        }
         let mut places = Charge::new(&all.sessions, &held.sessions);
         let full = places.grow(targets);
-        full.map_err(|full| self.refusal(full, "sessions", quotas.sessions))?;
+        full.map_err(|full| self.refusal(full, "sessions", limit))?;
         let mut memory = Charge::new(&all.session_bytes, &held.session_bytes);
         let full = memory.grow(bytes);
         full.map_err(|full| self.refusal(full, "bytes of sessions", quotas.session_bytes))?;

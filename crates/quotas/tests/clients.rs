@@ -86,6 +86,11 @@ fn sessions_are_counted_by_their_targets_until_they_end() {
         matches!(refused, OpenError::Quota(full) if full.limit == 4),
         "{refused}"
     );
+    let never = quota.reserve(5, 1000).map(drop).unwrap_err();
+    assert!(
+        matches!(never, OpenError::TooManyTargets { limit: 4, .. }),
+        "{never}"
+    );
     let one = quota.reserve(1, 1000).expect("one more fits");
     assert!(quota.check().is_err());
     drop((three, one));

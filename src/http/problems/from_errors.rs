@@ -275,6 +275,10 @@ impl From<OpenError> for Problem {
             OpenError::Snapshot(error) => error.into(),
             OpenError::Draining => Self::not_ready(),
             OpenError::Quota(error) => error.into(),
+            OpenError::TooManyTargets { count, limit } => Self::invalid_parameter(format!(
+                "Each target counts as a session, and one client may have {limit} here (`--client-sessions`): \
+                 of {count} targets follow at most {limit}."
+            )),
             OpenError::Exists => Self::session_exists(),
             OpenError::KeyReused => Self::idempotency_key_reused(),
         }

@@ -217,6 +217,11 @@ async fn a_session_counts_once_for_each_target() {
     expect_problem(create("20,15,16,12;40,30,18,14").await, "quota-exceeded").await;
     app.delete_session(&id).await;
     expect(create("20,15,16,12;40,30,18,14").await, StatusCode::CREATED).await;
+    // Another time it would not be taken either.
+    let five = [BOXES, "20,15,16,12;40,30,18,14"].join(";");
+    let problem = expect_problem(create(&five).await, "invalid-parameter").await;
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(detail.contains("at most 4"), "{detail}");
 
     // Memory for two targets with the usual parameters, not for three.
     let bytes = 2 * bagtrack_tracker::Preset::Robust.params().session_bytes() + 4096;

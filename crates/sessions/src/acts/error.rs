@@ -175,6 +175,14 @@ pub enum OpenError {
     /// The client has as many sessions as it may.
     #[error(transparent)]
     Quota(#[from] QuotaExhausted),
+    /// The client may never have a session with so many targets: each counts as a session.
+    #[error("{count} targets are more than the {limit} sessions that the client may have")]
+    TooManyTargets {
+        /// How many there are.
+        count: usize,
+        /// How many sessions the client may have.
+        limit: usize,
+    },
     /// A live session that another request opened has the id.
     #[error("another session has this id")]
     Exists,
