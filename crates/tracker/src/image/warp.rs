@@ -44,11 +44,12 @@ impl Rotation {
     }
 
     /// `frame` rotated within `window` (working pixels of the rotated image) and a pixel around it, by bilinear
-    /// interpolation; what is further out means nothing. Beyond the edge the edge's pixel counts. The memory of
-    /// `scratch` is used again, whatever it holds.
+    /// interpolation; further out are the pixels of `frame` itself. Beyond the edge the edge's pixel counts. The memory of
+    /// `scratch` is used again, and what it held is not seen.
     pub fn apply(&self, frame: &Frame, window: &Rect, scratch: Frame) -> Frame {
         frame.map_planes(scratch, |plane, mut pixels| {
-            pixels.resize(plane.pixels.len(), 0);
+            pixels.clear();
+            pixels.extend_from_slice(&plane.pixels);
             let side = f64::from(plane.pixel_side);
             let window = window.in_pixels_of(side);
             let columns = covered(window.x, window.width, plane.width);
@@ -178,14 +179,17 @@ mod tests {
     }
 
     #[test]
-    fn a_window_and_a_pixel_around_it_are_those_of_the_whole_image() {
+    fn a_window_and_a_pixel_around_it_are_rotated_and_the_rest_is_as_it_was() {
         let original = frame(|x, y| ((x * 7 + y * 3) % 251) as u8);
         let window = Rect::new(30.0, 20.0, 20.0, 15.0);
-        let part = Rotation::about(CENTER, 0.5).apply(&original, &window, Frame::default());
+        let used = frame(|_, _| 99);
+        let part = Rotation::about(CENTER, 0.5).apply(&original, &window, used);
         let whole = rotated(&original, 0.5);
         for (i, pixel) in part.pixels().iter().enumerate() {
             if (29..51).contains(&(i % 80)) && (19..36).contains(&(i / 80)) {
                 assert_eq!(*pixel, whole.pixels()[i], "{i}");
+            } else {
+                assert_eq!(*pixel, original.pixels()[i], "{i}");
             }
         }
         let beyond = Rect::new(200.0, -90.0, 20.0, 15.0);

@@ -97,6 +97,60 @@ fn a_printed_search_in_two_stages_does_not_depend_on_what_the_thread_saw_before(
     }
 }
 
+/// A small striped target, red and blue, that turns by a degree a frame and goes right, before grains of all colours.
+fn turning(t: usize) -> Frame {
+    let (x, y) = turning_target(t).center();
+    let (sin, cos) = (t as f64).to_radians().sin_cos();
+    let pixel = |i: usize| {
+        let (column, row) = (i % 320, i / 320);
+        let (dx, dy) = (column as f64 + 0.5 - x, row as f64 + 0.5 - y);
+        let (along, across) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        if along.abs() < 17.0 && across.abs() < 14.0 {
+            let is_light = (along / 6.0).floor().rem_euclid(2.0) == 0.0;
+            return if is_light {
+                [220, 60, 30]
+            } else {
+                [40, 20, 140]
+            };
+        }
+        let grain = |factor: usize| (column / 3 * factor + row / 3 * 31 + column * row / 40) % 160;
+        [grain(7), grain(13), grain(29)].map(|value| 40 + value as u8)
+    };
+    let rgb: Vec<u8> = (0..320 * 180).flat_map(pixel).collect();
+    Frame::from_rgb(320, 180, &rgb).expect("a frame of this size")
+}
+
+fn turning_target(t: usize) -> Rect {
+    Rect::new(60.0 + t as f64, 70.0, 34.0, 28.0)
+}
+
+/// A turned target is looked at in a view of a part of the frame: once what another session had left around that part
+/// changed bits.
+#[test]
+fn a_turned_target_does_not_depend_on_what_the_thread_saw_before() {
+    let run = || {
+        let params = Preset::Robust.params();
+        let tracker = Tracker::new(&turning(0), turning_target(0), params);
+        let mut tracker = tracker.expect("a box in the frame");
+        (1..60)
+            .map(|t| tracker.step(&turning(t)).expect("frames of one size"))
+            .collect()
+    };
+    let fresh = || std::thread::spawn(run).join().expect("it ends");
+    let (alone, again): (Vec<_>, Vec<_>) = (
+        fresh(),
+        std::thread::spawn(move || {
+            let _: Vec<_> = run();
+            run()
+        })
+        .join()
+        .expect("it ends"),
+    );
+    let overlap = alone[58].target.overlap(&turning_target(59));
+    assert!(overlap > 0.6, "{overlap}: it is not followed");
+    assert_eq!(alone, again);
+}
+
 #[test]
 fn a_frame_of_another_size_changes_nothing() {
     let mut tracker = start(4);
