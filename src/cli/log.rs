@@ -8,6 +8,7 @@ use std::io::{self, BufWriter, IsTerminal};
 use std::panic::PanicHookInfo;
 use std::time::Duration;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
+use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{EnvFilter, fmt, registry};
@@ -51,8 +52,7 @@ impl Log {
     /// # Errors
     /// The filter cannot be read, or the variables of the export.
     pub fn start(filter: &str, format: LogFormat) -> Result<Self, String> {
-        let filter = EnvFilter::try_new(filter)
-            .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))?;
+        let filter = read_filter(filter)?;
         let stderr = BufWriter::with_capacity(BUFFER_BYTES, io::stderr());
         let (lines, writer) = NonBlockingBuilder::default()
             .buffered_lines_limit(MAX_LINES)
@@ -113,6 +113,21 @@ impl DroppedLines {
             self.report();
         }
     }
+}
+
+/// The filter of this text. A word alone must be a level: a mistyped one would be a module that logs nothing, and all
+/// others would log nothing either.
+fn read_filter(text: &str) -> Result<EnvFilter, String> {
+    let words = text.split(',').map(str::trim);
+    let mut words = words.filter(|word| !word.is_empty() && !word.contains(['=', '[']));
+    if let Some(word) = words.find(|word| word.parse::<LevelFilter>().is_err()) {
+        return Err(format!(
+            "--log (BAGTRACK_LOG): `{word}` is no level; write error, warn, info, debug, trace or off, or \
+             MODULE=LEVEL, as in `info,bagtrack=debug`"
+        ));
+    }
+    EnvFilter::try_new(text)
+        .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))
 }
 
 fn log_panic(panic: &PanicHookInfo<'_>) {

@@ -8,7 +8,7 @@ use super::confined;
 use super::log::{Log, LogFormat};
 use super::memory_limit;
 use super::open_files;
-use super::signals::{self, Reloaded, Signals};
+use super::signals::{self, Hangups, Reloaded, Signals};
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use bagtrack_config::OFF;
 use bagtrack_ingest::video::Launcher;
@@ -53,6 +53,8 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let (base_path, ffmpeg) = (config.base_path.clone(), config.limits.ffmpeg.clone());
+    // The start may wait for a store, and whoever sends the signal does not know of that.
+    let hangups = Hangups::listen()?;
     let application = Application::bind(config).await?;
     let reloaded = Reloaded::of(&application);
     let mut signals = Signals::listen()?;
@@ -77,7 +79,7 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     tokio::task::spawn_blocking(move || check_ffmpeg(&ffmpeg));
     tell_addresses(scheme, address, &base_path);
     let reports = tokio::spawn(log.dropped().report_regularly());
-    let reloads = tokio::spawn(signals::reload(reloaded));
+    let reloads = tokio::spawn(signals::reload(hangups, reloaded));
     let ended = tokio::select! {
         ended = application.serve(first.shutdown()) => ended,
         () = again.second_shutdown() => {

@@ -95,18 +95,26 @@ impl Reloaded {
     }
 }
 
+/// The SIGHUPs that come. Without it they end the process.
+#[cfg(unix)]
+pub struct Hangups(tokio::signal::unix::Signal);
+
+#[cfg(unix)]
+impl Hangups {
+    /// Begins to listen.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn listen() -> io::Result<Self> {
+        use tokio::signal::unix::{SignalKind, signal};
+        signal(SignalKind::hangup()).map(Self)
+    }
+}
+
 /// Reads keys and certificate again on every SIGHUP.
 #[cfg(unix)]
-pub async fn reload(reloaded: Reloaded) {
-    use tokio::signal::unix::{SignalKind, signal};
-    let mut hangups = match signal(SignalKind::hangup()) {
-        Ok(hangups) => hangups,
-        Err(error) => {
-            tracing::error!(%error, "cannot listen to SIGHUP: keys and certificate are not read again");
-            return;
-        }
-    };
-    while hangups.recv().await.is_some() {
+pub async fn reload(mut hangups: Hangups, reloaded: Reloaded) {
+    while hangups.0.recv().await.is_some() {
         let reloaded = reloaded.clone();
         // The files may be on a slow file system.
         if let Err(error) = tokio::task::spawn_blocking(move || reloaded.reload()).await {
@@ -117,7 +125,17 @@ pub async fn reload(reloaded: Reloaded) {
 
 /// There is no such signal here.
 #[cfg(not(unix))]
-pub async fn reload(_reloaded: Reloaded) {}
+pub struct Hangups;
+
+#[cfg(not(unix))]
+impl Hangups {
+    pub fn listen() -> io::Result<Self> {
+        Ok(Self)
+    }
+}
+
+#[cfg(not(unix))]
+pub async fn reload(_hangups: Hangups, _reloaded: Reloaded) {}
 
 #[cfg(unix)]
 struct Source {

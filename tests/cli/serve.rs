@@ -1,7 +1,7 @@
 //! `bagtrack serve` beside the other commands: what it says at its start, and that it answers as `track` does.
 
 use crate::command::{clip, folder, succeeds, text};
-use crate::program::Program;
+use crate::program::{self, Program};
 use serde_json::Value;
 use std::fs;
 
@@ -112,5 +112,27 @@ fn a_session_of_several_targets_gets_the_answers_that_track_gives() {
             assert_eq!(line["status"], found["status"]);
         }
         assert_eq!(answer["targets"].as_array().map(Vec::len), Some(2));
+    }
+}
+
+/// What the program says where it does not start with these flags.
+fn refusal(flags: &[&str]) -> String {
+    let mut command = program::serve(&bagtrack_testing::command::program("bagtrack"));
+    match Program::spawn(command.args(flags)) {
+        Ok(_) => panic!("{flags:?} is taken"),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Each was once taken, and then nothing was logged, or those hosts were refused.
+#[test]
+fn settings_that_cannot_work_are_refused_with_what_would() {
+    for log in ["warning", "loud", "info,bagtrak"] {
+        let said = refusal(&["--log", log]);
+        assert!(said.contains("write error, warn, info"), "{said}");
+    }
+    for hosts in ["http://example.org", "*", "localhost, example.org"] {
+        let said = refusal(&["--allowed-hosts", hosts]);
+        assert!(said.contains("hosts like example.org"), "{said}");
     }
 }

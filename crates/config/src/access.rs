@@ -2,7 +2,7 @@
 
 #[cfg(feature = "jwt")]
 use super::jwt::JwtConfig;
-use super::settings::{Secret, settings};
+use super::settings::{Secret, hosts, settings};
 use std::path::PathBuf;
 
 settings! {
@@ -19,7 +19,7 @@ settings! {
         /// Hosts that requests may name, like `example.org` or `example.org:8443`, separated by commas [default: all; the
         /// names and addresses of this machine for a service on a loopback address without API keys and trusted proxies].
         /// `/healthz`, `/readyz` and `/metrics` answer under any.
-        allowed_hosts: Vec<String> = Vec::new();
+        allowed_hosts: Vec<String> = Vec::new(), |values| hosts(values);
         /// Secrets of at least 16 characters that snapshots and session tokens are signed with, separated by commas: the
         /// first signs, all are accepted. Without one, those of other processes are refused.
         snapshot_keys: Vec<Secret> = Vec::new(), as "SECRET";

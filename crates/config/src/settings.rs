@@ -236,6 +236,17 @@ pub(super) fn origins(values: &[String]) -> Result<(), &'static str> {
     in_range(hold, "origins like https://example.org, or *")
 }
 
+/// Hosts like `example.org` or `example.org:8443`.
+pub(super) fn hosts(values: &[String]) -> Result<(), &'static str> {
+    let is_part = |byte: u8| byte.is_ascii_graphic() && !b"/*@".contains(&byte);
+    let is_host = |text: &String| !text.is_empty() && text.bytes().all(is_part);
+    let hold = values.iter().all(is_host);
+    in_range(
+        hold,
+        "hosts like example.org or example.org:8443, with no space around",
+    )
+}
+
 /// Nothing where it is `inside`, else what it must be.
 pub(super) fn in_range(inside: bool, expected: &'static str) -> Result<(), &'static str> {
     match inside {

@@ -1,9 +1,13 @@
 //! The service as a process: signals, exit statuses, and its log.
 
 use crate::program::{self, Program};
+use bagtrack_testing::service::server::Process;
+use bagtrack_testing::within::within;
 use reqwest::{Client, StatusCode};
 use rustix::process::Signal;
-use std::process::Command;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+use tokio::net::TcpListener;
 
 /// A request whose body never comes, and which is inside when this returns.
 async fn stuck(service: &Program) -> crate::helpers::raw::RawConnection {
@@ -82,6 +86,29 @@ async fn a_hangup_reads_the_keys_again() {
     service.signal(Signal::HUP);
     service.logs("API keys read again");
     assert_eq!(status("fedcba9876543210").await, StatusCode::UNAUTHORIZED);
+}
+
+/// Keys and certificates may be exchanged while the start waits for a store. A hangup ended the process then.
+#[tokio::test]
+async fn a_hangup_during_the_start_does_not_end_the_service() {
+    let store = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("redis://{}", store.local_addr().unwrap());
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), "ann:0123456789abcdef").unwrap();
+    let mut command = program::serve_after(":");
+    command.args(["--store", &url, "--api-keys-file"]);
+    command.arg(file.path()).stderr(Stdio::piped());
+    let mut service = Process(command.spawn().unwrap());
+    let log = service.0.stderr.take().unwrap();
+    // The start waits for an answer, which does not come.
+    let (asked, _) = within(store.accept(), "the store is asked").await.unwrap();
+    service.signal(Signal::HUP);
+    drop((asked, store));
+    let read = tokio::task::spawn_blocking(move || {
+        let mut lines = BufReader::new(log).lines().map_while(Result::ok);
+        lines.any(|line| line.contains("API keys read again"))
+    });
+    assert!(within(read, "the keys are read").await.unwrap(), "it ended");
 }
 
 #[test]
