@@ -13,6 +13,9 @@ import { Problem } from "./problem.js";
  * @typedef {{resolve: (value: any) => void, reject: (problem: unknown) => void}} Waiting
  */
 
+/** Of all clients, and beyond the end of a thread: a session must not be taken for one of another thread. */
+let lastId = 0;
+
 /** A thread with trackers. Sessions of one client share it, and decode a frame once for all of them. */
 export class LocalClient {
   constructor() {
@@ -38,7 +41,8 @@ export class LocalClient {
    * @param {import("./tracker.js").TrackerOptions & {signal?: AbortSignal}} [options]
    */
   async open(image, box, { signal, ...options } = {}) {
-    const { id, answer } = await this.call("open", { image, box, options }, signal);
+    const id = ++lastId;
+    const answer = await this.call("open", { id, image, box, options }, signal);
     return new LocalSession(this, id, answer);
   }
 
@@ -46,7 +50,8 @@ export class LocalClient {
    * @param {Uint8Array<ArrayBuffer>} snapshot
    * @param {AbortSignal} [signal] */
   async restore(snapshot, signal) {
-    const { id, answer } = await this.call("restore", { snapshot }, signal);
+    const id = ++lastId;
+    const answer = await this.call("restore", { id, snapshot }, signal);
     return new LocalSession(this, id, answer);
   }
 

@@ -10,8 +10,8 @@ import { close } from "./transfer.js";
  * @typedef {import("./session.js").Box} Box
  *
  * @typedef {object} Calls
- * @property {{image: Image, box: Box, options?: import("./tracker.js").TrackerOptions}} open
- * @property {{snapshot: Uint8Array<ArrayBuffer>}} restore
+ * @property {{id: number, image: Image, box: Box, options?: import("./tracker.js").TrackerOptions}} open
+ * @property {{id: number, snapshot: Uint8Array<ArrayBuffer>}} restore
  * @property {{image: Image, ids: number[], see?: boolean}} step
  * @property {{image: Image, id: number, box: Box}} correct
  * @property {{id: number}} save
@@ -22,13 +22,14 @@ import { close } from "./transfer.js";
 
 /** @type {Map<number, Tracker>} */
 const trackers = new Map();
-let lastId = 0;
 
-/** @param {Tracker} tracker */
-function added(tracker) {
-  lastId += 1;
-  trackers.set(lastId, tracker);
-  return { id: lastId, answer: tracker.answer };
+/**
+ * @param {number} id
+ * @param {Tracker} tracker
+ */
+function added(id, tracker) {
+  trackers.set(id, tracker);
+  return tracker.answer;
 }
 
 /** @param {number} id */
@@ -40,8 +41,8 @@ function find(id) {
 
 /** @type {{[Name in keyof Calls]: (call: Calls[Name]) => unknown}} */
 const calls = {
-  open: async ({ image, box, options }) => added(await Tracker.create(image, box, options)),
-  restore: async ({ snapshot }) => added(await Tracker.load(snapshot)),
+  open: async ({ id, image, box, options }) => added(id, await Tracker.create(image, box, options)),
+  restore: async ({ id, snapshot }) => added(id, await Tracker.load(snapshot)),
   async step({ image, ids, see }) {
     const all = ids.map(find);
     const frame = await frameFor(image);

@@ -8,15 +8,6 @@ export type Waiting = {
     resolve: (value: any) => void;
     reject: (problem: unknown) => void;
 };
-/**
- * @typedef {import("./image.js").Image} Image
- * @typedef {import("./session.js").Answer} Answer
- * @typedef {import("./session.js").Box} Box
- * @typedef {import("./session.js").View} View
- * @typedef {import("./stream.js").StreamAnswer} StreamAnswer
- *
- * @typedef {{resolve: (value: any) => void, reject: (problem: unknown) => void}} Waiting
- */
 /** A thread with trackers. Sessions of one client share it, and decode a frame once for all of them. */
 export declare class LocalClient {
     /** @type {Promise<any> | undefined} */

@@ -2,11 +2,13 @@ export type Image = import("./image.js").Image;
 export type Box = import("./session.js").Box;
 export type Calls = {
     open: {
+        id: number;
         image: Image;
         box: Box;
         options?: import("./tracker.js").TrackerOptions;
     };
     restore: {
+        id: number;
         snapshot: Uint8Array<ArrayBuffer>;
     };
     step: {

@@ -1,0 +1,31 @@
+// Sessions and their worker: what has ended or fails takes nothing else along.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { LocalClient, Problem } from "../bagtrack.js";
+
+const [width, height] = [160, 120];
+const luma = Uint8Array.from({ length: width * height }, (_, at) => (at * 37 + (at >> 5) * 11) % 256);
+const image = { width, height, luma };
+const box = { x: 40, y: 30, width: 30, height: 30 };
+const options = { seed: 7 };
+
+const slug = (/** @type {string} */ wanted) => (/** @type {unknown} */ error) =>
+  error instanceof Problem && error.slug === wanted;
+
+test("a session of another client, or of before `close`, moves none of those that are open", async () => {
+  const [client, stranger] = [new LocalClient(), new LocalClient()];
+  const old = await client.open(image, box, options);
+  const foreign = await stranger.open(image, box, options);
+  await client.close();
+  const session = await client.open(image, { ...box, x: 80 }, options);
+  await assert.rejects(old.track(image), slug("session-not-found"));
+  await assert.rejects(old.correct(image, box), slug("session-not-found"));
+  await assert.rejects(client.track([foreign], image), slug("session-not-found"));
+  await old.end();
+  const { answer } = await session.read();
+  assert.deepEqual([answer.frame, old.frame, foreign.frame], [0, 0, 0]);
+  const restored = await client.restore(await session.snapshot());
+  assert.deepEqual([(await session.track(image)).frame, (await restored.track(image)).frame], [1, 1]);
+  await Promise.all([client.close(), stranger.close()]);
+});
