@@ -92,6 +92,7 @@ export class LocalClient {
   call(name, call, signal) {
     if (signal?.aborted) return Promise.reject(signal.reason);
     const { image } = call;
+    /** @type {ReturnType<typeof sendable> | undefined} */
     const taken = image && sendable(image);
     taken?.catch(() => undefined);
     const sending = this.before.then(async () => {
@@ -100,13 +101,16 @@ export class LocalClient {
       const { sent, handed } = (await taken) ?? { sent: undefined, handed: [] };
       this.calls += 1;
       const number = this.calls;
+      // Fails with what cannot be copied; then nothing waits.
+      worker.postMessage({ number, name, call: image ? { ...call, image: sent } : call }, handed);
       const answer = new Promise((resolve, reject) => this.waiting.set(number, { resolve, reject }));
       answer.catch(() => undefined);
       worker.ref?.();
-      worker.postMessage({ number, name, call: image ? { ...call, image: sent } : call }, handed);
       return { answer };
     });
-    this.before = sending.catch(async () => taken && close((await taken).sent));
+    // A call that could not be sent gives up what was made for it, and holds up none behind it.
+    const givenUp = sending.catch(() => taken?.then(({ sent, handed }) => handed.length > 0 && close(sent)));
+    this.before = givenUp.catch(() => undefined);
     return sending.then(({ answer }) => answer);
   }
 

@@ -29,3 +29,23 @@ test("a session of another client, or of before `close`, moves none of those tha
   assert.deepEqual([(await session.track(image)).frame, (await restored.track(image)).frame], [1, 1]);
   await Promise.all([client.close(), stranger.close()]);
 });
+
+test("a call that cannot be sent fails alone", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  // Of a canvas a bitmap is made, which fails here as for one without pixels.
+  class HTMLCanvasElement {}
+  const wrong = /** @type {any[]} */ ([new HTMLCanvasElement(), { ...image, draw: () => undefined }]);
+  const order = [image, wrong[0], image, wrong[1], wrong[0], image];
+  const settled = await Promise.allSettled(order.map((each) => session.track(each)));
+  assert.deepEqual(settled.map((each) => (each.status === "fulfilled" ? each.value.frame : each.reason.name)), [
+    1,
+    "ReferenceError",
+    2,
+    "DataCloneError",
+    "ReferenceError",
+    3,
+  ]);
+  assert.equal(client.waiting.size, 0, "or the process does not end");
+  await client.close();
+});
