@@ -1,5 +1,7 @@
 // What a frame is given as, and its pixels.
 
+import { checkImage } from "./given.js";
+
 /**
  * @typedef {object} Pixels RGBA row by row, as in `ImageData`; what is transparent counts as blended over black.
  * @property {number} width
@@ -27,6 +29,7 @@ let canvas;
  * @param {Image} image
  * @returns {Promise<Pixels | Planes>} */
 export async function pixelsOf(image) {
+  checkImage(image);
   if ("luma" in image || "data" in image) return image;
   if (typeof OffscreenCanvas === "undefined")
     throw new Error("Files and pictures are decoded by browsers: here give pixels { width, height, data }, or planes.");

@@ -91,9 +91,7 @@ export class LocalClient {
    */
   call(name, call, signal) {
     if (signal?.aborted) return Promise.reject(signal.reason);
-    const { image } = call;
-    /** @type {ReturnType<typeof sendable> | undefined} */
-    const taken = image && sendable(image);
+    const taken = "image" in call ? sendable(call.image) : undefined;
     taken?.catch(() => undefined);
     const sending = this.before.then(async () => {
       this.worker ??= this.start();
@@ -102,7 +100,7 @@ export class LocalClient {
       this.calls += 1;
       const number = this.calls;
       // Fails with what cannot be copied; then nothing waits.
-      worker.postMessage({ number, name, call: image ? { ...call, image: sent } : call }, handed);
+      worker.postMessage({ number, name, call: taken ? { ...call, image: sent } : call }, handed);
       const answer = new Promise((resolve, reject) => this.waiting.set(number, { resolve, reject }));
       answer.catch(() => undefined);
       worker.ref?.();

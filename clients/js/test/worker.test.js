@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { LocalClient, Problem } from "../bagtrack.js";
+import { Tracker } from "../tracker.js";
 
 const [width, height] = [160, 120];
 const luma = Uint8Array.from({ length: width * height }, (_, at) => (at * 37 + (at >> 5) * 11) % 256);
@@ -28,6 +29,21 @@ test("a session of another client, or of before `close`, moves none of those tha
   const restored = await client.restore(await session.snapshot());
   assert.deepEqual([(await session.track(image)).frame, (await restored.track(image)).frame], [1, 1]);
   await Promise.all([client.close(), stranger.close()]);
+});
+
+test("what is no image is refused before it is sent, and ends no session", async () => {
+  const client = new LocalClient();
+  const [session, other] = await Promise.all([client.open(image, box, options), client.open(image, box, options)]);
+  const wrong = /** @type {any[]} */ (["clip/0001.jpg", 5, true, null, undefined, () => image]);
+  for (const frame of wrong) {
+    await assert.rejects(session.track(frame), slug("unsupported-image"), String(frame));
+    await assert.rejects(session.correct(frame, box), slug("unsupported-image"), String(frame));
+    await assert.rejects(client.open(frame, box), slug("unsupported-image"), String(frame));
+    await assert.rejects(Tracker.create(frame, box), slug("unsupported-image"), String(frame));
+  }
+  assert.equal((await session.track(/** @type {any} */ ({ ...image, close: 5 }))).frame, 1);
+  assert.deepEqual([(await session.track(image)).frame, (await other.track(image)).frame], [2, 1]);
+  await client.close();
 });
 
 test("a call that cannot be sent fails alone", async () => {

@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 71] = [
+const FILES: [File; 72] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -107,6 +107,7 @@ const FILES: [File; 71] = [
     client_file!("js/bag.js"),
     client_file!("js/bagtrack.js"),
     client_file!("js/client.js"),
+    client_file!("js/given.js"),
     client_file!("js/image.js"),
     client_file!("js/kept.js"),
     client_file!("js/local.js"),
