@@ -1,7 +1,8 @@
 // A service: it opens sessions.
 
+import { boxText } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
-import { Session, boxText } from "./session.js";
+import { Session } from "./session.js";
 import { Transport } from "./transport.js";
 
 /**

@@ -1,6 +1,7 @@
 // A session: frames go in, boxes come back.
 
 import { Backoff } from "./backoff.js";
+import { boxOf, boxText } from "./given.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
@@ -38,13 +39,6 @@ import { pause } from "./transport.js";
 
 /** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
 const MOVE_EVERY = 1000;
-
-/** @param {Box} box */
-export function boxText({ x, y, width, height }) {
-  const sides = [x, y, width, height];
-  if (!sides.every(Number.isFinite)) throw new TypeError("A box is { x, y, width, height }, four finite numbers.");
-  return sides.map((value) => Number(value.toFixed(4))).join(",");
-}
 
 export class Session {
   /**
@@ -114,9 +108,10 @@ export class Session {
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer>}
    */
-  correct(frame, box, signal) {
-    const make = (/** @type {number} */ number) => this.put(number, frame, box, signal);
-    return this.next({ frames: [frame], box, make, signal });
+  async correct(frame, box, signal) {
+    const own = boxOf(box);
+    const make = (/** @type {number} */ number) => this.put(number, frame, own, signal);
+    return this.next({ frames: [frame], box: own, make, signal });
   }
 
   /** The session's state; the service does not count this as a frame.

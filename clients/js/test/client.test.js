@@ -89,6 +89,25 @@ test("a snapshot goes on under another id, a correction moves the box", async ()
   assert.equal(String.fromCharCode(...picture.slice(1, 4)), "PNG");
 });
 
+test("a correction with a wrong box is refused, and nothing of it is kept", async () => {
+  const session = await new Client(service.url).open(clip.frames[0], clip.box, options);
+  const wrong = /** @type {any[]} */ ([undefined, null, 5, [1, 2, 30, 40], { ...clip.box, x: undefined }]);
+  wrong.push({ ...clip.box, width: "30" }, { ...clip.box, height: Infinity });
+  for (const box of wrong) {
+    await assert.rejects(session.correct(clip.frames[1], box), problem("invalid-box"), JSON.stringify(box));
+    await assert.rejects(session.client.open(clip.frames[0], box), problem("invalid-box"), JSON.stringify(box));
+  }
+  // A box that is changed while its call waits.
+  const box = { ...clip.box };
+  const first = session.track(clip.frames[1]);
+  const corrected = session.correct(clip.frames[2], box);
+  box.x = NaN;
+  sameAsTheLibrary([await first]);
+  assert.deepEqual((await corrected).box, clip.box);
+  assert.deepEqual([(await session.track(clip.frames[3])).frame, (await session.read()).frames], [3, 4]);
+  await session.end();
+});
+
 test("a line that breaks between and within requests loses nothing", async () => {
   const line = await openLine(service.port);
   const session = await new Client(line.url).open(clip.frames[0], clip.box, options);

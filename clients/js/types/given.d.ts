@@ -1,3 +1,9 @@
 /** Refuses what is no image for a tracker here.
  * @param {unknown} image */
 export declare function checkImage(image: unknown): void;
+/** The box itself, which its owner may change afterwards; or a refusal.
+ * @param {import("./session.js").Box} box
+ * @returns {import("./session.js").Box} */
+export declare function boxOf(box: import("./session.js").Box): import("./session.js").Box;
+/** @param {import("./session.js").Box} box */
+export declare function boxText(box: import("./session.js").Box): string;

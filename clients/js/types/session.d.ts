@@ -40,8 +40,6 @@ export type Sent = {
     make: (number: number) => Promise<Response>;
     signal?: AbortSignal;
 };
-/** @param {Box} box */
-export declare function boxText({ x, y, width, height }: Box): string;
 export declare class Session {
     client: import("./client.js").Client;
     id: string;
