@@ -12,6 +12,21 @@ export function checkImage(image) {
   throw unsupported("An image is { width, height, data }, planes, a picture, a video or a Blob.");
 }
 
+/** Refuses what a WebSocket would send as a text, or not at all.
+ * @param {unknown} frame */
+export function checkFrame(frame) {
+  // By their names: those of another realm, such as a frame's or a test runner's, are of other classes.
+  const isFile = /^\[object (Blob|File|ArrayBuffer)\]$/.test(Object.prototype.toString.call(frame));
+  if (isFile || ArrayBuffer.isView(frame)) return;
+  throw unsupported("A frame is a Blob, an ArrayBuffer or a Uint8Array with a JPEG, PNG or WebP file.");
+}
+
+/** @param {number} window Frames on their way at a time. */
+export function checkWindow(window) {
+  if (Number.isInteger(window) && window >= 1 && window <= 32) return window;
+  throw new RangeError("The window of a stream is a whole number from 1 to 32.");
+}
+
 /** The box itself, which its owner may change afterwards; or a refusal.
  * @param {import("./session.js").Box} box
  * @returns {import("./session.js").Box} */

@@ -1,7 +1,7 @@
 // A session: frames go in, boxes come back.
 
 import { Backoff } from "./backoff.js";
-import { boxOf, boxText } from "./given.js";
+import { boxOf, boxText, checkFrame } from "./given.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
@@ -212,8 +212,9 @@ export class Session {
    * Makes a request with the next frames after those before.
    * @param {Sent} sent
    */
-  next(sent) {
-    if (this.open) return Promise.reject(new Error("The session has a stream: send the frames there, or close it."));
+  async next(sent) {
+    if (this.open) throw new Error("The session has a stream: send the frames there, or close it.");
+    sent.frames.forEach(checkFrame);
     const made = this.before.then(() => this.send(sent));
     this.before = made.catch(() => undefined);
     return made;

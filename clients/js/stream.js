@@ -1,6 +1,7 @@
 // A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice. A session
 // that the service has lost is opened again.
 
+import { boxOf, checkFrame, checkWindow } from "./given.js";
 import { Problem } from "./problem.js";
 import { pause } from "./transport.js";
 
@@ -39,7 +40,7 @@ export class FrameStream {
   constructor(session, options = {}) {
     this.session = session;
     this.live = options.live ?? false;
-    this.window = options.window ?? 8;
+    this.window = checkWindow(options.window ?? 8);
     this.patience = options.patience ?? session.client.transport.patience;
     this.onLine = options.onLine ?? (() => undefined);
     /** @type {Waiting[]} Oldest first. */
@@ -82,9 +83,11 @@ export class FrameStream {
   track(frame, { box, see } = {}) {
     if (this.isEnded) return Promise.reject(new Error("The stream has ended."));
     return new Promise((resolve, reject) => {
+      checkFrame(frame);
+      const header = { box: box == null ? undefined : boxOf(box), see };
       // Of live frames that cannot be sent yet, the newest is kept.
       if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
-      this.waiting.push({ frame, header: { box, see }, resolve, reject });
+      this.waiting.push({ frame, header, resolve, reject });
       if (this.lost) this.reopen(this.lost);
       else this.transmit();
     });

@@ -68,6 +68,29 @@ test("a refused frame takes none of those behind it along", async () => {
   stream.close();
 });
 
+test("what is no frame or no box is refused, and holds up none behind it", async () => {
+  const session = await open();
+  assert.throws(() => session.stream({ window: 0 }), RangeError);
+  for (const window of [33, 1.5, -1, NaN, /** @type {any} */ ("8")])
+    assert.throws(() => session.stream({ window }), /from 1 to 32/);
+  const stream = session.stream({ window: 1 });
+  const refused = (/** @type {any} */ error) => error instanceof Problem && error.slug;
+  const wrong = /** @type {any[]} */ (["abc", '{"see":true}', 5, { a: 1 }, [1, 2], null, undefined]);
+  const first = stream.track(clip.frames[1]);
+  for (const frame of wrong) {
+    await assert.rejects(stream.track(frame), (error) => refused(error) === "unsupported-image", String(frame));
+  }
+  for (const box of /** @type {any[]} */ ([5, [1, 2, 30, 40], { ...clip.box, x: NaN }])) {
+    await assert.rejects(stream.track(clip.frames[2], { box }), (error) => refused(error) === "invalid-box");
+  }
+  const { buffer } = clip.frames[2].slice();
+  const given = [buffer, new Blob([clip.frames[3]]), Buffer.from(clip.frames[4])].map((frame) => stream.track(frame));
+  sameAsTheLibrary(await Promise.all([first, ...given]));
+  stream.close();
+  // Nor is it kept where a post has no answer, for a stream to send it.
+  for (const frame of wrong) await assert.rejects(session.track(frame), (error) => refused(error) === "unsupported-image");
+});
+
 test("a correction and what the tracker saw", async () => {
   const session = await open();
   const stream = session.stream();
