@@ -1,7 +1,8 @@
 // Sessions in this page or process: no service, nothing is uploaded. The same calls as those of `Client` and `Session`.
 
-import { close, sendable } from "./transfer.js";
+import { ofNode } from "./platform.js";
 import { Problem } from "./problem.js";
+import { close, sendable } from "./transfer.js";
 
 /**
  * @typedef {import("./image.js").Image} Image
@@ -113,8 +114,9 @@ export class LocalClient {
   }
 
   async start() {
-    const url = new URL("./worker.js", import.meta.url);
-    const worker = typeof Worker === "undefined" ? await startThread(url) : new Worker(url, { type: "module" });
+    // Bundlers know a worker by these very words.
+    const isBrowser = typeof Worker !== "undefined";
+    const worker = isBrowser ? new Worker(new URL("./worker.js", import.meta.url), { type: "module" }) : await startThread();
     await new Promise((resolve, reject) => {
       worker.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
         if (data.isReady) resolve(undefined);
@@ -147,11 +149,12 @@ export class LocalClient {
   }
 }
 
-/** A worker of Node.js that listens as one of a browser does.
- * @param {URL} url */
-async function startThread(url) {
-  const threads = "node:worker_threads";
-  const worker = new (await import(threads)).Worker(url);
+/** A worker of Node.js that listens as one of a browser does. */
+async function startThread() {
+  const { Worker } = await ofNode("worker_threads");
+  // In other words than above, or a bundler adds the file once more, as it is.
+  const here = import.meta.url;
+  const worker = new Worker(new URL("worker.js", here));
   worker.addEventListener = (/** @type {string} */ kind, /** @type {(event: any) => void} */ listen) =>
     worker.on(kind, (/** @type {any} */ told) => listen(kind === "message" ? { data: told } : told));
   return worker;

@@ -1,5 +1,6 @@
 // The WebAssembly module: loaded once in each thread.
 
+import { ofNode } from "./platform.js";
 import init from "./wasm/bagtrack_wasm.js";
 
 /** @type {Promise<unknown> | undefined} */
@@ -17,6 +18,5 @@ async function read() {
   const url = new URL("./wasm/bagtrack_wasm_bg.wasm", import.meta.url);
   if (url.protocol !== "file:") return url;
   // Node.js does not fetch files.
-  const files = "node:fs/promises";
-  return (await import(files)).readFile(url);
+  return (await ofNode("fs/promises")).readFile(url);
 }

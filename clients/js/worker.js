@@ -1,6 +1,7 @@
 // The worker: trackers by their numbers, and calls for them, one after the other.
 
 import { pictureOf } from "./bag.js";
+import { ofNode } from "./platform.js";
 import { Problem } from "./problem.js";
 import { Tracker, frameFor } from "./tracker.js";
 import { close } from "./transfer.js";
@@ -81,17 +82,19 @@ async function answered({ number, name, call }) {
   }
 }
 
-/** @type {any} A worker of a browser has it, one of Node.js does not. */
-let port = globalThis;
-if (!("postMessage" in globalThis)) {
-  const threads = "node:worker_threads";
-  ({ parentPort: port } = await import(threads));
-}
 /** @type {Promise<void>} */
 let before = Promise.resolve();
-port.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
-  before = before.then(async () => port.postMessage(await answered(data)));
-});
-port.start?.();
-// Messages that come before a worker listens are lost in some browsers.
-port.postMessage({ isReady: true });
+
+/** @param {any} port */
+function serve(port) {
+  port.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
+    before = before.then(async () => port.postMessage(await answered(data)));
+  });
+  port.start?.();
+  // Messages that come before a worker listens are lost in some browsers.
+  port.postMessage({ isReady: true });
+}
+
+// A worker of a browser has it, one of Node.js does not. Bundlers make workers in which no module can wait.
+if ("postMessage" in globalThis) serve(globalThis);
+else ofNode("worker_threads").then(({ parentPort }) => serve(parentPort));

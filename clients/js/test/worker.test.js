@@ -1,6 +1,7 @@
 // Sessions and their worker: what has ended or fails takes nothing else along.
 
 import assert from "node:assert/strict";
+import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 import { LocalClient, Problem } from "../bagtrack.js";
 import { Tracker } from "../tracker.js";
@@ -64,4 +65,16 @@ test("a call that cannot be sent fails alone", async () => {
   ]);
   assert.equal(client.waiting.size, 0, "or the process does not end");
   await client.close();
+});
+
+test("bundlers find the worker, and can put its modules into one script", () => {
+  const folder = new URL("../", import.meta.url);
+  const text = (/** @type {string} */ name) => readFileSync(new URL(name, folder), "utf8");
+  assert.ok(text("local.js").includes('new Worker(new URL("./worker.js", import.meta.url), { type: "module" })'));
+  for (const name of readdirSync(folder).filter((file) => file.endsWith(".js"))) {
+    // As in a script: no import waits, nor does the module itself.
+    const script = text(name).replace(/^import .*$/gm, "").replace(/^export (?!\{)/gm, "").replace(/^export .*$/gm, "");
+    assert.doesNotThrow(() => new Function(script.replaceAll("import.meta.url", '""')), name);
+    assert.doesNotMatch(script, /["']node:/, `${name}: a bundler would look for it`);
+  }
 });

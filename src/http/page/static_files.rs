@@ -49,7 +49,7 @@ macro_rules! client_file {
 
 const INDEX: File = file!("index.html", HTML);
 
-const FILES: [File; 72] = [
+const FILES: [File; 73] = [
     file!("page.css", CSS),
     file!("main.js", SCRIPT),
     file!("again.js", SCRIPT),
@@ -112,6 +112,7 @@ const FILES: [File; 72] = [
     client_file!("js/kept.js"),
     client_file!("js/local.js"),
     client_file!("js/module.js"),
+    client_file!("js/platform.js"),
     client_file!("js/problem.js"),
     client_file!("js/session.js"),
     client_file!("js/snapshot.js"),

@@ -48,7 +48,7 @@ async fn every_file_that_the_page_names_is_served_and_all_are_small() {
             }
         }
     }
-    assert_eq!(seen.len(), 71, "{seen:?}");
+    assert_eq!(seen.len(), 72, "{seen:?}");
     assert!(at_once < 200_000, "{at_once}");
     assert!(later < 140_000, "{later}");
     expect_problem(app.get("/page/none.js").await, "route-not-found").await;

@@ -1,0 +1,8 @@
+// What only Node.js has.
+
+/** A module of Node.js, for which no bundler shall look.
+ * @param {string} name
+ * @returns {Promise<any>} */
+export function ofNode(name) {
+  return import(/* @vite-ignore */ /* webpackIgnore: true */ `node:${name}`);
+}
