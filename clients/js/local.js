@@ -258,6 +258,7 @@ export class LocalStream {
   constructor(session, { live = false } = {}) {
     this.session = session;
     this.live = live;
+    this.isEnded = false;
     this.underWay = 0;
     /** @type {(problem: unknown) => void} */
     this.resolveEnded = () => undefined;
@@ -271,6 +272,7 @@ export class LocalStream {
    * @returns {Promise<StreamAnswer | undefined>} Nothing where the frame was skipped, in a live stream.
    */
   async track(image, { box, see } = {}) {
+    if (this.isEnded) throw new Error("The stream has ended.");
     if (this.live && !box && this.underWay > 1) return undefined;
     this.underWay += 1;
     try {
@@ -282,6 +284,7 @@ export class LocalStream {
   }
 
   close() {
+    this.isEnded = true;
     this.resolveEnded(undefined);
   }
 }

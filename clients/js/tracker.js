@@ -1,5 +1,6 @@
 // The tracker in this thread: `Tracker.create(image, box)`, `tracker.step(image)`.
 
+import { boxOf } from "./given.js";
 import { pixelsOf } from "./image.js";
 import { load } from "./module.js";
 import { Problem } from "./problem.js";
@@ -45,7 +46,8 @@ function refusing(run) {
   try {
     return run();
   } catch (error) {
-    if (!(error instanceof Error) || error instanceof WebAssembly.RuntimeError) throw error;
+    const isTold = error instanceof Problem || !(error instanceof Error);
+    if (isTold || error instanceof WebAssembly.RuntimeError) throw error;
     const { message } = error;
     const kind = KINDS.find(([words]) => message.startsWith(words))?.[1] ?? "frame-damaged";
     const detail = `${message.charAt(0).toUpperCase()}${message.slice(1)}.`;
@@ -65,13 +67,19 @@ function parametersOf({ preset = "robust", seed, parameters = {} }) {
 
 /** @param {import("./image.js").Pixels | import("./image.js").Planes} image */
 function frameOf(image) {
-  if ("luma" in image) return Frame.fromPlanes(image.width, image.height, image.luma, image.cb, image.cr);
-  const { width, height, data } = image;
+  const { width, height } = image;
+  // The module would make whole numbers of 32 bits of anything.
+  if (![width, height].every((side) => side > 0 && side >>> 0 === side)) {
+    const detail = "The width and height of an image are whole numbers from 1 on.";
+    throw new Problem({ type: "frame-damaged", status: 422, detail });
+  }
+  if ("luma" in image) return Frame.fromPlanes(width, height, image.luma, image.cb, image.cr);
+  const { data } = image;
   return Frame.fromRgba(width, height, new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
 }
 
 /** @param {Box} box */
-const numbers = ({ x, y, width, height }) => new Float64Array([x, y, width, height]);
+const numbers = (box) => new Float64Array(Object.values(boxOf(box)));
 
 /** Rounded as the service does: to a hundredth of a pixel, and a thousandth of the score.
  * @param {import("./wasm/bagtrack_wasm.js").Estimate} estimate
@@ -113,7 +121,8 @@ function vectorsOf(values, columns, rows) {
 export class Tracker {
   /** @param {Wasm} wasm */
   constructor(wasm) {
-    this.wasm = wasm;
+    /** @type {Wasm | undefined} */
+    this.own = wasm;
     /** The last answer. */
     this.answer = answerOf(wasm.estimate);
   }
@@ -126,6 +135,11 @@ export class Tracker {
    */
   static create(image, box, options = {}) {
     return withFrame(image, (frame) => new Tracker(new Wasm(frame, numbers(box), parametersOf(options))));
+  }
+
+  get wasm() {
+    if (this.own) return this.own;
+    throw new Problem({ type: "session-not-found", status: 404, detail: "The tracker is freed." });
   }
 
   /** A tracker that goes on from a snapshot: of `save`, or of the service.
@@ -209,6 +223,7 @@ export class Tracker {
 
   /** Gives up its memory. */
   free() {
-    this.wasm.free();
+    this.own?.free();
+    this.own = undefined;
   }
 }

@@ -78,3 +78,37 @@ test("bundlers find the worker, and can put its modules into one script", () => 
     assert.doesNotMatch(script, /["']node:/, `${name}: a bundler would look for it`);
   }
 });
+
+test("a box that is none, a side that is none, and a tracker that was freed are told as that", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  for (const none of /** @type {any[]} */ ([undefined, null, 5, [1, 2, 30, 40], { x: 1, y: 1 }, { ...box, x: "1" }])) {
+    await assert.rejects(client.open(image, none), slug("invalid-box"), JSON.stringify(none));
+    await assert.rejects(session.correct(image, none), slug("invalid-box"), JSON.stringify(none));
+  }
+  for (const side of /** @type {any[]} */ ([-1, 0, 160.5, NaN, undefined, "160", 2 ** 32 + 160])) {
+    const sized = { ...image, width: side };
+    await assert.rejects(session.track(sized), (error) => slug("frame-damaged")(error) && /whole numbers/.test(`${error}`));
+  }
+  assert.equal((await session.track(image)).frame, 1);
+  await client.close();
+  const tracker = await Tracker.create(image, box, options);
+  tracker.free();
+  tracker.free();
+  await assert.rejects(tracker.step(image), slug("session-not-found"));
+  assert.throws(() => tracker.save(), slug("session-not-found"));
+  assert.throws(() => tracker.size, slug("session-not-found"));
+  assert.deepEqual(tracker.box, box);
+});
+
+test("a stream here takes no frame after `close`", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  const stream = session.stream();
+  const first = stream.track(image);
+  stream.close();
+  await assert.rejects(stream.track(image), /has ended/);
+  await assert.rejects(stream.track(image, { box }), /has ended/);
+  assert.deepEqual([(await first)?.frame, await stream.ended, (await session.track(image)).frame], [1, undefined, 2]);
+  await client.close();
+});

@@ -125,6 +125,7 @@ export declare class LocalSession {
 export declare class LocalStream {
     session: LocalSession;
     live: boolean;
+    isEnded: boolean;
     underWay: number;
     /** @type {(problem: unknown) => void} */
     resolveEnded: (problem: unknown) => void;

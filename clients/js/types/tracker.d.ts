@@ -19,7 +19,8 @@ export type TrackerOptions = {
 export declare function frameFor(image: Image): Promise<Frame>;
 /** Follows one object. A call that fails leaves it as it was. */
 export declare class Tracker {
-    wasm: Wasm;
+    /** @type {Wasm | undefined} */
+    own: Wasm | undefined;
     /** The last answer. */
     answer: import("./session.js").Answer;
     /** @param {Wasm} wasm */
@@ -31,6 +32,7 @@ export declare class Tracker {
      * @param {TrackerOptions} [options]
      */
     static create(image: Image | Frame, box: Box, options?: TrackerOptions): Promise<Tracker>;
+    get wasm(): Wasm;
     /** A tracker that goes on from a snapshot: of `save`, or of the service.
      * @param {Uint8Array<ArrayBuffer>} snapshot */
     static load(snapshot: Uint8Array<ArrayBuffer>): Promise<Tracker>;
