@@ -241,6 +241,27 @@ fn track_draws_the_box_and_nothing_else() {
 }
 
 #[test]
+fn track_warns_of_a_box_that_may_be_two_corners_and_goes_on() {
+    let parent = folder();
+    let dir = clip(
+        parent.path(),
+        "clip",
+        &["--width", "320", "--height", "240"],
+    );
+    let said = |given: &str| {
+        let output = bagtrack(&["track", text(&dir), "--box", given]);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let warning = said("180,120,260,200");
+    assert!(
+        warning.contains("outside the frame") && warning.contains("180,120,80,80"),
+        "{warning}"
+    );
+    assert_eq!(said("180,120,80,80"), "");
+}
+
+#[test]
 fn track_says_in_one_line_what_is_wrong() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);

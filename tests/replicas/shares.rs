@@ -34,6 +34,13 @@ async fn sessions_that_left_memory_count_in_the_store_for_all_replicas() {
         (paths.len(), refused.status()),
         (6, StatusCode::TOO_MANY_REQUESTS)
     );
+    // Which of the two is used up, it does not say: the store tells neither.
+    let problem: serde_json::Value = refused.json().await.unwrap();
+    let detail = problem["detail"].as_str().unwrap();
+    assert!(
+        detail.contains("6 sessions in the store here, and "),
+        "{detail}"
+    );
     let other = open(&client, &replicas[0], "203.0.113.1").await;
     assert_eq!(other.status(), StatusCode::CREATED);
     // What has ended gives its place back.

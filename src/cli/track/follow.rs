@@ -6,7 +6,7 @@ use super::interrupt::Interrupt;
 use super::rows::Rows;
 use super::targets::Targets;
 use bagtrack_formats::{Clip, Row};
-use bagtrack_sessions::Selection;
+use bagtrack_sessions::{Selection, box_warnings};
 use bagtrack_tracker::{Expert, Params, Rect};
 use indicatif::ProgressBar;
 use std::error::Error;
@@ -121,6 +121,10 @@ impl Job {
                     self.expert.as_ref(),
                 );
                 let started = started.map_err(named)?;
+                let warnings = box_warnings(&self.boxes, started.frame_size());
+                for warning in warnings.into_iter().flatten() {
+                    self.bar.suspend(|| eprintln!("bagtrack: {warning}"));
+                }
                 if let Some(destination) = &self.destination {
                     *drawn = Some(destination.open(self.frames.rate(), frame)?);
                 }

@@ -275,6 +275,15 @@ impl From<OpenError> for Problem {
             OpenError::Snapshot(error) => error.into(),
             OpenError::Draining => Self::not_ready(),
             OpenError::Quota(error) => error.into(),
+            OpenError::StoreShare(share) => Self::new(
+                Kind::QuotaExceeded,
+                format!(
+                    "One client may have {} sessions in the store here, and {} bytes of them (a quarter of \
+                     `--max-session-bytes`). Delete sessions that are done, or try again after the time in \
+                     `Retry-After`. Nothing was changed.",
+                    share.max_places, share.max_bytes
+                ),
+            ),
             OpenError::TooManyTargets { count, limit } => Self::invalid_parameter(format!(
                 "Each target counts as a session, and one client may have {limit} here (`--client-sessions`): \
                  of {count} targets follow at most {limit}."

@@ -1,6 +1,7 @@
 //! Why an act was not done. None of them changes a session.
 
 use super::box_check::ImplausibleBox;
+use crate::store::StoreShare;
 use crate::{
     InsertError, NoSession, QueueFull, ReplayError, SessionBusy, SessionClosed, SnapshotError,
     StartError, Stopped, StoreUnavailable, TooManySessions, WorkPanicked,
@@ -175,6 +176,9 @@ pub enum OpenError {
     /// The client has as many sessions as it may.
     #[error(transparent)]
     Quota(#[from] QuotaExhausted),
+    /// The client has used up what it may have in the store that replicas share.
+    #[error("the client has {} places of sessions in the store, or {} bytes of them", .0.max_places, .0.max_bytes)]
+    StoreShare(StoreShare),
     /// The client may never have a session with so many targets: each counts as a session.
     #[error("{count} targets are more than the {limit} sessions that the client may have")]
     TooManyTargets {

@@ -1,6 +1,6 @@
 //! Opens sessions: once for each name, so that a request that comes again gets the same answer.
 
-use super::error::{OpenError, QuotaExhausted};
+use super::error::OpenError;
 use super::idempotency::{CreationKey, id_of};
 use super::service::SessionService;
 use super::start::Start;
@@ -184,8 +184,7 @@ impl SessionService {
                 ttl,
             };
             if !store.admit(&share, counted).await? {
-                let (what, limit) = ("sessions in the store", share.max_places);
-                return Err(QuotaExhausted { what, limit }.into());
+                return Err(OpenError::StoreShare(share));
             }
             match store.create(id, &record).await? {
                 Outcome::Committed(_) => version = Some(record.version),
