@@ -496,10 +496,14 @@ async fn readers_that_take_nothing_lose_their_places_to_a_video_that_waits() {
     };
     let other = within(other, "a place is given up").await;
     assert_eq!(times(&other).len(), FRAMES as usize);
-    // The other one keeps its place, as nobody waits for it any more: its answer is whole.
+    // Who has lost its place is told so. The other one has lost it only where a try above ended between the promise of a
+    // place and the place.
     let ends = join_all(held.map(Response::bytes)).await;
-    let whole = ends.iter().flatten().map(|bytes| times(bytes).len());
-    assert_eq!(whole.collect::<Vec<_>>(), [300]);
+    assert!(
+        ends.iter().any(Result::is_err),
+        "an answer ends as if it were whole"
+    );
+    assert!(ends.iter().flatten().all(|bytes| times(bytes).len() == 300));
 }
 
 /// The lines up to the problem that ends them, which must name this many pictures before it.
