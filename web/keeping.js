@@ -3,7 +3,7 @@
 
 import { get, input } from "./dom.js";
 import { again } from "./editing.js";
-import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepFiles, keepWork, keptFiles, keptWork } from "./kept.js";
+import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepWork, keptFiles, keptWork } from "./kept.js";
 import { openFiles } from "./sources.js";
 
 /**
@@ -16,8 +16,14 @@ import { openFiles } from "./sources.js";
 /** Milliseconds after a change until it is kept. */
 const AFTER = 1000;
 const CLIPS = ["card", "leaves"];
-/** The first screen does not need these. */
-const projects = () => import("./project.js");
+/** @type {Promise<typeof import("./project.js")> | undefined} */
+let loaded;
+/** The first screen does not need these. A page that is left imports nothing anew. */
+const projects = () =>
+  (loaded ??= import("./project.js").catch((error) => {
+    loaded = undefined;
+    throw error;
+  }));
 const openClip = async (/** @type {string} */ name) => (await import("./clip.js")).openClip(name);
 /** What the tab has open, also after it was loaded anew. */
 const OWN = "work";
@@ -59,12 +65,16 @@ export class Keeping {
     try {
       if (run.objects.length === 0) return await this.keepNothing();
       const project = (await projects()).projectOf(run);
-      if (this.source !== run.source) await this.keepSource(id, run.source);
-      const clip = clipOf(run.source);
-      const isWhole = !!clip || this.hasFiles || run.source.isAbsent === true;
-      const { isLocal, source: { imageNames } } = run;
-      await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames });
+      const { isLocal, source } = run;
+      const files = this.source === source ? undefined : smallFiles(source);
+      if (files) this.hasFiles = files.length > 0;
+      const clip = clipOf(source);
+      const isWhole = !!clip || this.hasFiles || source.isAbsent === true;
+      const { imageNames } = source;
+      // In one step: a page that is left ends it, and begins no other.
+      await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames }, files);
       if (run !== this.page.run) return isWhole;
+      this.source = source;
       this.isSafe = this.timer === undefined && isWhole;
       this.tell(`Kept in this browser: ${told(project)}.${isWhole ? "" : " The pictures are not kept."}`);
       return isWhole;
@@ -81,16 +91,6 @@ export class Keeping {
     this.isSafe = this.timer === undefined;
     this.tell("");
     return true;
-  }
-
-  /** @param {string} id
-   * @param {Source} source */
-  async keepSource(id, source) {
-    const files = source.files ?? [];
-    const bytes = files.reduce((sum, { size }) => sum + size, 0);
-    this.hasFiles = files.length > 0 && bytes <= MOST_BYTES;
-    await keepFiles(id, this.hasFiles ? files : []);
-    this.source = source;
   }
 
   /** A run that is about to be stopped can go on later, where its source can be opened again. */
@@ -308,6 +308,12 @@ const clipOf = ({ name, files }) => CLIPS.find((clip) => clip === name && !files
 /** The last state of each object.
  * @param {Run} run */
 const statesOf = (run) => Object.fromEntries(run.objects.map(({ number, saves }) => [number, saves[saves.length - 1]]));
+
+/** The files of a source, where they are small enough to be copied.
+ * @param {Source} source */
+function smallFiles({ files = [] }) {
+  return files.reduce((sum, { size }) => sum + size, 0) <= MOST_BYTES ? files : [];
+}
 
 /** Goes on with the frames after the last one.
  * @param {Run} run

@@ -36,7 +36,7 @@ let database;
 /**
  * @template T
  * @param {IDBTransactionMode} mode
- * @param {(store: IDBObjectStore) => IDBRequest<T>} run
+ * @param {(store: IDBObjectStore) => IDBRequest<T>} run The last one of its requests is answered.
  * @returns {Promise<T>}
  */
 async function within(mode, run) {
@@ -48,6 +48,8 @@ async function within(mode, run) {
   });
   const transaction = (await database).transaction(STORE, mode);
   const request = run(transaction.objectStore(STORE));
+  // Without this, a page that is left at once takes back what it wrote.
+  transaction.commit();
   return new Promise((resolve, reject) => {
     transaction.oncomplete = () => resolve(request.result);
     // Want of room is told here.
@@ -58,31 +60,27 @@ async function within(mode, run) {
 /** @param {IDBValidKey} key */
 const read = (key) => within("readonly", (store) => store.get(key));
 
-/** Writes. Where there is no room, the oldest entry that no tab has open makes room.
- * @param {unknown} value
- * @param {IDBValidKey} key
+/** Keeps a run. Where there is no room, the oldest entry that no tab has open makes room.
+ * @param {Kept} kept
+ * @param {File[]} [files] Instead of those that it has.
  * @returns {Promise<unknown>} */
-async function write(value, key) {
+export async function keepWork(kept, files) {
   try {
-    return await within("readwrite", (store) => store.put(value, key));
+    return await within("readwrite", (store) => {
+      if (files) store.put(files, ["files", kept.id]);
+      return store.put(kept, ["work", kept.id]);
+    });
   } catch (error) {
     const oldest = Object(error).name === "QuotaExceededError" ? (await freeWorks()).pop() : undefined;
     if (!oldest) throw error;
     await forget(oldest.id);
-    return write(value, key);
+    return keepWork(kept, files);
   }
 }
-
-/** @param {Kept} kept */
-export const keepWork = (kept) => write(kept, ["work", kept.id]);
 
 /** @param {string} id
  * @returns {Promise<Kept | undefined>} */
 export const keptWork = (id) => read(["work", id]);
-
-/** @param {string} id
- * @param {File[]} files */
-export const keepFiles = (id, files) => write(files, ["files", id]);
 
 /** @param {string} id
  * @returns {Promise<File[] | undefined>} */
@@ -113,8 +111,7 @@ export async function freeWorks() {
 async function moveOld() {
   const [work, files] = await Promise.all([read("work"), read("files")]);
   if (!work) return;
-  await write(files ?? [], ["files", work.tab]);
-  await write({ ...work, id: work.tab, at: Date.now() }, ["work", work.tab]);
+  await keepWork({ ...work, id: work.tab, at: Date.now() }, files ?? []);
   await within("readwrite", (store) => {
     store.delete("files");
     return store.delete("work");

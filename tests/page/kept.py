@@ -66,6 +66,19 @@ def kept_run(checks, page):
     return kept_rows(page)
 
 
+def renamed_and_reloaded(checks):
+    """The tab is loaded anew at once after a change."""
+    page = checks.page(where="here")
+    kept_run(checks, page)
+    name = page.locator("#list input[type=text]")
+    for text in ("The card", "The ace", "The ace of spades"):
+        name.fill(text)
+        page.reload()
+        said(page, "card is here again")
+        assert name.input_value() == text, name.input_value()
+    page.context.close()
+
+
 def offers(page, names):
     """Waits until a page offers to go on with these, newest first."""
     for _ in range(50):
@@ -315,6 +328,7 @@ ALL = [
     last_object_deleted,
     video_made_of_another_run,
     reloaded_in_the_middle,
+    renamed_and_reloaded,
     each_tab_for_itself,
     left_for_another_source,
     project_opened_again,
