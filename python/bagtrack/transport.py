@@ -15,6 +15,9 @@ class Services:
         urls = [url] if isinstance(url, str) else list(url)
         if not urls:
             raise ValueError("there is no address of a service")
+        for address in urls:
+            if not address.startswith(("http://", "https://")):
+                raise ValueError(f"the address {address!r} does not begin with http:// or https://")
         self._urls = [address.rstrip("/") for address in urls]
         self._used = 0
 

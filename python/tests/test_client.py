@@ -137,6 +137,11 @@ def test_a_server_that_is_away_for_a_while_is_waited_for_and_then_given_up(
     assert client.frame == 2
 
 
+def test_an_address_without_its_scheme_is_refused_at_once() -> None:
+    with pytest.raises(ValueError, match="'localhost:8080' does not begin with http://"):
+        bagtrack.Client(["http://localhost:8080", "localhost:8080"])
+
+
 def test_refusals_are_told_and_change_nothing(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
