@@ -20,6 +20,7 @@ mod sample;
 mod serve;
 mod signals;
 mod track;
+mod variables;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;

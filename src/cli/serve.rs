@@ -9,6 +9,7 @@ use super::log::{Log, LogFormat};
 use super::memory_limit;
 use super::open_files;
 use super::signals::{self, Hangups, Reloaded, Signals};
+use super::variables;
 use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use bagtrack_config::OFF;
 use bagtrack_ingest::video::Launcher;
@@ -37,6 +38,7 @@ pub struct Args {
 /// Runs `serve`.
 pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let log = Log::start(&args.log, args.log_format)?;
+    variables::check(&super::command());
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(args.config.network_threads())
         .enable_all()

@@ -12,7 +12,9 @@ use serde_json::Value;
 use std::process::{Command, Output};
 
 fn bagtrack() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_bagtrack"))
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
+    program::without_settings(&mut command);
+    command
 }
 
 /// The service, with a log in JSON.

@@ -122,7 +122,20 @@ pub fn serve_after(preparation: &str) -> Command {
     command
 }
 
+/// What whoever runs the tests has set is not for this command.
+pub fn without_settings(command: &mut Command) {
+    for (name, _) in std::env::vars_os() {
+        if name
+            .to_str()
+            .is_some_and(|name| name.starts_with("BAGTRACK_"))
+        {
+            command.env_remove(name);
+        }
+    }
+}
+
 fn set_up(command: &mut Command) {
+    without_settings(command);
     // A flag may name another address.
     command.arg("serve").env("BAGTRACK_LISTEN", "127.0.0.1:0");
     command.env("NO_COLOR", "1");
