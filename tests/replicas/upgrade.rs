@@ -248,6 +248,12 @@ async fn what_one_version_has_made_the_other_takes() {
         let copy = json(create, StatusCode::CREATED).await;
         assert_eq!(copy["frame"], 3, "{copy}");
 
+        let made = pair.client.post(pair.url(0, "/token")).send().await;
+        let token = json(made.unwrap(), StatusCode::OK).await;
+        let get = pair.client.get(pair.url(1, ""));
+        let get = get.bearer_auth(token["token"].as_str().unwrap());
+        json(get.send().await.unwrap(), StatusCode::OK).await;
+
         let delete = pair.client.delete(pair.url(1, "")).send().await.unwrap();
         assert_eq!(delete.status(), StatusCode::NO_CONTENT);
         json(pair.post(0, 4).await, StatusCode::NOT_FOUND).await;

@@ -5,7 +5,7 @@ use super::jwt::{JwtError, TokenError, TokenVerifier};
 use super::keys::{ApiKeys, KeysError};
 use super::token::TokenKeys;
 use bagtrack_config::AccessConfig;
-use bagtrack_sessions::{MacKeys, Owner, SNAPSHOT_KEY_CONTEXT};
+use bagtrack_sessions::{MacKeys, Owner, SNAPSHOT_KEY_CONTEXT, SessionName};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -39,6 +39,17 @@ pub enum AccessError {
          {MIN_SECRET_BYTES} characters"
     )]
     ShortSecret,
+}
+
+/// What lets somebody in.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Credential {
+    /// Whose sessions it opens.
+    pub owner: Owner,
+    /// The digest of the API key that it is, or that a session token was made with.
+    pub key: Option<blake3::Hash>,
+    /// When it ends, where it does.
+    pub until: Option<SystemTime>,
 }
 
 /// The keys and secrets of a running service.
@@ -106,16 +117,39 @@ impl Access {
         self.keys.are_needed()
     }
 
-    /// Whether there is a key of this owner, or may be a token.
-    pub fn has_owner(&self, owner: &Owner) -> bool {
+    /// Whether this still lets somebody in: its key is among the keys, and its time has not come.
+    pub fn holds(&self, credential: &Credential, now: SystemTime) -> bool {
+        let Credential { owner, key, until } = credential;
+        if until.is_some_and(|until| now >= until) {
+            return false;
+        }
+        if !self.is_needed() {
+            return true;
+        }
         #[cfg(feature = "jwt")]
         if self.jwt.as_ref().is_some_and(|jwt| jwt.may_have(owner)) {
             return true;
         }
-        self.keys.has_owner(owner)
+        let keys = self.keys.of(owner);
+        match key {
+            Some(key) => keys.contains(key),
+            None => !keys.is_empty(),
+        }
     }
 
-    /// Whom this key, or this token of an identity provider, speaks for; and until when, where it ends.
+    /// The session that this session token is good for, and what it lets in with; if it was made here and still holds.
+    pub fn session_token(&self, text: &str, now: SystemTime) -> Option<(SessionName, Credential)> {
+        let token = self.tokens.verify(text, now, |owner| self.keys.of(owner))?;
+        let credential = Credential {
+            owner: token.owner,
+            key: token.key,
+            until: Some(token.expires),
+        };
+        self.holds(&credential, now)
+            .then_some((token.session, credential))
+    }
+
+    /// What this key, or this token of an identity provider, lets in with.
     ///
     /// # Errors
     /// See [`NotIdentified`].
@@ -124,14 +158,22 @@ impl Access {
         &self,
         presented: &str,
         now: SystemTime,
-    ) -> Result<(Owner, Option<SystemTime>), NotIdentified> {
-        if let Some(owner) = self.keys.owner(presented.as_bytes()) {
-            return Ok((owner, None));
+    ) -> Result<Credential, NotIdentified> {
+        if let Some((owner, digest)) = self.keys.owner(presented.as_bytes()) {
+            return Ok(Credential {
+                owner,
+                key: Some(digest),
+                until: None,
+            });
         }
         #[cfg(feature = "jwt")]
         if let Some(jwt) = &self.jwt {
             let identity = jwt.identify(presented, now).await?;
-            return Ok((identity.owner, Some(identity.expires)));
+            return Ok(Credential {
+                owner: identity.owner,
+                key: None,
+                until: Some(identity.expires),
+            });
         }
         Err(NotIdentified::Key)
     }

@@ -108,22 +108,24 @@ impl ApiKeys {
         self.0.file.is_some() || !self.0.fixed.is_empty()
     }
 
-    /// The owner of this key.
-    pub fn owner(&self, presented: &[u8]) -> Option<Owner> {
+    /// The owner of this key, and its digest.
+    pub fn owner(&self, presented: &[u8]) -> Option<(Owner, blake3::Hash)> {
         let digest = blake3::hash(presented);
         let mut owner = None;
         // All are compared, so the time does not tell which one it is.
         for key in self.current().iter() {
             if key.digest == digest {
-                owner = Some(key.owner.clone());
+                owner = Some((key.owner.clone(), digest));
             }
         }
         owner
     }
 
-    /// Whether there is a key of this owner.
-    pub fn has_owner(&self, owner: &Owner) -> bool {
-        self.current().iter().any(|key| key.owner == *owner)
+    /// The digests of this owner's keys.
+    pub fn of(&self, owner: &Owner) -> Vec<blake3::Hash> {
+        let current = self.current();
+        let own = current.iter().filter(|key| key.owner == *owner);
+        own.map(|key| key.digest).collect()
     }
 
     fn current(&self) -> Arc<[ApiKey]> {
@@ -179,7 +181,8 @@ mod tests {
         let long = "0123456789abcdef";
         let load = |text: &str| ApiKeys::load(&[Secret::from(text)], None);
         let keys = load(&format!("me:{long}")).unwrap();
-        assert_eq!(keys.owner(long.as_bytes()), Some(Owner::named("me")));
+        let me = (Owner::named("me"), blake3::hash(long.as_bytes()));
+        assert_eq!(keys.owner(long.as_bytes()), Some(me));
         assert_eq!(keys.owner(b"0123456789abcdeg"), None);
         for wrong in [
             "me:short-key",

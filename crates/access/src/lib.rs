@@ -23,7 +23,7 @@ mod jwt;
 mod keys;
 mod token;
 
-pub use access::{Access, AccessError, NotIdentified};
+pub use access::{Access, AccessError, Credential, NotIdentified};
 pub use hosts::AllowedHosts;
 #[cfg(feature = "jwt")]
 pub use jwt::{Identity, JwtError, KeySetError, KeySource, SourceError, TokenError, TokenVerifier};

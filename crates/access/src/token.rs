@@ -1,8 +1,8 @@
 //! Session tokens: what a web page gets in place of an API key.
 //!
 //! A token holds the id of its session and the random number that this was opened with, the moment at which it ends, the
-//! name of the key that made it, and a code of all of these under a secret of the service. So nothing is stored, and it
-//! ends with its session (another one may have the id later), its time, its key or the secret.
+//! name of the key that made it, and a code of all of these and of that key under a secret of the service. So nothing is
+//! stored, and it ends with its session (another one may have the id later), its time, its key or the secret.
 //!
 //! Layout, as base64url after [`PREFIX`]: 16 bytes of id, 8 of the incarnation, 8 of seconds since 1970 (both big
 //! endian), 32 of code, and the name.
@@ -15,7 +15,8 @@ use uuid::Uuid;
 
 /// What every token begins with, and no usual key.
 pub const PREFIX: &str = "bagtrack-session.";
-const KEY_CONTEXT: &str = "bagtrack 2026-11 session token";
+const CONTEXT: &str = "bagtrack 2026-11 session token";
+const WITH_KEY_CONTEXT: &str = "bagtrack 2026-11 session token of an API key";
 const ID_BYTES: usize = 16;
 const INCARNATION_BYTES: usize = 8;
 const TIME_BYTES: usize = 8;
@@ -27,18 +28,28 @@ pub struct SessionToken {
     pub session: SessionName,
     /// Whose session that is.
     pub owner: Owner,
+    /// The digest of the API key that made it. None where an identity provider's token did, where no key was needed, or
+    /// where a version made it that wrote no keys into tokens.
+    pub key: Option<blake3::Hash>,
     /// When it ends, in whole seconds.
     pub expires: SystemTime,
 }
 
 /// The keys of tokens.
 #[derive(Debug)]
-pub struct TokenKeys(MacKeys);
+pub struct TokenKeys {
+    /// Of tokens that no API key made.
+    plain: MacKeys,
+    with_key: MacKeys,
+}
 
 impl TokenKeys {
     /// Keys from these secrets; a random one without any.
     pub fn new<S: AsRef<[u8]>>(secrets: &[S]) -> Self {
-        Self(MacKeys::new(KEY_CONTEXT, secrets))
+        Self {
+            plain: MacKeys::new(CONTEXT, secrets),
+            with_key: MacKeys::new(WITH_KEY_CONTEXT, secrets),
+        }
     }
 
     /// The text of a token.
@@ -48,38 +59,52 @@ impl TokenKeys {
         let mut bytes = [&id.as_bytes()[..], &incarnation.to_be_bytes()].concat();
         bytes.extend_from_slice(&seconds.as_secs().to_be_bytes());
         let name = token.owner.name().unwrap_or("");
-        let code = self.0.sign(&[&bytes, name.as_bytes()].concat());
+        let code = match &token.key {
+            None => self.plain.sign(&[&bytes, name.as_bytes()].concat()),
+            Some(key) => self
+                .with_key
+                .sign(&[key.as_bytes(), &bytes[..], name.as_bytes()].concat()),
+        };
         bytes.extend_from_slice(&code);
         bytes.extend_from_slice(name.as_bytes());
         format!("{PREFIX}{}", BASE64_URL_SAFE_NO_PAD.encode(bytes))
     }
 
-    /// The token of a text, if it is one that these keys signed and that has not ended by `now`.
-    pub fn verify(&self, text: &str, now: SystemTime) -> Option<SessionToken> {
+    /// The token of a text, if it is one that these keys signed and that has not ended by `now`. `keys_of` gives the
+    /// digests of an owner's API keys: one of them has made it, or none at all.
+    pub fn verify(
+        &self,
+        text: &str,
+        now: SystemTime,
+        keys_of: impl FnOnce(&Owner) -> Vec<blake3::Hash>,
+    ) -> Option<SessionToken> {
         let text = text.strip_prefix(PREFIX)?;
         let bytes = BASE64_URL_SAFE_NO_PAD.decode(text).ok()?;
         let (id, rest) = bytes.split_first_chunk::<ID_BYTES>()?;
         let (incarnation, rest) = rest.split_first_chunk::<INCARNATION_BYTES>()?;
         let (seconds, rest) = rest.split_first_chunk::<TIME_BYTES>()?;
         let (code, name) = rest.split_first_chunk::<MAC_BYTES>()?;
-        if !self
-            .0
-            .verify(&[&id[..], incarnation, seconds, name].concat(), code)
-        {
-            return None;
-        }
-        let expires = Duration::from_secs(u64::from_be_bytes(*seconds));
-        let expires = UNIX_EPOCH.checked_add(expires)?;
+        let message = [&id[..], incarnation, seconds, name].concat();
         let owner = match std::str::from_utf8(name).ok()? {
             "" => Owner::default(),
             name => Owner::named(name),
         };
+        let key = match self.plain.verify(&message, code) {
+            true => None,
+            false => Some(keys_of(&owner).into_iter().find(|key| {
+                let message = [&key.as_bytes()[..], &message].concat();
+                self.with_key.verify(&message, code)
+            })?),
+        };
+        let expires = Duration::from_secs(u64::from_be_bytes(*seconds));
+        let expires = UNIX_EPOCH.checked_add(expires)?;
         (now < expires).then_some(SessionToken {
             session: SessionName {
                 id: Uuid::from_bytes(*id),
                 incarnation: u64::from_be_bytes(*incarnation),
             },
             owner,
+            key,
             expires,
         })
     }
@@ -93,34 +118,44 @@ mod tests {
     fn a_token_holds_for_its_session_until_its_end_and_cannot_be_changed() {
         let keys = TokenKeys::new(&["a secret"]);
         let expires = UNIX_EPOCH + Duration::from_secs(1_000_000);
-        let token = SessionToken {
-            session: SessionName {
+        let before = expires - Duration::from_secs(1);
+        let (own, other) = (blake3::hash(b"my key"), blake3::hash(b"another key"));
+        for (owner, key) in [
+            (Owner::named("me"), Some(own)),
+            (Owner::named("me"), None),
+            (Owner::default(), None),
+        ] {
+            let session = SessionName {
                 id: Uuid::from_u128(7),
                 incarnation: 11,
-            },
-            owner: Owner::named("me"),
-            expires,
-        };
-        let text = keys.sign(&token);
-        let before = expires - Duration::from_secs(1);
-        assert_eq!(keys.verify(&text, before), Some(token.clone()));
-        let of_nobody = SessionToken {
-            owner: Owner::default(),
-            ..token
-        };
-        let text_of_nobody = keys.sign(&of_nobody);
-        assert_eq!(keys.verify(&text_of_nobody, before), Some(of_nobody));
-        assert_eq!(keys.verify(&text, expires), None);
-        assert_eq!(TokenKeys::new(&["another"]).verify(&text, before), None);
-        for position in PREFIX.len()..text.len() {
-            let mut changed = text.clone().into_bytes();
-            changed[position] = if changed[position] == b'A' {
-                b'B'
-            } else {
-                b'A'
             };
-            let changed = String::from_utf8(changed).unwrap();
-            assert_eq!(keys.verify(&changed, before), None, "{position}");
+            let token = SessionToken {
+                session,
+                owner: owner.clone(),
+                key,
+                expires,
+            };
+            let text = keys.sign(&token);
+            let of_owner = |asked: &Owner| {
+                assert_eq!(*asked, owner);
+                vec![other, own]
+            };
+            assert_eq!(keys.verify(&text, before, of_owner), Some(token));
+            assert_eq!(keys.verify(&text, expires, of_owner), None);
+            let taken = keys.verify(&text, before, |_| vec![other]);
+            assert_eq!(taken.is_none(), key.is_some(), "its key is gone");
+            let of_another = TokenKeys::new(&["another"]);
+            assert_eq!(of_another.verify(&text, before, of_owner), None);
+            for position in PREFIX.len()..text.len() {
+                let mut changed = text.clone().into_bytes();
+                changed[position] = match changed[position] {
+                    b'A' => b'B',
+                    _ => b'A',
+                };
+                let changed = String::from_utf8(changed).unwrap();
+                let taken = keys.verify(&changed, before, |_| vec![other, own]);
+                assert_eq!(taken, None, "{position}");
+            }
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Who may use a service with these settings.
 
-use bagtrack_access::{Access, AccessError, AllowedHosts, ApiKeys, KeysError, NotIdentified};
+use bagtrack_access::{
+    Access, AccessError, AllowedHosts, ApiKeys, Credential, KeysError, NotIdentified, SessionToken,
+};
 use bagtrack_config::{AccessConfig, Config, Secret};
-use bagtrack_sessions::Owner;
+use bagtrack_sessions::{Owner, SessionName};
 use std::fs;
 use std::net::SocketAddr;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
+use uuid::Uuid;
 
 const KEY: &str = "0123456789abcdef";
 const OTHER: &str = "fedcba9876543210";
@@ -22,6 +25,14 @@ fn with_key() -> AccessConfig {
     AccessConfig {
         api_keys: vec![Secret::from(format!("me:{KEY}").as_str())],
         ..AccessConfig::default()
+    }
+}
+
+fn of_key(owner: &str, key: &str) -> Credential {
+    Credential {
+        owner: Owner::named(owner),
+        key: Some(blake3::hash(key.as_bytes())),
+        until: None,
     }
 }
 
@@ -55,15 +66,61 @@ fn a_service_without_keys_is_for_this_machine_or_says_that_it_is_for_all() {
 #[tokio::test]
 async fn a_key_speaks_for_its_owner_where_keys_are_needed() {
     let here = address("127.0.0.1:8080");
-    let (me, you) = (Owner::named("me"), Owner::named("you"));
     let open = load(&AccessConfig::default(), here).unwrap();
-    assert!(!open.is_needed() && !open.has_owner(&me));
+    assert!(!open.is_needed() && open.holds(&Credential::default(), SystemTime::UNIX_EPOCH));
     let closed = load(&with_key(), here).unwrap();
     assert!(closed.is_needed());
-    assert!(closed.has_owner(&me) && !closed.has_owner(&you));
     let identify = async |key| closed.identify(key, SystemTime::UNIX_EPOCH).await;
-    assert_eq!(identify(KEY).await, Ok((me, None)));
+    assert_eq!(identify(KEY).await, Ok(of_key("me", KEY)));
     assert_eq!(identify(OTHER).await, Err(NotIdentified::Key));
+    let holds = |credential| closed.holds(&credential, SystemTime::UNIX_EPOCH);
+    assert!(holds(of_key("me", KEY)));
+    assert!(!holds(of_key("you", KEY)) && !holds(of_key("me", OTHER)));
+    assert!(!holds(Credential::default()));
+}
+
+#[test]
+fn a_session_token_ends_with_the_key_that_made_it_though_another_has_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("keys");
+    let write = |text: &str| fs::write(&file, text).unwrap();
+    write(&format!("me:{KEY}\nme:{OTHER}"));
+    let config = AccessConfig {
+        api_keys_file: Some(file.clone()),
+        ..AccessConfig::default()
+    };
+    let access = load(&config, address("127.0.0.1:8080")).unwrap();
+    let session = SessionName {
+        id: Uuid::from_u128(7),
+        incarnation: 11,
+    };
+    let now = SystemTime::UNIX_EPOCH;
+    let expires = now + Duration::from_secs(60);
+    let token = |key: Option<&str>| {
+        access.tokens.sign(&SessionToken {
+            session,
+            owner: Owner::named("me"),
+            key: key.map(|key| blake3::hash(key.as_bytes())),
+            expires,
+        })
+    };
+    let (old, new, of_earlier_version) = (token(Some(KEY)), token(Some(OTHER)), token(None));
+    let taken = |token: &str| access.session_token(token, now);
+    let with = |key| Credential {
+        until: Some(expires),
+        ..of_key("me", key)
+    };
+    assert_eq!(taken(&old), Some((session, with(KEY))));
+    write(&format!("me:{OTHER}"));
+    assert_eq!(access.keys.reload().unwrap(), 1);
+    assert_eq!(taken(&old), None);
+    assert!(!access.holds(&with(KEY), now), "a stream that is open");
+    assert_eq!(taken(&new), Some((session, with(OTHER))));
+    assert!(taken(&of_earlier_version).is_some());
+    write(&format!("you:{OTHER}"));
+    access.keys.reload().unwrap();
+    assert_eq!(taken(&new), None);
+    assert_eq!(taken(&of_earlier_version), None);
 }
 
 #[test]
@@ -125,16 +182,17 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
     fs::write(&file, format!("# people\n\n  you:{OTHER}  \n")).unwrap();
     let texts = [Secret::from(format!("me:{KEY}").as_str())];
     let keys = ApiKeys::load(&texts, Some(&file)).unwrap();
-    let (me, you) = (Owner::named("me"), Owner::named("you"));
-    assert_eq!(keys.owner(KEY.as_bytes()), Some(me.clone()));
-    assert_eq!(keys.owner(OTHER.as_bytes()), Some(you.clone()));
-    assert!(keys.has_owner(&you) && !keys.has_owner(&Owner::named("they")));
+    let owner = |key: &str| keys.owner(key.as_bytes()).map(|(owner, _)| owner);
+    let count = |name| keys.of(&Owner::named(name)).len();
+    assert_eq!(owner(KEY), Some(Owner::named("me")));
+    assert_eq!(owner(OTHER), Some(Owner::named("you")));
+    assert_eq!((count("me"), count("you"), count("they")), (1, 1, 0));
 
-    let again = format!("they:{OTHER}\nwe:0000000000000000\n");
+    let again = format!("they:{OTHER}\nme:0000000000000000\n");
     fs::write(&file, again).unwrap();
     assert_eq!(keys.reload().unwrap(), 3);
-    assert_eq!(keys.owner(OTHER.as_bytes()), Some(Owner::named("they")));
-    assert!(!keys.has_owner(&you) && keys.has_owner(&me));
+    assert_eq!(owner(OTHER), Some(Owner::named("they")));
+    assert_eq!((count("me"), count("you"), count("they")), (2, 0, 1));
 
     // What cannot be read changes nothing.
     for (text, expected) in [
@@ -145,7 +203,7 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
         fs::write(&file, text).unwrap();
         let error = keys.reload().unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
-        assert_eq!(keys.owner(OTHER.as_bytes()), Some(Owner::named("they")));
+        assert_eq!(owner(OTHER), Some(Owner::named("they")));
     }
     fs::remove_file(&file).unwrap();
     let gone = keys.reload().unwrap_err();
@@ -153,7 +211,7 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
     fs::create_dir(&file).unwrap();
     let folder = keys.reload().unwrap_err();
     assert!(folder.to_string().contains("no regular file"), "{folder}");
-    assert!(keys.has_owner(&me));
+    assert_eq!(count("me"), 2);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 #![cfg(feature = "jwt")]
 
 use bagtrack_access::{
-    Access, AccessError, JwtError, KeySource, NotIdentified, SourceError, TokenError, TokenVerifier,
+    Access, AccessError, Credential, JwtError, KeySource, NotIdentified, SourceError, TokenError,
+    TokenVerifier,
 };
 use bagtrack_config::{AccessConfig, JwtConfig, Secret};
 use bagtrack_sessions::Owner;
@@ -405,20 +406,27 @@ async fn an_issuer_makes_tokens_needed_beside_api_keys() {
     let load = |config: &AccessConfig| Access::load(config, everywhere, at(NOW));
     let alone = load(&access).unwrap();
     assert!(alone.is_needed() && !alone.keys.are_needed());
-    assert!(alone.has_owner(&Owner::named("jwt:camera")));
-    assert!(!alone.has_owner(&Owner::named("camera")));
+    let named = |name: &str| Credential {
+        owner: Owner::named(name),
+        ..Credential::default()
+    };
+    let holds = |access: &Access, name: &str| access.holds(&named(name), at(NOW));
+    assert!(holds(&alone, "jwt:camera") && !holds(&alone, "camera"));
 
     access.api_keys = vec![Secret::from("camera:0123456789abcdef")];
     let both = load(&access).unwrap();
-    assert!(both.has_owner(&Owner::named("jwt:camera")) && both.has_owner(&Owner::named("camera")));
+    assert!(holds(&both, "jwt:camera") && holds(&both, "camera"));
     let token = key.sign(&claims(json!({ "sub": "camera" })));
     let of_token = both.identify(&token, at(NOW)).await;
-    assert_eq!(
-        of_token,
-        Ok((Owner::named("jwt:camera"), Some(at(NOW + 300))))
-    );
-    let of_key = both.identify("0123456789abcdef", at(NOW)).await;
-    assert_eq!(of_key, Ok((Owner::named("camera"), None)));
+    let of_camera = Credential {
+        until: Some(at(NOW + 300)),
+        ..named("jwt:camera")
+    };
+    assert_eq!(of_token, Ok(of_camera.clone()));
+    assert!(both.holds(&of_camera, at(NOW + 299)) && !both.holds(&of_camera, at(NOW + 300)));
+    let of_key = both.identify("0123456789abcdef", at(NOW)).await.unwrap();
+    assert_eq!(of_key.owner, Owner::named("camera"));
+    assert!(of_key.key.is_some() && both.holds(&of_key, at(NOW + 10_000)));
     let of_another = both.identify("fedcba9876543210", at(NOW)).await;
     assert_eq!(of_another, Err(NotIdentified::Token(TokenError::Form)));
 

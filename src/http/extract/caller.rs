@@ -3,52 +3,47 @@
 use crate::http::problems::problem::Problem;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
-use bagtrack_access::SessionToken;
+use bagtrack_access::Credential;
 use bagtrack_quotas::Client;
 use bagtrack_sessions::{Owner, SessionName};
 use std::io;
 use std::net::Ipv4Addr;
 use std::sync::Arc;
-use std::time::SystemTime;
 use uuid::Uuid;
 
 /// Who makes a request, as the layer [`authenticate`](crate::http::middleware::authenticate::authenticate) has found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Caller {
-    owner: Owner,
+    credential: Credential,
     /// The only session that may be used, where the request came with a session token.
     only: Option<SessionName>,
-    /// When what the request came with ends, where it does.
-    until: Option<SystemTime>,
 }
 
 impl Caller {
-    /// Whoever has the key of this owner, or a token of an identity provider, which is good `until` it ends.
-    pub fn with_key(owner: Owner, until: Option<SystemTime>) -> Self {
+    /// Whoever has this API key, or this token of an identity provider.
+    pub fn with_key(credential: Credential) -> Self {
         Self {
-            owner,
+            credential,
             only: None,
-            until,
         }
     }
 
-    /// Whoever has this session token.
-    pub fn with_token(token: SessionToken) -> Self {
+    /// Whoever has a session token for this session.
+    pub fn with_token(session: SessionName, credential: Credential) -> Self {
         Self {
-            owner: token.owner,
-            only: Some(token.session),
-            until: Some(token.expires),
+            credential,
+            only: Some(session),
         }
     }
 
-    /// Whether what the caller came with has ended by `now`.
-    pub fn has_ended(&self, now: SystemTime) -> bool {
-        self.until.is_some_and(|until| now >= until)
+    /// What the request came with.
+    pub fn credential(&self) -> &Credential {
+        &self.credential
     }
 
     /// Whose sessions these are.
     pub fn owner(&self) -> &Owner {
-        &self.owner
+        &self.credential.owner
     }
 
     /// The only session that may be used, where the request came with a session token.

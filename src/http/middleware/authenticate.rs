@@ -11,7 +11,7 @@ use axum::http::header::{AUTHORIZATION, SEC_WEBSOCKET_PROTOCOL, WWW_AUTHENTICATE
 use axum::http::{HeaderMap, HeaderValue};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use bagtrack_access::{NotIdentified, TOKEN_PREFIX};
+use bagtrack_access::{Credential, NotIdentified, TOKEN_PREFIX};
 use bagtrack_api::ProblemKind as Kind;
 use bagtrack_quotas::Client;
 
@@ -59,7 +59,7 @@ pub async fn authenticate_metrics(
     if presented != Some(digest(key.text())) {
         return unauthorized(&NotIdentified::Key, request.headers());
     }
-    let reader = Caller::with_key(Default::default(), None);
+    let reader = Caller::with_key(Credential::default());
     request.extensions_mut().insert(reader);
     next.run(request).await
 }
@@ -99,17 +99,14 @@ async fn caller(state: &AppState, headers: &HeaderMap) -> Result<Caller, NotIden
     let (access, now) = (&state.access, state.now());
     let presented = bearer(headers).or_else(|| offered_token(headers));
     if let Some(text) = presented.filter(|text| text.starts_with(TOKEN_PREFIX)) {
-        let token = access.tokens.verify(text, now);
-        // The token ends with its key.
-        let token = token.filter(|token| !access.is_needed() || access.has_owner(&token.owner));
-        return token.map(Caller::with_token).ok_or(NotIdentified::Key);
+        let (session, credential) = access.session_token(text, now).ok_or(NotIdentified::Key)?;
+        return Ok(Caller::with_token(session, credential));
     }
     if !access.is_needed() {
-        return Ok(Caller::with_key(Default::default(), None));
+        return Ok(Caller::with_key(Credential::default()));
     }
     let presented = presented.ok_or(NotIdentified::Key)?;
-    let (owner, until) = access.identify(presented, now).await?;
-    Ok(Caller::with_key(owner, until))
+    access.identify(presented, now).await.map(Caller::with_key)
 }
 
 /// The key or token of the only `Authorization` header.

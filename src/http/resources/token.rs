@@ -39,6 +39,7 @@ pub async fn create(
     let token = state.access.tokens.sign(&SessionToken {
         session: session.name(),
         owner: session.owner().clone(),
+        key: caller.credential().key,
         expires,
     });
     Ok(Json(api::SessionToken {

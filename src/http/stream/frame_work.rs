@@ -122,9 +122,7 @@ impl FrameWork {
     /// The session, if the caller may still use it.
     async fn find(&self) -> Result<Arc<Session>, Problem> {
         let (state, caller) = (&self.state, &self.caller);
-        let access = &state.access;
-        let has_key = !access.is_needed() || access.has_owner(caller.owner());
-        if caller.has_ended(state.now()) || !has_key {
+        if !state.access.holds(caller.credential(), state.now()) {
             return Err(Problem::unauthorized());
         }
         let flow = self.account.flow();

@@ -1,6 +1,10 @@
 //! The service as a process: signals, exit statuses, and its log.
 
+use crate::application::expect;
+use crate::pictures;
 use crate::program::{self, Program};
+use crate::stream_client::StreamClient;
+use crate::streams::stream::problem_slug;
 use bagtrack_testing::service::server::Process;
 use bagtrack_testing::within::within;
 use reqwest::{Client, StatusCode};
@@ -86,6 +90,73 @@ async fn a_hangup_reads_the_keys_again() {
     service.signal(Signal::HUP);
     service.logs("API keys read again");
     assert_eq!(status("fedcba9876543210").await, StatusCode::UNAUTHORIZED);
+}
+
+#[test]
+fn a_variable_that_is_no_setting_is_told_at_the_start() {
+    let variables = [
+        ("BAGTRACK_MAX_SESSION", "3"),
+        ("BAGTRACK_MAX_SESSIONS", "3"),
+        // Kubernetes sets these beside a service that is called `bagtrack`.
+        ("BAGTRACK_SERVICE_HOST", "10.0.0.1"),
+        ("BAGTRACK_PORT_8080_TCP", "tcp://10.0.0.1:8080"),
+    ];
+    let service = Program::start(&[], &variables);
+    let told: Vec<&String> = service.said().iter().collect();
+    let of = |name: &str| told.iter().filter(|line| line.contains(name)).count();
+    assert_eq!(of("BAGTRACK_MAX_SESSION is no setting"), 1, "{told:?}");
+    assert_eq!(of("BAGTRACK_MAX_SESSIONS"), 0, "{told:?}");
+    assert_eq!(of("BAGTRACK_SERVICE") + of("BAGTRACK_PORT"), 0, "{told:?}");
+}
+
+/// What a key that leaked has made must not outlive it.
+#[tokio::test]
+async fn a_replaced_key_ends_its_tokens_and_streams_though_its_name_stays() {
+    const OLD: &str = "0123456789abcdef";
+    const NEW: &str = "fedcba9876543210";
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), format!("ann:{OLD}\nann:{NEW}")).unwrap();
+    let flags = ["--api-keys-file", file.path().to_str().unwrap()];
+    let mut service = Program::start(&flags, &[]);
+    let client = Client::new();
+    let create = client.post(service.url("/sessions?box=10,10,24,24"));
+    let create = create.bearer_auth(OLD).body(pictures::png(0)).send();
+    let session = expect(create.await.unwrap(), StatusCode::CREATED).await;
+    let id = session["id"].as_str().unwrap();
+    let url = service.url(&format!("/sessions/{id}"));
+    let mut tokens = Vec::new();
+    for key in [OLD, NEW] {
+        let made = client.post(format!("{url}/token")).bearer_auth(key);
+        let made = expect(made.send().await.unwrap(), StatusCode::OK).await;
+        tokens.push(made["token"].as_str().unwrap().to_owned());
+    }
+    let address = service.address;
+    let stream = async |key: &str| {
+        let key = format!("Bearer {key}");
+        let headers = [("authorization", key.as_str())];
+        let stream = StreamClient::try_open(address, id, "", &headers).await;
+        stream.expect("it is let in")
+    };
+    let mut old = stream(OLD).await;
+    let status = async |presented: &str| {
+        let request = client.get(&url).bearer_auth(presented);
+        request.send().await.unwrap().status()
+    };
+    for token in &tokens {
+        assert_eq!(status(token).await, StatusCode::OK);
+    }
+    std::fs::write(file.path(), format!("ann:{NEW}")).unwrap();
+    service.signal(Signal::HUP);
+    service.logs("API keys read again");
+    assert_eq!(status(OLD).await, StatusCode::UNAUTHORIZED);
+    assert_eq!(status(&tokens[0]).await, StatusCode::UNAUTHORIZED);
+    assert_eq!(status(&tokens[1]).await, StatusCode::OK);
+    old.send(pictures::png(1)).await;
+    assert_eq!(problem_slug(&old.message().await), "unauthorized");
+    assert_eq!(old.close_code().await, 4401);
+    let mut new = stream(NEW).await;
+    new.send(pictures::png(1)).await;
+    assert_eq!(new.message().await["frame"], 1);
 }
 
 /// Keys and certificates may be exchanged while the start waits for a store. A hangup ended the process then.
