@@ -331,6 +331,37 @@ async fn a_connection_that_says_nothing_any_more_is_left_for_another() {
     }
 }
 
+/// It was never asked again.
+#[tokio::test]
+#[ignore = "needs redis-server"]
+async fn a_redis_that_has_refused_a_password_is_found_again_when_it_takes_it() {
+    const TIMEOUT: Duration = Duration::from_millis(300);
+    let redis = Redis::start();
+    let set = |password: &str| redis.ask::<String>(&["CONFIG", "SET", "requirepass", password]);
+    let url = format!("redis://:the-password@127.0.0.1:{}", redis.port);
+    set("the-password");
+    let address = RedisAddress::parse(&url, TIMEOUT).unwrap();
+    let store = RedisStore::connect(address, "suite", TIMEOUT)
+        .await
+        .unwrap();
+    let mut session = Known::create(&store, 1, TTL).await;
+
+    let client = redis::Client::open(url).unwrap();
+    let mut admin = client.get_connection().unwrap();
+    for password in ["another", "the-password"] {
+        let mut configure = redis::cmd("CONFIG");
+        configure.arg(&["SET", "requirepass", password]);
+        configure.exec(&mut admin).unwrap();
+        let mut kill = redis::cmd("CLIENT");
+        kill.arg(&["KILL", "TYPE", "normal", "SKIPME", "yes"]);
+        kill.exec(&mut admin).unwrap();
+        let takes = password == "the-password";
+        until(password, || store.is_ready() == takes).await;
+    }
+    assert!(store.load(session.name.id).await.unwrap().is_some());
+    session.advance(&store).await;
+}
+
 #[tokio::test]
 #[ignore = "needs redis-server"]
 async fn a_redis_without_room_takes_no_session_and_one_that_refuses_is_not_ready() {

@@ -169,6 +169,7 @@ impl Connection {
         }
     }
 
+    /// Makes another link in place of the one of this number.
     fn replace(&self, number: u64) {
         let mut link = self.lock();
         if link.0 == number
@@ -185,12 +186,18 @@ impl Connection {
 
     /// Asks the store whether it is there; with this write, where it may not take any.
     pub(super) async fn probe(&self, write: Call<'_>) {
+        let (number, _) = *self.lock();
         let is_doubtful = self.is_doubtful.swap(false, Ordering::AcqRel);
-        if is_doubtful || !self.is_ready() {
-            let is_refused = self.attempt(write).await.is_err();
-            self.refuses.store(is_refused, Ordering::Release);
-        } else {
-            let _ = self.attempt(Call::Ping).await;
+        let is_write = is_doubtful || !self.is_ready();
+        let probed = self
+            .attempt(if is_write { write } else { Call::Ping })
+            .await;
+        if is_write {
+            self.refuses.store(probed.is_err(), Ordering::Release);
+        }
+        if probed.is_err() {
+            // A link that was refused while it was made, as with a wrong password, is not made anew by itself.
+            self.replace(number);
         }
     }
 }
