@@ -29,6 +29,7 @@ const FIRST_PAUSE = 200;
 const LONGEST_PAUSE = 5000;
 /** Close codes from here on are this and an HTTP status: the service closed the stream for good. */
 const OF_STATUS = 4000;
+const UNAUTHORIZED = 401;
 /** As browsers call a line that broke. */
 const ABNORMAL = 1006;
 
@@ -152,6 +153,8 @@ export class FrameStream {
   /** @param {Problem} problem */
   refused(problem) {
     this.lastProblem = problem;
+    // The frame is not what is refused: the service closes the stream.
+    if (problem.status === UNAUTHORIZED) return;
     if (problem.isGone) return this.gone(problem);
     if (this.outOfOrder > 0) {
       this.outOfOrder -= 1;
@@ -253,8 +256,15 @@ export class FrameStream {
       // Not every platform closes a socket that could not be opened.
       socket.onerror = () => down(ABNORMAL);
     } catch (error) {
-      this.end(/** @type {Error} */ (error));
+      const isTemporary = error instanceof Problem && error.isTemporary && !this.isLate;
+      if (isTemporary) this.closed(ABNORMAL);
+      else this.refusedFor(/** @type {Error} */ (error));
     }
+  }
+
+  /** Whether the line has been broken for so long that it is not opened again. */
+  get isLate() {
+    return Date.now() - this.downSince > this.patience;
   }
 
   /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
@@ -273,7 +283,9 @@ export class FrameStream {
    */
   async closed(code) {
     if (this.isEnded) return;
-    if (code > OF_STATUS) return this.refusedFor(this.reason(code - OF_STATUS));
+    // A token has ended. The key gives another one, unless it has ended, too: the call below tells.
+    const isFinal = code > OF_STATUS && code !== OF_STATUS + UNAUTHORIZED;
+    if (isFinal) return this.refusedFor(this.reason(code - OF_STATUS));
     this.breakLine();
     await pause(this.wait);
     if (this.isEnded) return;
@@ -282,11 +294,10 @@ export class FrameStream {
     const { transport } = this.session.client;
     const url = transport.at(`sessions/${this.session.id}`);
     const seen = await transport.attempt("GET", url, {}).then((response) => response.json()).catch((error) => error);
-    const isLate = Date.now() - this.downSince > this.patience;
     if (this.isEnded) return;
     if (seen instanceof Error) {
       const isTemporary = seen instanceof Problem && seen.isTemporary;
-      return isTemporary && !isLate ? this.closed(code) : this.refusedFor(seen);
+      return isTemporary && !this.isLate ? this.closed(code) : this.refusedFor(seen);
     }
     this.resendFrom(seen.frames);
     await this.connect();

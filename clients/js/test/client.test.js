@@ -182,6 +182,36 @@ test("keys and session tokens", async () => {
   }
 });
 
+test("a stream takes another token when its own ends, and ends with its key", async () => {
+  const key = "0123456789abcdef";
+  const closed = await startService([], { BAGTRACK_API_KEYS: `page:${key}` });
+  try {
+    const client = new Client(closed.url, { key });
+    const session = await client.open(clip.frames[0], clip.box, options);
+    const make = session.token.bind(session);
+    let made = 0;
+    session.token = () => {
+      made += 1;
+      return make(1);
+    };
+    const stream = session.stream();
+    const answers = [];
+    while (made < 3) {
+      answers.push(await stream.track(clip.frames[answers.length + 1]));
+      await new Promise((resolve) => setTimeout(resolve, 50));
+    }
+    sameAsTheLibrary(answers);
+    client.transport.key = await make(1);
+    const refused = (async () => {
+      for (;;) await stream.track(clip.frames[answers.length + 1]);
+    })();
+    await assert.rejects(refused, problem("unauthorized"));
+    assert.equal(/** @type {any} */ (await stream.ended).slug, "unauthorized");
+  } finally {
+    await closed.stop();
+  }
+});
+
 test("a session leaves a service that is about to end", async () => {
   const secret = { BAGTRACK_SNAPSHOT_KEYS: "a secret of this test" };
   const [first, second] = await Promise.all([startService([], secret), startService([], secret)]);

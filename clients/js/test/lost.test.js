@@ -114,6 +114,22 @@ test("a stream goes on from the last snapshot with frames on their way", async (
   }
 });
 
+test("a stream that is begun after the service was killed goes on, also with a key", async () => {
+  const key = "0123456789abcdef";
+  const service = await startMortal({ ...SECRET, BAGTRACK_API_KEYS: `page:${key}` });
+  try {
+    const session = await new Client(service.url, { key }).open(clip.frames[0], clip.box, { seed: SEED });
+    const answers = [await session.track(clip.frames[1])];
+    await service.restart();
+    const stream = session.stream();
+    answers.push(...(await Promise.all(clip.frames.slice(2, 12).map((frame) => stream.track(frame)))));
+    sameAsTheLibrary(answers);
+    stream.close();
+  } finally {
+    await service.stop();
+  }
+});
+
 test("a live stream goes on with the newest frame", async () => {
   const service = await startMortal(SECRET);
   try {

@@ -112,6 +112,8 @@ export declare class FrameStream {
      * @param {Problem} problem What told that the service has lost it. */
     reopen(problem: Problem): Promise<void>;
     connect(): Promise<void>;
+    /** Whether the line has been broken for so long that it is not opened again. */
+    get isLate(): boolean;
     /** A socket cannot send the key. It takes a token, as which a key that is a token itself will do. */
     token(): Promise<string>;
     /**
