@@ -159,11 +159,6 @@ impl Problem {
         self
     }
 
-    /// The same of another kind.
-    pub(in crate::http) fn with_kind(self, kind: Kind) -> Self {
-        Self { kind, ..self }
-    }
-
     pub(super) fn expecting_frame(mut self, number: u64) -> Self {
         self.expected_frame = Some(number);
         self

@@ -6,7 +6,6 @@ use crate::http::state::AppState;
 use axum::extract::State;
 use bagtrack_api::Health;
 use bagtrack_api::ProblemKind as Kind;
-use bagtrack_sessions::StoreUnavailable;
 
 fn health(status: &str) -> Json<Health> {
     let status = status.to_owned();
@@ -42,7 +41,9 @@ pub async fn ready(State(state): State<AppState>) -> Result<Json<Health>, Proble
     }
     let store = state.service.store.as_ref();
     if store.is_some_and(|store| !store.is_ready()) {
-        return Err(Problem::from(StoreUnavailable::default()).with_kind(Kind::NotReady));
+        let detail =
+            "The store of the sessions gives no answer, or takes no writes. The log says why.";
+        return Err(Problem::new(Kind::NotReady, detail));
     }
     check_room(&state)?;
     match store.is_some_and(|store| store.is_full()) {
