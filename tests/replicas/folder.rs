@@ -195,6 +195,42 @@ fn journal_bytes(folder: &TempDir) -> u64 {
     lengths.max().unwrap()
 }
 
+/// An empty store was made in place of the one that was gone, and all sessions were told to be lost.
+#[tokio::test]
+async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
+    let clip = Clip::of(0, 12);
+    let (answers, _) = undisturbed(std::slice::from_ref(&clip)).await.remove(0);
+    let (folder, store) = folder();
+    let mut replica = Limited::start(&store);
+    let mut track = Track::open(replica.0.url(""), Client::new(), 0, clip.clone()).await;
+    while track.answers.len() < 5 {
+        track.advance().await;
+    }
+    // Its writes fail, as those of a disk that goes.
+    replica.limit(Some(0));
+    let url = replica
+        .0
+        .url(&format!("/sessions/{}/frames?frame=6", track.id()));
+    let post = Client::new().post(url).body(clip.frames[6].clone());
+    let refused = post.send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    let (sessions, elsewhere) = (folder.path().join("sessions"), folder.path().join("disk"));
+    std::fs::rename(&sessions, &elsewhere).unwrap();
+    replica.limit(None);
+    replica.0.logs("sessions cannot be opened");
+    assert!(!sessions.exists());
+    assert_eq!(replica.readiness().await, StatusCode::SERVICE_UNAVAILABLE);
+    // The mount point is there again, the disk is not.
+    std::fs::create_dir(&sessions).unwrap();
+    replica.0.logs("not there any more");
+    std::fs::remove_dir(&sessions).unwrap();
+    std::fs::rename(&elsewhere, &sessions).unwrap();
+    while replica.readiness().await != StatusCode::OK {}
+    while track.advance().await {}
+    assert!(!track.went_back());
+    assert_eq!(track.answers, answers);
+}
+
 #[tokio::test]
 async fn on_a_full_disk_frames_are_refused_and_nothing_is_lost() {
     let clip = Clip::of(0, 25);

@@ -172,6 +172,23 @@ impl Database {
         Ok(database)
     }
 
+    /// Opens the database of a folder that has one. A folder without is that of a disk which is not there: the sessions are
+    /// on the disk, and would be told to be lost.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub(super) fn open_again(folder: &Path) -> Result<Self, OpenError> {
+        let error = |source| OpenError::Io {
+            folder: folder.to_owned(),
+            source,
+        };
+        if journals(folder).map_err(error)?.is_empty() {
+            let gone = "the store's files are not there any more";
+            return Err(error(io::Error::new(io::ErrorKind::NotFound, gone)));
+        }
+        Self::open(folder)
+    }
+
     fn open_unguarded(folder: &Path) -> fjall::Result<Self> {
         let inner = SingleWriterTxDatabase::builder(folder)
             .manual_journal_persist(true)

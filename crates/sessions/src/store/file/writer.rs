@@ -90,6 +90,8 @@ pub(super) struct Writer {
     sweep_due: Instant,
     reopen_due: Instant,
     pause: Duration,
+    /// Why it could not be written the last time.
+    reason: String,
 }
 
 impl Writer {
@@ -119,6 +121,7 @@ impl Writer {
             sweep_due: begun,
             reopen_due: begun,
             pause: REOPEN.0,
+            reason: String::new(),
         })
     }
 
@@ -207,8 +210,9 @@ impl Writer {
 
     /// Closes the database, whose files could not be written.
     fn fail(&mut self, reason: &str) -> String {
-        if self.health.is_up.swap(false, Ordering::AcqRel) {
+        if self.health.is_up.swap(false, Ordering::AcqRel) || self.reason != reason {
             tracing::error!(reason, "the store cannot be written");
+            reason.clone_into(&mut self.reason);
         }
         self.database = None;
         self.sync_due = None;
@@ -268,7 +272,7 @@ impl Writer {
     }
 
     fn reopen(&mut self) {
-        let opened = Database::open(&self.folder).map_err(|error| error.to_string());
+        let opened = Database::open_again(&self.folder).map_err(|error| error.to_string());
         let probed = opened.and_then(|database| {
             let probed = database.probe().map_err(|error| error.to_string());
             probed.map(|()| database)
