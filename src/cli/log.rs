@@ -115,6 +115,9 @@ impl DroppedLines {
     }
 }
 
+/// Libraries that log each attempt to reach what is away, hundreds a second. The service says when it goes and comes back.
+const QUIET: &str = "redis=off";
+
 /// The filter of this text. A word alone must be a level: a mistyped one would be a module that logs nothing, and all
 /// others would log nothing either.
 fn read_filter(text: &str) -> Result<EnvFilter, String> {
@@ -126,7 +129,7 @@ fn read_filter(text: &str) -> Result<EnvFilter, String> {
              MODULE=LEVEL, as in `info,bagtrack=debug`"
         ));
     }
-    EnvFilter::try_new(text)
+    EnvFilter::try_new(format!("{QUIET},{text}"))
         .map_err(|error| format!("--log (BAGTRACK_LOG) cannot be read: {error}"))
 }
 

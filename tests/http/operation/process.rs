@@ -109,6 +109,20 @@ fn a_variable_that_is_no_setting_is_told_at_the_start() {
     assert_eq!(of("BAGTRACK_SERVICE") + of("BAGTRACK_PORT"), 0, "{told:?}");
 }
 
+/// It logged hundreds of lines a second, of each attempt to reach it.
+#[test]
+fn a_cluster_that_is_away_is_told_once() {
+    // It is asked for at the start, before the service listens.
+    let service = Program::start(&["--store", "redis-cluster://127.0.0.1:1"], &[]);
+    service.signal(Signal::TERM);
+    let told = service.said().to_vec();
+    let (_, rest) = service.ends();
+    let lines = || told.iter().chain(&rest);
+    let away = lines().filter(|line| line.contains("the store gives no answer"));
+    assert_eq!(away.count(), 1, "{told:?} {rest:?}");
+    assert_eq!(lines().find(|line| line.contains("redis::cluster")), None);
+}
+
 /// What a key that leaked has made must not outlive it.
 #[tokio::test]
 async fn a_replaced_key_ends_its_tokens_and_streams_though_its_name_stays() {

@@ -193,7 +193,10 @@ impl Connection {
             .attempt(if is_write { write } else { Call::Ping })
             .await;
         if is_write {
-            self.refuses.store(probed.is_err(), Ordering::Release);
+            let has_refused = self.refuses.swap(probed.is_err(), Ordering::AcqRel);
+            if has_refused && probed.is_ok() {
+                tracing::info!("the store takes writes again");
+            }
         }
         if probed.is_err() {
             // A link that was refused while it was made, as with a wrong password, is not made anew by itself.
