@@ -301,6 +301,54 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
     }
 }
 
+/// Where such a video is cut, its first packets are of pictures that are made from ones before the cut. They were counted.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
+    let parent = folder();
+    let [whole, cut] = ["whole.mkv", "cut.mkv"].map(|name| parent.path().join(name));
+    let ffmpeg = |arguments: &[&str]| {
+        let mut command = Command::new("ffmpeg");
+        let command = command.args(["-v", "error"]).args(arguments);
+        assert!(command.status().expect("ffmpeg starts").success());
+    };
+    let source = "color=size=96x64:rate=30:duration=2,geq=lum='20+3*N+25*mod(floor(X/8)+floor(Y/8)\\,2)':cb=128:cr=128";
+    let coded = "log-level=none:open-gop=1:keyint=15:min-keyint=15:bframes=4:b-adapt=0";
+    let coded = ["-c:v", "libx265", "-x265-params", coded, text(&whole)];
+    ffmpeg(&[&["-f", "lavfi", "-i", source], &coded[..]].concat());
+    ffmpeg(&["-ss", "0.8", "-i", text(&whole), "-c", "copy", text(&cut)]);
+    let track = |start: usize| {
+        let out = format!("{}/", text(&parent.path().join(start.to_string())));
+        let start_at = start.to_string();
+        let flags = ["--box=30,20,24,24", "--start", &start_at, "--format", "csv"];
+        let printed = succeeds(&[&["track", text(&cut)], &flags[..], &["--draw", &out]].concat());
+        let rows = rows(&printed).into_iter();
+        let times: Vec<f64> = rows.map(|row| row.time.expect("it has a time")).collect();
+        let first = image::open(Path::new(&out).join(format!("{start:06}.jpg")));
+        (times, first.expect("it was drawn").into_luma8())
+    };
+    let (times, _) = track(0);
+    assert!(times.len() > 30, "{times:?}");
+    for (index, pair) in times.windows(2).enumerate() {
+        assert!(
+            (pair[1] - pair[0] - 1.0 / 30.0).abs() < 2e-3,
+            "{index}: {times:?}"
+        );
+    }
+    for start in [1, 12] {
+        let (later, picture) = track(start);
+        assert_eq!(later, times[start..]);
+        let of_whole = parent.path().join(format!("0/{start:06}.jpg"));
+        let of_whole = image::open(of_whole).expect("it was drawn").into_luma8();
+        // Squares of the ground, away from the box: a frame is 3 gray levels lighter than the one before.
+        let gray = |picture: &image::GrayImage| f64::from(picture.get_pixel(68, 60).0[0]);
+        assert!((gray(&picture) - gray(&of_whole)).abs() < 1.7, "{start}");
+    }
+    let beyond = times.len().to_string();
+    let line = fails(&["track", text(&cut), "--box=30,20,24,24", "--start", &beyond]);
+    assert!(line.contains(&format!("it has {beyond} frames")), "{line}");
+}
+
 /// A browser's recording of a screen is like this: frames come when something changes.
 #[test]
 #[ignore = "needs ffmpeg"]

@@ -81,25 +81,26 @@ impl fmt::Display for Rate {
 impl VideoInfo {
     /// What ffprobe tells about the video at `path`; defaults where it cannot.
     pub fn read(path: &Path) -> Self {
-        let mut command = Command::new(FFPROBE);
-        command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
-        let entries = "format=format_name,start_time:stream=avg_frame_rate:packet=pts_time,flags";
-        command.args(["-show_entries", entries]).arg(path);
-        let told = command.output().map(|output| output.stdout);
-        Self::parse(&String::from_utf8_lossy(&told.unwrap_or_default()))
+        let (info, packets) = Self::parse(&ask(path, "packet=pts_time,flags"));
+        match are_frames(&packets) {
+            true => info,
+            // They have to be decoded.
+            false => Self::parse(&ask(path, "frame=pts_time")).0,
+        }
     }
 
-    /// Reads lines like `packet,0.040000,K__`, `stream,25/1` and `format,"mov,mp4",0.000000`.
-    fn parse(told: &str) -> Self {
+    /// Reads lines like `packet,0.040000,K__` or `frame,0.040000`, `stream,25/1` and `format,"mov,mp4",0.000000`. Gives the
+    /// times in the order of the lines, too.
+    fn parse(told: &str) -> (Self, Vec<Option<f64>>) {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
-        let mut times = Vec::new();
+        let mut told_times = Vec::new();
         let mut rate = None;
         let mut indexed_from = None;
         for line in told.lines().map(fields) {
             match line.iter().map(String::as_str).collect::<Vec<_>>()[..] {
                 // A packet that an edit list leaves out is decoded, but not shown.
                 ["packet", _, flags, ..] if flags.contains('D') => {}
-                ["packet", time, ..] => times.push(time.parse::<f64>()),
+                ["packet" | "frame", time, ..] => told_times.push(time.parse::<f64>().ok()),
                 ["stream", fraction, ..] => rate = Rate::parse(fraction),
                 ["format", name, .., start] if INDEXED.contains(&name.trim_matches('"')) => {
                     indexed_from = start.parse().ok();
@@ -107,16 +108,15 @@ impl VideoInfo {
                 _ => {}
             }
         }
-        let mut times: Vec<f64> = times
-            .into_iter()
-            .collect::<Result<_, _>>()
-            .unwrap_or_default();
+        let all: Option<Vec<f64>> = told_times.iter().copied().collect();
+        let mut times = all.unwrap_or_default();
         times.sort_by(f64::total_cmp);
-        Self {
+        let info = Self {
             rate: rate.unwrap_or_default(),
             times,
             indexed_from,
-        }
+        };
+        (info, told_times)
     }
 
     /// Within which seconds after its start time the file is to be decoded so that frame `index` is the first: between
@@ -156,6 +156,27 @@ impl VideoInfo {
     }
 }
 
+/// What ffprobe says of the video at `path`, and of each of its packets or frames.
+fn ask(path: &Path, each: &str) -> String {
+    let mut command = Command::new(FFPROBE);
+    command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
+    let entries = format!("format=format_name,start_time:stream=avg_frame_rate:{each}");
+    command.args(["-show_entries", &entries]).arg(path);
+    let told = command.output().map(|output| output.stdout);
+    String::from_utf8_lossy(&told.unwrap_or_default()).into_owned()
+}
+
+/// Whether packets with these times are the frames that are shown. Where a video was cut, the first packets may be of
+/// pictures before the first one, which cannot be made, and some may have no time. Where none has one, frames have none.
+fn are_frames(times: &[Option<f64>]) -> bool {
+    let Some(Some(first)) = times.first() else {
+        return times.iter().all(Option::is_none);
+    };
+    times
+        .iter()
+        .all(|time| time.is_some_and(|time| time >= *first))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,7 +185,8 @@ mod tests {
     fn times_are_in_the_order_of_showing_and_count_from_the_first() {
         // B-frames come before the frames that they are shown after; the first packet is cut off by an edit list.
         let told = "packet,0.9,KD_\npacket,1.0,K__\npacket,1.2,___\npacket,1.1,___\nstream,10/1\n";
-        let info = VideoInfo::parse(told);
+        let (info, packets) = VideoInfo::parse(told);
+        assert!(are_frames(&packets));
         assert_eq!(info.count(), Some(3));
         assert_eq!(
             [0, 1, 2, 5].map(|index| info.time(index)),
@@ -178,7 +200,7 @@ mod tests {
     fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
         let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,10/1\n";
         let seek_to = |format: &str| {
-            let info = VideoInfo::parse(&format!("{packets}{format}\n"));
+            let (info, _) = VideoInfo::parse(&format!("{packets}{format}\n"));
             let round = |time: f64| (time * 1e6).round() / 1e6;
             [0, 1, 2, 3].map(|index| {
                 let range = info.seek_to(index);
@@ -194,10 +216,12 @@ mod tests {
 
     #[test]
     fn without_times_the_rate_tells() {
-        let info = VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,30000/1001\n");
+        let (info, packets) =
+            VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,30000/1001\n");
+        assert!(!are_frames(&packets));
         assert_eq!((info.count(), info.time(30)), (None, 1.001));
         assert_eq!((info.frame_at(1.001), info.frame_at(1.0)), (30, 30));
-        assert_eq!(VideoInfo::parse("").time(50), 2.0);
+        assert_eq!(VideoInfo::parse("").0.time(50), 2.0);
     }
 
     #[test]
