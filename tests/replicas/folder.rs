@@ -219,7 +219,10 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     replica.limit(None);
     replica.0.logs("sessions cannot be opened");
     assert!(!sessions.exists());
-    assert_eq!(replica.readiness().await, StatusCode::SERVICE_UNAVAILABLE);
+    let answer = reqwest::get(replica.0.url("/readyz")).await.unwrap();
+    assert_eq!(answer.status(), StatusCode::SERVICE_UNAVAILABLE);
+    let told = answer.text().await.unwrap();
+    assert!(told.contains("The store of the sessions"), "{told}");
     // The mount point is there again, the disk is not.
     std::fs::create_dir(&sessions).unwrap();
     replica.0.logs("not there any more");
