@@ -8,7 +8,11 @@ use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 use tokio::sync::{Notify, oneshot};
+use tokio::time::timeout;
 use uuid::Uuid;
+
+/// No request works for so long.
+const LONG: Duration = Duration::from_secs(60);
 
 type Reply = Box<dyn Any + Send>;
 type Script = Arc<dyn Fn(&mut dyn Backend) -> Reply + Send + Sync>;
@@ -81,7 +85,8 @@ impl HostileStore {
     /// Waits until all requests wait for the store or have ended.
     pub async fn settles(&self) {
         while self.wire().busy > 0 {
-            self.idle.notified().await;
+            let idle = timeout(LONG, self.idle.notified()).await;
+            idle.unwrap_or_else(|_| panic!("{} requests neither wait nor end", self.wire().busy));
         }
     }
 
@@ -192,12 +197,7 @@ impl HostileStore {
                 wire.busy -= 1;
             }
             self.idle.notify_one();
-            let waiting = Waiting {
-                store: self,
-                answered: false,
-            };
-            let reply = reply.await;
-            waiting.answered();
+            let reply = Waiting { store: self, reply }.answer().await;
             let lost = StoreUnavailable("a test lost it".to_owned());
             let reply = reply.ok().flatten().ok_or(lost)?;
             Ok(*reply.downcast::<T>().expect("the reply to its own call"))
@@ -209,18 +209,21 @@ impl HostileStore {
 /// `Busy` takes back.
 struct Waiting<'a> {
     store: &'a HostileStore,
-    answered: bool,
+    reply: oneshot::Receiver<Option<Reply>>,
 }
 
 impl Waiting<'_> {
-    fn answered(mut self) {
-        self.answered = true;
+    async fn answer(mut self) -> Result<Option<Reply>, oneshot::error::RecvError> {
+        (&mut self.reply).await
     }
 }
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        if !self.answered {
+        // One whose reply has been delivered is busy since then, whether it has seen the reply or was given up before.
+        self.reply.close();
+        let is_delivered = self.reply.is_terminated() || self.reply.try_recv().is_ok();
+        if !is_delivered {
             self.store.wire().busy += 1;
         }
     }

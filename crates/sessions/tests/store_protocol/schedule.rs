@@ -299,12 +299,16 @@ fn cases(default: u32) -> ProptestConfig {
     }
 }
 
-/// Runs a schedule to its end.
-fn run(records: impl Backend + 'static, every: u64, has_rival: bool, schedule: Vec<u16>) {
+fn current_thread() -> tokio::runtime::Runtime {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
-    runtime.unwrap().block_on(async {
+    runtime.unwrap()
+}
+
+/// Runs a schedule to its end.
+fn run(records: impl Backend + 'static, every: u64, has_rival: bool, schedule: Vec<u16>) {
+    current_thread().block_on(async {
         let mut world = World::new(HostileStore::new(records), every, has_rival).await;
         for choice in schedule {
             world.step(choice).await;
@@ -335,4 +339,29 @@ proptest! {
     ) {
         run(InFolder::default(), every, has_rival, schedule);
     }
+}
+
+#[test]
+fn an_opening_whose_session_ends_is_given_up() {
+    current_thread().block_on(async {
+        let mut world = World::new(HostileStore::new(Records::default()), 1, false).await;
+        world.finish_asking(0, Asked::End).await;
+        // One replica is about to create the session, and another has created it and ends it.
+        world.ask(0, Asked::Open(1)).await;
+        world.store.run(0);
+        world.store.deliver(0, true);
+        world.store.settles().await;
+        for asked in [Asked::Open(1), Asked::End] {
+            world.ask(1, asked).await;
+            while world.store.calls() > 1 {
+                world.store.run(1);
+                world.store.deliver(0, true);
+                world.store.settles().await;
+            }
+            world.take_answers(true);
+        }
+        assert_eq!((world.ended, world.store.calls()), (2, 0));
+        world.give_openings_up().await;
+        world.finish().await;
+    });
 }
