@@ -141,10 +141,6 @@ impl ScriptServer for Server {
         };
         Box::pin(async { Ok(Value::Array(answer)) })
     }
-
-    fn ping(&self) -> RedisFuture<'_, Value> {
-        Box::pin(async { Ok(Value::Okay) })
-    }
 }
 
 impl Shelf {

@@ -140,17 +140,6 @@ impl ScriptServer for Line {
             args,
         }))
     }
-
-    fn ping(&self) -> RedisFuture<'_, Value> {
-        Box::pin(async {
-            let (_, slow_by, epoch) = self.server.state();
-            sleep(self.latency() + slow_by).await;
-            match self.server.state() {
-                (true, _, after) if after == epoch => Ok(Value::SimpleString("PONG".to_owned())),
-                _ => Err(broken()),
-            }
-        })
-    }
 }
 
 /// The first number of an answer, which tells its kind.

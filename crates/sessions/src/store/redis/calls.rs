@@ -5,7 +5,7 @@ use super::super::session_store::{
     Commit, Counted, Outcome, SessionStore, StoreFuture, StoreShare, StoreUnavailable,
 };
 use super::address::{Kind, RedisAddress};
-use super::connection::{Call, Connection};
+use super::connection::Connection;
 use super::script::{NewHash, Script, ScriptCall, ScriptServer};
 use super::scripts::Scripts;
 use crate::clock::{Clock, sleep};
@@ -44,7 +44,7 @@ struct Shared {
     scripts: Scripts,
     prefix: String,
     clock: Clock,
-    /// Whether it refused the last new session for want of room.
+    /// Whether it has no room for new sessions.
     is_full: AtomicBool,
     /// Until when, by the clock, clients are refused without looking for room again.
     refused: Mutex<HashMap<String, Duration>>,
@@ -59,7 +59,9 @@ impl Shared {
     async fn probe(&self) {
         let key = format!("{}:probe", self.prefix);
         let write = self.scripts.probe.key(key);
-        self.connection.probe(Call::Script(write)).await;
+        if let Ok(is_full) = self.connection.probe(write).await {
+            self.is_full.store(is_full, Ordering::Relaxed);
+        }
     }
 }
 
@@ -151,7 +153,7 @@ impl RedisStore {
     }
 
     async fn about_record(&self, script: ScriptCall<'_>) -> Result<Outcome, StoreUnavailable> {
-        let Answer(outcome) = self.0.connection.call(Call::Script(script)).await?;
+        let Answer(outcome) = self.0.connection.call(script).await?;
         Ok(outcome)
     }
 
@@ -188,7 +190,7 @@ impl RedisStore {
         script.arg(member).arg(self.now());
         script.arg(share.max_places).arg(share.max_bytes);
         script.arg(milliseconds(COUNTED)).arg(LOOKED_AT);
-        let answer: (i64, Vec<String>) = self.0.connection.call(Call::Script(script)).await?;
+        let answer: (i64, Vec<String>) = self.0.connection.call(script).await?;
         Ok((answer.0 == 0).then_some(answer.1))
     }
 
@@ -223,14 +225,14 @@ impl RedisStore {
             };
             let mut lives = self.0.scripts.lives.key(self.key(id));
             lives.arg(incarnation);
-            let lives: bool = self.0.connection.call(Call::Script(lives)).await?;
+            let lives: bool = self.0.connection.call(lives).await?;
             let mut script = self
                 .0
                 .scripts
                 .recount
                 .key(self.key_of_client(&share.client));
             script.arg(&member).arg(if lives { self.now() } else { 0 });
-            let _: i64 = self.0.connection.call(Call::Script(script)).await?;
+            let _: i64 = self.0.connection.call(script).await?;
         }
         Ok(())
     }
@@ -345,7 +347,7 @@ impl SessionStore for RedisStore {
         let mut script = self.on(&self.0.scripts.end, name);
         script.arg(name.incarnation).arg(milliseconds(ttl));
         Box::pin(async move {
-            let ended = self.0.connection.call(Call::Script(script)).await?;
+            let ended = self.0.connection.call(script).await?;
             // Its client has room again; who that is, is not known here.
             self.0.refused().clear();
             Ok(ended)
@@ -357,7 +359,7 @@ impl SessionStore for RedisStore {
         let mut script = self.0.scripts.secret.key(key);
         script.arg(&new[..]).arg(milliseconds(SECRET));
         Box::pin(async move {
-            let secret: Vec<u8> = self.0.connection.call(Call::Script(script)).await?;
+            let secret: Vec<u8> = self.0.connection.call(script).await?;
             let secret = <[u8; 32]>::try_from(secret);
             secret.map_err(|_| StoreUnavailable("its secret is damaged".to_owned()))
         })

@@ -15,25 +15,6 @@ use std::time::Duration;
 /// Between two attempts of one call.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// What is sent to the store. It can be sent again.
-pub(super) enum Call<'a> {
-    Script(ScriptCall<'a>),
-    Ping,
-}
-
-impl Call<'_> {
-    async fn send(&self, link: &mut Link) -> RedisResult<Value> {
-        match (self, link) {
-            (Self::Script(script), Link::Server(link)) => script.invoke(link).await,
-            (Self::Script(script), Link::Cluster(link)) => script.invoke(link).await,
-            (Self::Script(script), Link::Given(server)) => script.run_at(server.as_ref()).await,
-            (Self::Ping, Link::Server(link)) => redis::cmd("PING").query_async(link).await,
-            (Self::Ping, Link::Cluster(link)) => redis::cmd("PING").query_async(link).await,
-            (Self::Ping, Link::Given(server)) => server.ping().await,
-        }
-    }
-}
-
 /// A connection that finds its way back by itself. Clones share it.
 #[derive(Clone)]
 pub(super) enum Link {
@@ -51,12 +32,18 @@ pub(super) struct Connection {
     is_up: AtomicBool,
     /// Whether the store refused the last write of a probe.
     refuses: AtomicBool,
-    /// Whether the next probe is a write: at the start, and after a call was refused.
-    is_doubtful: AtomicBool,
     failures: AtomicU64,
 }
 
 impl Link {
+    async fn send(&mut self, script: &ScriptCall<'_>) -> RedisResult<Value> {
+        match self {
+            Self::Server(link) => script.invoke(link).await,
+            Self::Cluster(link) => script.invoke(link).await,
+            Self::Given(server) => script.run_at(server.as_ref()).await,
+        }
+    }
+
     fn new(address: &RedisAddress, timeout: Duration) -> RedisResult<Self> {
         match &address.0 {
             Kind::Server(client) => {
@@ -88,7 +75,6 @@ impl Connection {
             link: Mutex::new((0, link)),
             is_up: AtomicBool::new(true),
             refuses: AtomicBool::new(false),
-            is_doubtful: AtomicBool::new(true),
             failures: AtomicU64::new(0),
         })
     }
@@ -115,22 +101,22 @@ impl Connection {
     /// There is no answer.
     pub(super) async fn call<T: FromRedisValue>(
         &self,
-        call: Call<'_>,
+        script: ScriptCall<'_>,
     ) -> Result<T, StoreUnavailable> {
         if !self.is_up() {
             self.failures.fetch_add(1, Ordering::Relaxed);
             return Err(StoreUnavailable("it did not answer lately".to_owned()));
         }
-        let value = self.attempt(call).await?;
+        let value = self.attempt(&script).await?;
         T::from_redis_value(value).map_err(|error| StoreUnavailable(error.to_string()))
     }
 
-    async fn attempt(&self, call: Call<'_>) -> Result<Value, StoreUnavailable> {
+    async fn attempt(&self, script: &ScriptCall<'_>) -> Result<Value, StoreUnavailable> {
         let deadline = clock::now() + self.timeout;
         let mut reason: Option<RedisError> = None;
         while clock::now() < deadline {
             let (number, mut link) = self.lock().clone();
-            match timeout_at(deadline, call.send(&mut link)).await {
+            match timeout_at(deadline, link.send(script)).await {
                 Ok(Ok(value)) => {
                     self.answers();
                     return Ok(value);
@@ -138,7 +124,6 @@ impl Connection {
                 // It answers, but will not do this, however often it is asked.
                 Ok(Err(error)) if is_refusal(&error) => {
                     self.answers();
-                    self.is_doubtful.store(true, Ordering::Release);
                     self.failures.fetch_add(1, Ordering::Relaxed);
                     if !self.refuses.load(Ordering::Acquire) {
                         tracing::error!(%error, "the store refuses a call");
@@ -184,24 +169,25 @@ impl Connection {
         self.link.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks the store whether it is there; with this write, where it may not take any.
-    pub(super) async fn probe(&self, write: Call<'_>) {
+    /// Asks the store whether it is there and takes this write.
+    ///
+    /// # Errors
+    /// It does not.
+    pub(super) async fn probe<T: FromRedisValue>(
+        &self,
+        write: ScriptCall<'_>,
+    ) -> Result<T, StoreUnavailable> {
         let (number, _) = *self.lock();
-        let is_doubtful = self.is_doubtful.swap(false, Ordering::AcqRel);
-        let is_write = is_doubtful || !self.is_ready();
-        let probed = self
-            .attempt(if is_write { write } else { Call::Ping })
-            .await;
-        if is_write {
-            let has_refused = self.refuses.swap(probed.is_err(), Ordering::AcqRel);
-            if has_refused && probed.is_ok() {
-                tracing::info!("the store takes writes again");
-            }
+        let probed = self.attempt(&write).await;
+        let has_refused = self.refuses.swap(probed.is_err(), Ordering::AcqRel);
+        if has_refused && probed.is_ok() {
+            tracing::info!("the store takes writes again");
         }
         if probed.is_err() {
             // A link that was refused while it was made, as with a wrong password, is not made anew by itself.
             self.replace(number);
         }
+        T::from_redis_value(probed?).map_err(|error| StoreUnavailable(error.to_string()))
     }
 }
 

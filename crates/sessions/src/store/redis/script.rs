@@ -31,12 +31,6 @@ pub trait ScriptServer: fmt::Debug + Send + Sync {
         keys: &'a [String],
         args: &'a [Vec<u8>],
     ) -> RedisFuture<'a, Value>;
-
-    /// Answers, where the server is there.
-    ///
-    /// # Errors
-    /// There is no answer.
-    fn ping(&self) -> RedisFuture<'_, Value>;
 }
 
 /// A script.

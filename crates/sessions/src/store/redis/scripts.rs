@@ -157,11 +157,11 @@ const LIVES: &str = r"
 return redis.call('HGET', KEYS[1], 'incarnation') == ARGV[1]
 ";
 
-/// Whether the store takes writes.
+/// Whether the store takes writes. Answers whether it has no room for new sessions.
 const PROBE: &str = r"
 redis.call('HSET', KEYS[1], 'token', '')
 redis.call('PEXPIRE', KEYS[1], 1000)
-return 1
+return nearly_full() and 1 or 0
 ";
 
 pub(super) struct Scripts {
@@ -188,7 +188,7 @@ impl Scripts {
             fence: telling(FENCE),
             secret: Script::new(SECRET),
             end: Script::new(END),
-            probe: Script::new(PROBE),
+            probe: Script::new(&format!("{NEARLY_FULL}{PROBE}")),
             admit: Script::new(ADMIT),
             recount: Script::new(RECOUNT),
             lives: Script::new(LIVES),
