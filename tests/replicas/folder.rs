@@ -15,6 +15,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A folder, and the setting that names it.
@@ -227,6 +228,36 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     std::fs::create_dir(&sessions).unwrap();
     replica.0.logs("not there any more");
     std::fs::remove_dir(&sessions).unwrap();
+    std::fs::rename(&elsewhere, &sessions).unwrap();
+    while replica.readiness().await != StatusCode::OK {}
+    while track.advance().await {}
+    assert!(!track.went_back());
+    assert_eq!(track.answers, answers);
+}
+
+/// The frames that came after it were answered 200, and were gone with it.
+#[tokio::test]
+async fn a_folder_that_is_removed_takes_no_frames() {
+    let clip = Clip::of(0, 12);
+    let (answers, _) = undisturbed(std::slice::from_ref(&clip)).await.remove(0);
+    let (folder, store) = folder();
+    let replica = Replica::with_store(&store, &[]);
+    let mut track = Track::open(replica.url(""), Client::new(), 0, clip.clone()).await;
+    while track.answers.len() < 5 {
+        track.advance().await;
+    }
+    let (sessions, elsewhere) = (
+        folder.path().join("sessions"),
+        folder.path().join("removed"),
+    );
+    std::fs::rename(&sessions, &elsewhere).unwrap();
+    let told = async { while replica.readiness().await == StatusCode::OK {} };
+    let told = tokio::time::timeout(Duration::from_secs(60), told).await;
+    told.expect("it is told that the files have gone");
+    let url = replica.url(&format!("/sessions/{}/frames?frame=6", track.id()));
+    let post = Client::new().post(url).body(clip.frames[6].clone());
+    let refused = post.send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
     std::fs::rename(&elsewhere, &sessions).unwrap();
     while replica.readiness().await != StatusCode::OK {}
     while track.advance().await {}

@@ -32,6 +32,9 @@ const SWEPT_ROWS: usize = 1024;
 /// Of an entry without a state in memory, with what the map has beside it.
 pub(super) const ENTRY_BYTES: u64 = 128;
 
+/// Why a database cannot be used that was removed, or is on a disk that is not there.
+pub(super) const GONE: &str = "the store's files are not there any more";
+
 /// A key that is no session's id.
 const NO_SESSION: [u8; 1] = [0];
 
@@ -183,8 +186,7 @@ impl Database {
             source,
         };
         if journals(folder).map_err(error)?.is_empty() {
-            let gone = "the store's files are not there any more";
-            return Err(error(io::Error::new(io::ErrorKind::NotFound, gone)));
+            return Err(error(io::Error::new(io::ErrorKind::NotFound, GONE)));
         }
         Self::open(folder)
     }
@@ -214,6 +216,12 @@ impl Database {
             written_bytes: MEMTABLE_BYTES,
             dropped_bytes: 0,
         })
+    }
+
+    /// Whether its files can still be found in the folder. The system goes on writing those that were removed, which
+    /// nobody can open again.
+    pub(super) fn is_there(&self) -> bool {
+        journal_paths(&self.folder).is_ok_and(|paths| !paths.is_empty())
     }
 
     /// Whether the disk is nearly full. One that does not say counts as empty.
@@ -433,15 +441,21 @@ fn make_folder(folder: &Path) -> io::Result<()> {
 
 /// The journals in a folder, and how long each is without the zeros at its end.
 fn journals(folder: &Path) -> io::Result<Vec<(PathBuf, u64)>> {
-    let mut journals = Vec::new();
-    for entry in folder.read_dir()? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|extension| extension == "jnl") {
-            let length = written_length(&mut File::open(&path)?)?;
-            journals.push((path, length));
-        }
-    }
-    Ok(journals)
+    let with_length = |path: PathBuf| {
+        let length = written_length(&mut File::open(&path)?)?;
+        Ok((path, length))
+    };
+    journal_paths(folder)?
+        .into_iter()
+        .map(with_length)
+        .collect()
+}
+
+fn journal_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries: io::Result<Vec<_>> = folder.read_dir()?.collect();
+    let paths = entries?.into_iter().map(|entry| entry.path());
+    let is_journal = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "jnl");
+    Ok(paths.filter(is_journal).collect())
 }
 
 /// The length of a file without the zeros at its end.

@@ -1,6 +1,6 @@
 //! The thread that does all calls, in groups that are written together.
 
-use super::database::{Database, OpenError, Transaction};
+use super::database::{Database, GONE, OpenError, Transaction};
 use super::durability::Durability;
 use super::rules::Fault;
 use super::time::{Noted, Time};
@@ -246,6 +246,10 @@ impl Writer {
             self.health.is_late.store(false, Ordering::Release);
         }
         if begun >= self.sweep_due {
+            if !database.is_there() {
+                self.fail(GONE);
+                return;
+            }
             let is_full = database.is_nearly_full();
             self.health.is_full.store(is_full, Ordering::Relaxed);
             let time = self.time.now();
