@@ -5,6 +5,7 @@
 use super::token::PREFIX;
 use bagtrack_config::Secret;
 use bagtrack_sessions::Owner;
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -37,6 +38,12 @@ pub enum KeysError {
     /// The file has no key: nobody could use the service.
     #[error("{0} (--api-keys-file, BAGTRACK_API_KEYS_FILE) has no key")]
     Empty(PathBuf),
+    /// One key is two clients'.
+    #[error(
+        "the clients {0} and {1} have the same API key (--api-keys, --api-keys-file): each needs a key of its own, which \
+         tells whose a session is"
+    )]
+    Shared(String, String),
 }
 
 #[derive(Debug, Clone)]
@@ -97,6 +104,7 @@ impl ApiKeys {
             }
             keys.extend(read);
         }
+        check_owners(&keys)?;
         let count = keys.len();
         let current = self.0.current.write();
         *current.unwrap_or_else(PoisonError::into_inner) = keys.into();
@@ -144,6 +152,19 @@ pub(super) fn read_regular(path: &Path) -> io::Result<String> {
             "it is no regular file",
         )),
     }
+}
+
+/// Refuses a key that two owners have.
+fn check_owners(keys: &[ApiKey]) -> Result<(), KeysError> {
+    let mut owners = HashMap::new();
+    for key in keys {
+        let owner = *owners.entry(key.digest).or_insert(&key.owner);
+        if *owner != key.owner {
+            let name = |owner: &Owner| owner.name().unwrap_or_default().to_owned();
+            return Err(KeysError::Shared(name(owner), name(&key.owner)));
+        }
+    }
+    Ok(())
 }
 
 /// The keys of entries `name:key`.

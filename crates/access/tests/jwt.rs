@@ -252,6 +252,11 @@ async fn the_header_of_a_token_does_not_choose_how_it_is_checked() {
         let is_told = matches!(refused, TokenError::Algorithm(_) | TokenError::UnknownKey);
         assert!(is_told, "{algorithm}: {refused}");
     }
+    for critical in [json!(["urn:example:once"]), json!([])] {
+        let header = json!({ "alg": "ES384", "kid": "r", "crit": critical });
+        let token = key.sign_as(&header, &claims(json!({})));
+        assert_eq!(name_in(&verifier, &token).await, Err(TokenError::Critical));
+    }
 }
 
 #[tokio::test]

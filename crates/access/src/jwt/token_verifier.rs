@@ -53,6 +53,9 @@ pub enum TokenError {
     /// Its algorithm is none of a public key.
     #[error("the token is signed with {0:?}, not with the issuer's key")]
     Algorithm(Algorithm),
+    /// Its header says that what this service does not know has to be understood (RFC 7515, section 4.1.11).
+    #[error("the token's header has critical parameters (`crit`), and this service knows none")]
+    Critical,
     /// Nobody knows the key that it names.
     #[error("the issuer has no key of the name and algorithm that the token says")]
     UnknownKey,
@@ -264,6 +267,9 @@ impl TokenVerifier {
         use Algorithm::{HS256, HS384, HS512};
         if matches!(header.alg, HS256 | HS384 | HS512) {
             return Err(TokenError::Algorithm(header.alg));
+        }
+        if header.crit.is_some() {
+            return Err(TokenError::Critical);
         }
         let key = keys.find(header.kid.as_deref(), header.alg);
         let key = key.ok_or(TokenError::UnknownKey)?;
