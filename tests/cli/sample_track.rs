@@ -281,6 +281,8 @@ fn track_says_in_one_line_what_is_wrong() {
         line.contains("there is no such parameter") && line.contains("alpha"),
         "{line}"
     );
+    #[cfg(unix)]
+    assert!(fails(&["track", "/dev/null"]).contains("save the video to a file first"));
     let line = fails(&["track", text(&dir), "--set", "alpha=much"]);
     assert!(line.contains("--set alpha"), "{line}");
     let line = fails(&["track", text(&dir), "--set", "alpha=2"]);

@@ -61,9 +61,15 @@ enum Pictures {
 impl Frames {
     /// The frames of a folder or a video, from `start` on.
     pub fn open(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
-        match path.is_file() {
-            true => Self::of_video(path, start, direction),
-            false => Self::of_folder(path, start, direction),
+        let file = path.metadata();
+        let file = file.map_err(|error| format!("{}: {error}", path.display()))?;
+        if file.is_dir() {
+            Self::of_folder(path, start, direction)
+        } else if file.is_file() {
+            Self::of_video(path, start, direction)
+        } else {
+            let text = "it is a pipe or a device: save the video to a file first";
+            Err(format!("{}: {text}", path.display()).into())
         }
     }
 

@@ -36,7 +36,9 @@ pub fn decode(text: &str) -> Result<Bytes, Problem> {
     } else {
         BASE64.decode(encoded)
     };
-    decoded
-        .map(Bytes::from)
-        .map_err(|error| Problem::malformed(format!("A file is not base64: {error}.")))
+    decoded.map(Bytes::from).map_err(|error| {
+        let error = error.to_string();
+        let reason = error.trim_end_matches('.');
+        Problem::malformed(format!("A file is not base64: {reason}."))
+    })
 }

@@ -189,7 +189,8 @@ fn names(settings: &TrackSettings, targets: usize) -> Result<Vec<String>, Proble
     let given = settings.names.iter().flat_map(|names| &names.0);
     let mut names: Vec<String> = given.map(|name| name.0.clone()).collect();
     if names.len() > targets {
-        let detail = format!("`names` has {} names, for {targets} boxes.", names.len());
+        let boxes = if targets == 1 { "box" } else { "boxes" };
+        let detail = format!("`names` has {} names, for {targets} {boxes}.", names.len());
         return Err(Problem::malformed(detail));
     }
     names.extend((names.len()..targets).map(|target| format!("Object {}", target + 1)));

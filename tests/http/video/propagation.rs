@@ -315,7 +315,7 @@ async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() 
         ),
         (
             &[one, ("format", "cvat"), ("names", "van,rider")],
-            "2 names, for 1 boxes",
+            "2 names, for 1 box.",
         ),
         (
             &[one, ("format", "cvat"), ("names", "van\u{1}")],
