@@ -196,6 +196,15 @@ fn journal_bytes(folder: &TempDir) -> u64 {
     lengths.max().unwrap()
 }
 
+/// The next frame is answered 503.
+async fn refuses_frame(sessions: &str, track: &Track, clip: &Clip) {
+    let number = track.answers.len() + 1;
+    let url = format!("{sessions}/{}/frames?frame={number}", track.id());
+    let post = Client::new().post(url).body(clip.frames[number].clone());
+    let refused = post.send().await.unwrap();
+    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+}
+
 /// An empty store was made in place of the one that was gone, and all sessions were told to be lost.
 #[tokio::test]
 async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
@@ -209,12 +218,7 @@ async fn a_folder_whose_disk_has_gone_is_not_made_anew() {
     }
     // Its writes fail, as those of a disk that goes.
     replica.limit(Some(0));
-    let url = replica
-        .0
-        .url(&format!("/sessions/{}/frames?frame=6", track.id()));
-    let post = Client::new().post(url).body(clip.frames[6].clone());
-    let refused = post.send().await.unwrap();
-    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    refuses_frame(&replica.0.url("/sessions"), &track, &clip).await;
     let (sessions, elsewhere) = (folder.path().join("sessions"), folder.path().join("disk"));
     std::fs::rename(&sessions, &elsewhere).unwrap();
     replica.limit(None);
@@ -254,10 +258,7 @@ async fn a_folder_that_is_removed_takes_no_frames() {
     let told = async { while replica.readiness().await == StatusCode::OK {} };
     let told = tokio::time::timeout(Duration::from_secs(60), told).await;
     told.expect("it is told that the files have gone");
-    let url = replica.url(&format!("/sessions/{}/frames?frame=6", track.id()));
-    let post = Client::new().post(url).body(clip.frames[6].clone());
-    let refused = post.send().await.unwrap();
-    assert_eq!(refused.status(), StatusCode::SERVICE_UNAVAILABLE);
+    refuses_frame(&replica.url("/sessions"), &track, &clip).await;
     std::fs::rename(&elsewhere, &sessions).unwrap();
     while replica.readiness().await != StatusCode::OK {}
     while track.advance().await {}

@@ -194,7 +194,7 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
     assert_eq!(owner(OTHER), Some(Owner::named("they")));
     assert_eq!((count("me"), count("you"), count("they")), (2, 0, 1));
 
-    // What cannot be read changes nothing, and a key tells one client.
+    // What is refused changes nothing. A key is one client's.
     let of_two = [format!("they:{OTHER}\nwe:{OTHER}"), format!("we:{KEY}")];
     for (text, expected) in [
         (&of_two[0][..], "they and we"),

@@ -219,9 +219,12 @@ impl Database {
     }
 
     /// Whether its files can still be found in the folder. The system goes on writing those that were removed, which
-    /// nobody can open again.
+    /// nobody can open again. A folder that cannot be looked into, as for want of descriptors, counts as there.
     pub(super) fn is_there(&self) -> bool {
-        journal_paths(&self.folder).is_ok_and(|paths| !paths.is_empty())
+        match journal_paths(&self.folder) {
+            Ok(paths) => !paths.is_empty(),
+            Err(error) => error.kind() != io::ErrorKind::NotFound,
+        }
     }
 
     /// Whether the disk is nearly full. One that does not say counts as empty.
