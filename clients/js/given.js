@@ -3,7 +3,7 @@
 import { Problem } from "./problem.js";
 
 /** @param {string} detail */
-const unsupported = (detail) => new Problem({ type: "unsupported-image", status: 415, detail });
+export const unsupported = (detail) => new Problem({ type: "unsupported-image", status: 415, detail });
 
 /** Refuses what is no image for a tracker here.
  * @param {unknown} image */

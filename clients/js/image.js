@@ -1,6 +1,7 @@
 // What a frame is given as, and its pixels.
 
-import { checkImage } from "./given.js";
+import { checkImage, unsupported } from "./given.js";
+import { Problem } from "./problem.js";
 
 /**
  * @typedef {object} Pixels RGBA row by row, as in `ImageData`; what is transparent counts as blended over black.
@@ -32,9 +33,11 @@ export async function pixelsOf(image) {
   checkImage(image);
   if ("luma" in image || "data" in image) return image;
   if (typeof OffscreenCanvas === "undefined")
-    throw new Error("Files and pictures are decoded by browsers: here give pixels { width, height, data }, or planes.");
+    throw unsupported("Files and pictures are decoded by browsers: here give pixels { width, height, data }, or planes.");
   if (!(image instanceof Blob)) return draw(image);
-  const bitmap = await createImageBitmap(image);
+  const bitmap = await createImageBitmap(image).catch(({ message }) => {
+    throw new Problem({ type: "frame-damaged", status: 422, detail: `The browser cannot decode the file: ${message}` });
+  });
   try {
     return draw(bitmap);
   } finally {

@@ -32,10 +32,10 @@ test("a session of another client, or of before `close`, moves none of those tha
   await Promise.all([client.close(), stranger.close()]);
 });
 
-test("what is no image is refused before it is sent, and ends no session", async () => {
+test("what is no image here is refused, and ends no session", async () => {
   const client = new LocalClient();
   const [session, other] = await Promise.all([client.open(image, box, options), client.open(image, box, options)]);
-  const wrong = /** @type {any[]} */ (["clip/0001.jpg", 5, true, null, undefined, () => image]);
+  const wrong = /** @type {any[]} */ (["clip/0001.jpg", 5, true, null, undefined, () => image, new Blob(["of browsers"])]);
   for (const frame of wrong) {
     await assert.rejects(session.track(frame), slug("unsupported-image"), String(frame));
     await assert.rejects(session.correct(frame, box), slug("unsupported-image"), String(frame));

@@ -1,3 +1,6 @@
+import { Problem } from "./problem.js";
+/** @param {string} detail */
+export declare const unsupported: (detail: string) => Problem;
 /** Refuses what is no image for a tracker here.
  * @param {unknown} image */
 export declare function checkImage(image: unknown): void;
