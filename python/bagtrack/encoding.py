@@ -15,9 +15,12 @@ Frame = Union[bytes, bytearray, memoryview, npt.NDArray[np.uint8]]
 
 
 def encode(frame: Frame, encoding: Encoding, quality: int) -> bytes:
-    """The bytes of `frame` as an image file. `ValueError` where it is no frame."""
+    """The bytes of `frame` as an image file. `TypeError` or `ValueError` where it is no frame."""
     if isinstance(frame, (bytes, bytearray, memoryview)):
         return bytes(frame)
+    if not isinstance(frame, np.ndarray):
+        name = type(frame).__name__
+        raise TypeError(f"a frame is a NumPy array, or the bytes of an image file (Path(...).read_bytes()), not {name}")
     if frame.dtype != np.uint8:
         raise ValueError(f"a frame has the dtype uint8, not {frame.dtype}")
     if frame.ndim == 3 and frame.shape[2] == 1:
