@@ -94,16 +94,15 @@ impl Code {
     }
 
     fn of_lengths(lengths: &[usize]) -> Option<Self> {
-        let of_length = |wanted: usize| {
-            let symbols = lengths.iter().zip(0u16..);
-            symbols.filter_map(move |(&length, symbol)| (length == wanted).then_some(symbol))
-        };
-        let mut counts = [0u16; MAX_LENGTH + 1];
-        lengths
+        let used = lengths
             .iter()
-            .filter(|&&length| length > 0)
-            .for_each(|&length| counts[length] += 1);
-        let symbols: Vec<u16> = (1..=MAX_LENGTH).flat_map(of_length).collect();
+            .zip(0u16..)
+            .filter(|(length, _)| **length > 0);
+        let mut used: Vec<(usize, u16)> = used.map(|(length, symbol)| (*length, symbol)).collect();
+        used.sort_unstable();
+        let mut counts = [0u16; MAX_LENGTH + 1];
+        used.iter().for_each(|(length, _)| counts[*length] += 1);
+        let symbols: Vec<u16> = used.into_iter().map(|(_, symbol)| symbol).collect();
         match symbols.len() {
             0 => return None,
             1 => counts = [0; MAX_LENGTH + 1],
@@ -136,11 +135,6 @@ impl Code {
             code <<= 1;
         }
         None
-    }
-
-    /// Whether there is a single symbol, which takes no bit.
-    pub(super) fn is_single(&self) -> bool {
-        self.symbols.len() == 1
     }
 
     /// Bytes that the decoder allocates for it, at most.

@@ -60,8 +60,8 @@ impl<'file> WebPFile<'file> {
     /// Walks the chunks.
     pub(super) fn read(bytes: &'file [u8], limits: &Limits) -> Result<Self, IngestError> {
         let chunks = WebP::read(bytes).map_err(|reason| Format::WebP.damaged(reason))?;
-        let mut decoder =
-            WebPDecoder::new(Cursor::new(bytes)).map_err(|error| typed(Format::WebP, error))?;
+        let mut decoder = WebPDecoder::new(Cursor::new(chunks.file))
+            .map_err(|error| typed(Format::WebP, error))?;
         let (width, height) = decoder.dimensions();
         if width == 0 || height == 0 {
             // image-webp keeps 14 bits of a lossless side, so that of 16,384 pixels, which is the longest, becomes 0.
@@ -88,10 +88,15 @@ impl<'file> WebPFile<'file> {
         format: FrameFormat,
     ) -> Result<StoredImage<'static>, IngestError> {
         let (width, height) = self.decoder.dimensions();
-        let codes = self.chunks.memory_of_codes((width, height));
-        let codes = codes.ok_or_else(|| Format::WebP.damaged("its codes cannot be read"))?;
         let beside = self.chunks.working_bytes_per_pixel() * u64::from(width) * u64::from(height);
-        limits.check_memory(memory(&self.decoder) + beside + codes)?;
+        let pixels = memory(&self.decoder) + beside;
+        limits.check_memory(pixels)?;
+        let codes = self
+            .chunks
+            .memory_of_codes((width, height), limits.max_memory - pixels);
+        let unread = "its codes cannot be read, or its images differ in size";
+        let codes = codes.ok_or_else(|| Format::WebP.damaged(unread))?;
+        limits.check_memory(pixels + codes)?;
         decode(self.decoder, Format::WebP, self.orientation, format)
     }
 }

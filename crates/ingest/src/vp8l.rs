@@ -19,29 +19,32 @@ const FIRST_LENGTH: u16 = 256;
 const FIRST_SEEN_COLOR: u16 = FIRST_LENGTH + 24;
 const SIGNATURE: usize = 0x2f;
 
-/// Bytes that the codes of the image in a `VP8L` chunk take. None, where they cannot be read.
-pub(super) fn memory_of_codes(data: &[u8]) -> Option<u64> {
+/// Bytes that the codes of the image in a `VP8L` chunk take: exactly, or more than `most`. None, where they cannot be read,
+/// or the image has another size: its own one is up to the sender, and so is the time to walk through it.
+pub(super) fn memory_of_codes(data: &[u8], size: (usize, usize), most: u64) -> Option<u64> {
     let mut bits = Bits::new(data);
     if bits.number(8)? != SIGNATURE {
         return None;
     }
-    let size = (1 + bits.number(14)?, 1 + bits.number(14)?);
+    if size != (1 + bits.number(14)?, 1 + bits.number(14)?) {
+        return None;
+    }
     // Whether alpha is used, and the version.
     bits.number(4)?;
-    walk(&mut bits, size)
+    walk(&mut bits, size, most)
 }
 
-/// Bytes that the codes of the alpha channel in an `ALPH` chunk take, for an image of this size.
-pub(super) fn memory_of_alpha_codes(data: &[u8], size: (usize, usize)) -> Option<u64> {
+/// The same of the alpha channel in an `ALPH` chunk, for an image of this size.
+pub(super) fn memory_of_alpha_codes(data: &[u8], size: (usize, usize), most: u64) -> Option<u64> {
     let (header, data) = data.split_first()?;
     match header & 3 {
-        1 => walk(&mut Bits::new(data), size),
+        1 => walk(&mut Bits::new(data), size, most),
         _ => Some(0),
     }
 }
 
-/// Walks through an image up to the last code of its pixels.
-fn walk(bits: &mut Bits, (mut width, height): (usize, usize)) -> Option<u64> {
+/// Walks through an image up to the last code of its pixels, or to the one that is beyond `most` bytes.
+fn walk(bits: &mut Bits, (mut width, height): (usize, usize), most: u64) -> Option<u64> {
     let mut seen = [false; 4];
     while bits.bit()? == 1 {
         let kind = bits.number(2)?;
@@ -79,6 +82,9 @@ fn walk(bits: &mut Bits, (mut width, height): (usize, usize)) -> Option<u64> {
     for _ in 0..groups {
         let codes = read_group(bits, seen_colors)?;
         memory += GROUP + codes.iter().map(Code::memory).sum::<u64>();
+        if memory > most {
+            break;
+        }
     }
     Some(memory)
 }
@@ -116,7 +122,6 @@ fn read_pixels(bits: &mut Bits, width: usize, height: usize) -> Option<usize> {
     let seen_colors = read_seen_colors(bits)?;
     let codes = read_group(bits, seen_colors)?;
     let (mut left, mut largest) = (width * height, 0);
-    let is_uniform = codes[..4].iter().all(Code::is_single);
     while left > 0 {
         let [green, red, blue, alpha, distance] = &codes;
         let symbol = green.symbol(bits)?;
@@ -126,7 +131,7 @@ fn read_pixels(bits: &mut Bits, width: usize, height: usize) -> Option<usize> {
                 blue.symbol(bits)?;
                 alpha.symbol(bits)?;
                 largest = largest.max(number);
-                if is_uniform { left } else { 1 }
+                1
             }
             FIRST_LENGTH..FIRST_SEEN_COLOR => {
                 let length = read_count(bits, usize::from(symbol - FIRST_LENGTH))?;

@@ -1,9 +1,12 @@
 //! Ingest of damaged and hostile bytes: an error that says what is wrong, never a panic, never a large bill.
 
+use crate::memory::{Bits, animation_frame, canvas, webp, webp_chunk};
 use bagtrack_ingest::{IngestError, Limits, decode, inspect};
 use bagtrack_testing::picture_files::{BASELINE, JpegForm, color, encode, jpeg};
 use image::{DynamicImage, ImageFormat};
 use proptest::prelude::*;
+use std::sync::mpsc;
+use std::time::Duration;
 
 const SMALL: Limits = Limits {
     max_bytes: 1 << 20,
@@ -270,6 +273,59 @@ fn a_webp_of_the_longest_sides_is_a_typed_error() {
             "{result:?}"
         );
     }
+}
+
+/// The codes of an image in which each symbol takes no bit, and stands for a pixel that is copied.
+fn write_empty_pixels(bits: &mut Bits) {
+    // No colours that were seen before. A code of lengths in which 18 (a run of zeros) and 1 have one bit each; three
+    // lengths follow: 138 and 118 zeros, and then the 1 of symbol 256.
+    for (number, width) in [(0, 1), (0, 1), (0, 4), (0, 3), (1, 3), (0, 3), (1, 3)] {
+        bits.write(number, width);
+    }
+    for (number, width) in [
+        (1, 1),
+        (0, 3),
+        (1, 2),
+        (1, 1),
+        (127, 7),
+        (1, 1),
+        (107, 7),
+        (0, 1),
+    ] {
+        bits.write(number, width);
+    }
+    (0..4).for_each(|_| bits.write_single_code());
+}
+
+/// Two such files of 3 KB held all workers for ever.
+#[test]
+fn a_webp_is_answered_soon_whatever_size_its_chunks_claim() {
+    let image = encode(&color(64, 48).into(), ImageFormat::WebP).split_off(12);
+    let mut transforms = Bits::default();
+    for kind in [0, 1] {
+        transforms.write(1 | kind << 1, 6);
+        write_empty_pixels(&mut transforms);
+    }
+    transforms.write(0, 64);
+    let alpha = webp_chunk(b"ALPH", &[&[1], &transforms.bytes[..]].concat());
+    let mut header = Bits::default();
+    // The signature, and 16,384 pixels a side.
+    header.write(0x2f, 8);
+    header.write((1 << 28) - 1, 32);
+    let lossless = webp_chunk(b"VP8L", &[header.bytes, transforms.bytes].concat());
+    let huge = animation_frame(1 << 24, &[alpha]);
+    let is_taken = |chunks: &[Vec<u8>]| {
+        let (file, (done, answer)) = (webp(chunks), mpsc::channel());
+        std::thread::spawn(move || done.send(decode(&file, &Limits::default()).is_ok()));
+        let answer = answer.recv_timeout(Duration::from_secs(60));
+        answer.expect("it is answered")
+    };
+    assert!(is_taken(&[image.clone(), huge.clone()]));
+    let many = [vec![image], vec![lossless.clone(); 10_000]].concat();
+    assert!(is_taken(&many));
+    let animation = [canvas(true), webp_chunk(b"ANIM", &[0; 6])];
+    assert!(!is_taken(&[&animation[..], &[huge]].concat()));
+    assert!(!is_taken(&[canvas(false), lossless]));
 }
 
 /// A valid file with some bytes changed, a piece dropped and a piece repeated.

@@ -79,13 +79,13 @@ fn with_palette(side: usize, interlaced: bool) -> Vec<u8> {
 
 /// Writes numbers with so many bits, the lowest bit first.
 #[derive(Default)]
-struct Bits {
-    bytes: Vec<u8>,
+pub struct Bits {
+    pub bytes: Vec<u8>,
     count: usize,
 }
 
 impl Bits {
-    fn write(&mut self, number: usize, bits: usize) {
+    pub fn write(&mut self, number: usize, bits: usize) {
         for place in 0..bits {
             if self.count.is_multiple_of(8) {
                 self.bytes.push(0);
@@ -110,7 +110,7 @@ impl Bits {
     }
 
     /// A code with the symbol 0 alone.
-    fn write_single_code(&mut self) {
+    pub fn write_single_code(&mut self) {
         self.write(0b0001, 4);
     }
 }
@@ -147,12 +147,40 @@ pub fn with_code_groups(groups: usize) -> Vec<u8> {
     for _ in 0..1024 * 1024 {
         bits.write(0, 11);
     }
-    let mut chunk = b"VP8L".to_vec();
-    chunk.extend_from_slice(&(bits.bytes.len() as u32).to_le_bytes());
-    chunk.extend_from_slice(&bits.bytes);
-    chunk.resize(chunk.len().next_multiple_of(2), 0);
-    let length = (4 + chunk.len() as u32).to_le_bytes();
-    [b"RIFF".as_slice(), &length, b"WEBP", &chunk].concat()
+    webp(&[webp_chunk(b"VP8L", &bits.bytes)])
+}
+
+/// A WebP of these chunks.
+pub fn webp(chunks: &[Vec<u8>]) -> Vec<u8> {
+    let chunks = chunks.concat();
+    let length = (4 + chunks.len() as u32).to_le_bytes();
+    [b"RIFF".as_slice(), &length, b"WEBP", &chunks].concat()
+}
+
+/// A chunk of a WebP.
+pub fn webp_chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let length = (data.len() as u32).to_le_bytes();
+    let padding = &[0][..data.len() % 2];
+    [kind.as_slice(), &length, data, padding].concat()
+}
+
+/// The chunk with which an extended WebP of 1024 x 1024 pixels begins.
+pub fn canvas(is_animation: bool) -> Vec<u8> {
+    let flags = if is_animation { 2 } else { 0 };
+    webp_chunk(b"VP8X", &[flags, 0, 0, 0, 0xff, 3, 0, 0xff, 3, 0])
+}
+
+/// The first frame of an animation, with sides of so many pixels.
+pub fn animation_frame(side: u32, chunks: &[Vec<u8>]) -> Vec<u8> {
+    let side = &(side - 1).to_le_bytes()[..3];
+    let header = [&[0; 6], side, side, &[40, 0, 0, 0]].concat();
+    webp_chunk(b"ANMF", &[header, chunks.concat()].concat())
+}
+
+/// A lossy image of which there is no more than its header, with sides of 16,383 pixels.
+fn endless_lossy() -> Vec<u8> {
+    let header = [0x10, 0, 0, 0x9d, 1, 0x2a, 0xff, 0x3f, 0xff, 0x3f];
+    webp_chunk(b"VP8 ", &[&header[..], &[0; 1000]].concat())
 }
 
 #[test]
@@ -215,6 +243,25 @@ fn no_format_allocates_more_than_is_promised() {
         (
             "WebP with 2000 groups of codes",
             with_code_groups(2000),
+            false,
+        ),
+        (
+            "WebP with 2000 groups of codes after its end",
+            [webp(&[canvas(false)]), with_code_groups(2000).split_off(12)].concat(),
+            false,
+        ),
+        (
+            "lossy WebP that is larger than its canvas",
+            webp(&[canvas(false), endless_lossy()]),
+            false,
+        ),
+        (
+            "WebP of an animation whose frame is larger than it says",
+            webp(&[
+                canvas(true),
+                webp_chunk(b"ANIM", &[0; 6]),
+                animation_frame(16, &[endless_lossy()]),
+            ]),
             false,
         ),
         ("JPEG", encode(rgb(2500), ImageFormat::Jpeg), true),
