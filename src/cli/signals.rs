@@ -1,12 +1,12 @@
 //! The signals that `serve` listens to: SIGTERM and SIGINT end it, SIGHUP reads keys and the certificate again.
 
 #[cfg(all(unix, feature = "tls"))]
-use bagtrack::http::Certificate;
+use bagtrack::http::CertificateError;
 #[cfg(all(unix, feature = "jwt"))]
 use bagtrack::http::JwtError;
 use bagtrack::http::{ApiKeys, Application, Shutdown};
 use std::io;
-#[cfg(all(unix, feature = "jwt"))]
+#[cfg(all(unix, any(feature = "jwt", feature = "tls")))]
 use std::sync::Arc;
 use tokio::sync::watch;
 
@@ -56,7 +56,7 @@ pub struct Reloaded {
     #[cfg(all(unix, feature = "jwt"))]
     issuer_keys: Option<Arc<dyn Fn() -> Result<usize, JwtError> + Send + Sync>>,
     #[cfg(all(unix, feature = "tls"))]
-    certificate: Option<Certificate>,
+    certificate: Option<Arc<dyn Fn() -> Result<(), CertificateError> + Send + Sync>>,
 }
 
 impl Reloaded {
@@ -67,7 +67,7 @@ impl Reloaded {
             #[cfg(all(unix, feature = "jwt"))]
             issuer_keys: application.issuer_keys().map(|read| Arc::new(read) as _),
             #[cfg(all(unix, feature = "tls"))]
-            certificate: application.certificate(),
+            certificate: application.certificate().map(|read| Arc::new(read) as _),
         }
     }
 
@@ -86,8 +86,8 @@ impl Reloaded {
             }
         }
         #[cfg(feature = "tls")]
-        if let Some(certificate) = &self.certificate {
-            match certificate.reload() {
+        if let Some(read) = &self.certificate {
+            match read() {
                 Ok(()) => tracing::info!("certificate read again"),
                 Err(error) => tracing::error!(%error, "the certificate stays as it was"),
             }

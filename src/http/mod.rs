@@ -47,7 +47,7 @@ pub use bagtrack_config::{
     StoreConfig, parse_duration, parse_listen,
 };
 #[cfg(feature = "tls")]
-pub use bagtrack_net::{Certificate, CertificateError};
+pub use bagtrack_net::CertificateError;
 pub use bagtrack_quotas::Client;
 pub use resources::routes::document as openapi_document;
 pub use server::application::{Application, Shutdown};

@@ -6,7 +6,10 @@ use rustls::{ServerConfig, crypto::ring};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
+use std::time::SystemTime;
 use tokio_rustls::TlsAcceptor;
+use x509_cert::certificate::{CertificateInner, Rfc5280};
+use x509_cert::der::Decode;
 
 /// The only protocol within TLS.
 const PROTOCOL: &[u8] = b"http/1.1";
@@ -55,7 +58,7 @@ pub enum CertificateError {
     /// They are not a pair, or of a kind that is not supported.
     #[error(
         "{cert} (--tls-cert) and {key} (--tls-key) cannot be used together: {reason}. The first certificate of the file \
-         must be that of the key, ECDSA (P-256, P-384), RSA (2048 bits or more) or Ed25519"
+         must be that of the key, of X.509 version 3, and ECDSA (P-256, P-384), RSA (2048 bits or more) or Ed25519"
     )]
     Pair {
         /// The certificate's file.
@@ -79,15 +82,19 @@ struct Inner {
 }
 
 impl Certificate {
-    /// That of these files, where they are named.
+    /// That of these files, where they are named. The log warns of one that clients refuse for its time.
     ///
     /// # Errors
     /// See [`CertificateError`].
-    pub fn load(cert: Option<&Path>, key: Option<&Path>) -> Result<Option<Self>, CertificateError> {
+    pub fn load(
+        cert: Option<&Path>,
+        key: Option<&Path>,
+        now: SystemTime,
+    ) -> Result<Option<Self>, CertificateError> {
         match (cert, key) {
             (None, None) => Ok(None),
             (Some(cert), Some(key)) => Ok(Some(Self(Arc::new(Inner {
-                current: RwLock::new(Arc::new(server_config(cert, key)?)),
+                current: RwLock::new(Arc::new(server_config(cert, key, now)?)),
                 cert: cert.to_owned(),
                 key: key.to_owned(),
             })))),
@@ -99,8 +106,8 @@ impl Certificate {
     ///
     /// # Errors
     /// See [`CertificateError`]. The certificate is then as before.
-    pub fn reload(&self) -> Result<(), CertificateError> {
-        let read = Arc::new(server_config(&self.0.cert, &self.0.key)?);
+    pub fn reload(&self, now: SystemTime) -> Result<(), CertificateError> {
+        let read = Arc::new(server_config(&self.0.cert, &self.0.key, now)?);
         let current = self.0.current.write();
         // Nothing panics while it is held.
         *current.unwrap_or_else(PoisonError::into_inner) = read;
@@ -114,8 +121,15 @@ impl Certificate {
     }
 }
 
-fn server_config(cert: &Path, key: &Path) -> Result<ServerConfig, CertificateError> {
+fn server_config(
+    cert: &Path,
+    key: &Path,
+    now: SystemTime,
+) -> Result<ServerConfig, CertificateError> {
     let (chain, private) = (chain(cert)?, private_key(key)?);
+    for certificate in &chain {
+        warn_of_time(cert, certificate, now);
+    }
     let pair = |reason| CertificateError::Pair {
         cert: cert.to_owned(),
         key: key.to_owned(),
@@ -144,6 +158,21 @@ fn chain(path: &Path) -> Result<Vec<CertificateDer<'static>>, CertificateError> 
         Ok(chain) if chain.is_empty() => Err(no_certificate("there is none".to_owned())),
         Ok(chain) => Ok(chain),
         Err(error) => Err(no_certificate(error.to_string())),
+    }
+}
+
+/// Warns of a certificate that has ended, or has not begun. One that cannot be read is refused elsewhere.
+fn warn_of_time(path: &Path, certificate: &CertificateDer<'_>, now: SystemTime) {
+    let Ok(read) = CertificateInner::<Rfc5280>::from_der(certificate) else {
+        return;
+    };
+    let validity = read.tbs_certificate().validity();
+    let (path, subject) = (path.display(), read.tbs_certificate().subject());
+    let (begins, ends) = (validity.not_before, validity.not_after);
+    if now > ends.to_system_time() {
+        tracing::warn!(%subject, "{path} (--tls-cert) has ended on {ends}: clients refuse it; renew it, then send SIGHUP");
+    } else if now < begins.to_system_time() {
+        tracing::warn!(%subject, "{path} (--tls-cert) begins on {begins}: clients refuse it until then");
     }
 }
 

@@ -81,7 +81,7 @@ impl Application {
         let address = config.listen;
         let access = load_access(&config, clock.wall(clock.now())).await?;
         #[cfg(feature = "tls")]
-        let security = security(&config.tls)?;
+        let security = security(&config.tls, clock.wall(clock.now()))?;
         #[cfg(not(feature = "tls"))]
         let security = Security::Plain;
         let listener = listen(address).await;
@@ -118,13 +118,16 @@ impl Application {
         self.security.scheme()
     }
 
-    /// The certificate, to read it again.
+    /// What reads the certificate again, where there is one. It may block.
     #[cfg(feature = "tls")]
-    pub fn certificate(&self) -> Option<Certificate> {
-        match &self.security {
-            Security::Plain => None,
-            Security::Tls(certificate) => Some(certificate.clone()),
-        }
+    pub fn certificate(
+        &self,
+    ) -> Option<impl Fn() -> Result<(), CertificateError> + Send + Sync + use<>> {
+        let Security::Tls(certificate) = &self.security else {
+            return None;
+        };
+        let (certificate, state) = (certificate.clone(), self.service.state.clone());
+        Some(move || certificate.reload(state.now()))
     }
 
     /// The API keys, to read them again.
@@ -217,8 +220,8 @@ async fn load_access(config: &Config, now: SystemTime) -> Result<Access, AccessE
 
 /// With TLS where the settings name a certificate.
 #[cfg(feature = "tls")]
-fn security(tls: &TlsConfig) -> Result<Security, CertificateError> {
-    let certificate = Certificate::load(tls.tls_cert.as_deref(), tls.tls_key.as_deref())?;
+fn security(tls: &TlsConfig, now: SystemTime) -> Result<Security, CertificateError> {
+    let certificate = Certificate::load(tls.tls_cert.as_deref(), tls.tls_key.as_deref(), now)?;
     Ok(certificate.map_or(Security::Plain, Security::Tls))
 }
 

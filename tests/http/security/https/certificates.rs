@@ -35,6 +35,11 @@ fn authority_params() -> CertificateParams {
     params
 }
 
+fn host_params() -> CertificateParams {
+    let names = ["localhost".to_owned(), "127.0.0.1".to_owned()];
+    CertificateParams::new(names).unwrap()
+}
+
 impl Authority {
     pub fn new() -> Self {
         let (root_key, key) = (KeyPair::generate().unwrap(), KeyPair::generate().unwrap());
@@ -63,9 +68,19 @@ impl Authority {
 
     /// Writes another certificate of a new key into these files.
     pub fn issue_into(&self, files: &Files, kind: &'static SignatureAlgorithm) {
+        self.write(files, kind, host_params());
+    }
+
+    /// Writes a certificate that is good from one year to another into these files.
+    pub fn issue_for_years(&self, files: &Files, [from, to]: [i32; 2]) {
+        let mut params = host_params();
+        params.not_before = rcgen::date_time_ymd(from, 1, 1);
+        params.not_after = rcgen::date_time_ymd(to, 1, 1);
+        self.write(files, &PKCS_ECDSA_P256_SHA256, params);
+    }
+
+    fn write(&self, files: &Files, kind: &'static SignatureAlgorithm, params: CertificateParams) {
         let key = KeyPair::generate_for(kind).unwrap();
-        let names = ["localhost".to_owned(), "127.0.0.1".to_owned()];
-        let params = CertificateParams::new(names).unwrap();
         let certificate = params.signed_by(&key, &self.issuer).unwrap();
         let chain = certificate.pem() + &self.intermediate;
         std::fs::write(files.certificate(), chain).unwrap();

@@ -58,6 +58,21 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     assert_eq!(shown(&authority, &program).await, second);
 }
 
+/// Only clients tell of such a certificate otherwise, each in its own words.
+#[test]
+fn the_log_warns_of_a_certificate_that_clients_refuse_for_its_time() {
+    let authority = Authority::new();
+    let files = authority.issue(kinds()[0].1);
+    authority.issue_for_years(&files, [2019, 2020]);
+    let mut program = serve(&files.certificate(), &files.key());
+    let said = program.said().join("\n");
+    assert!(said.contains("has ended on 2020-01-01T00:00:00Z"), "{said}");
+    authority.issue_for_years(&files, [2098, 2099]);
+    program.signal(Signal::HUP);
+    program.logs("begins on 2098-01-01T00:00:00Z");
+    program.logs("certificate read again");
+}
+
 #[tokio::test]
 async fn the_health_check_speaks_tls_to_a_service_with_a_certificate() {
     let files = Authority::new().issue(kinds()[0].1);
