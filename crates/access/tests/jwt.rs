@@ -208,6 +208,10 @@ async fn a_token_that_is_not_for_this_service_is_told_why() {
             json!({ "iss": "https://elsewhere.example" }),
             TokenError::Issuer,
         ),
+        (
+            json!({ "iss": [ISSUER, "https://elsewhere.example"] }),
+            TokenError::Issuer,
+        ),
         (json!({ "iss": null }), claim("iss")),
         (json!({ "aud": "others" }), TokenError::Audience),
         (json!({ "aud": null }), claim("aud")),

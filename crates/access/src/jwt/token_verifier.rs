@@ -289,6 +289,10 @@ impl TokenVerifier {
         claims: &Map<String, Value>,
         now: SystemTime,
     ) -> Result<Identity, TokenError> {
+        // The library takes an array that has it, too.
+        if claims.get("iss").and_then(Value::as_str) != Some(&self.0.issuer) {
+            return Err(TokenError::Issuer);
+        }
         let expires = moment(claims, "exp")?.ok_or_else(|| missing("exp"))?;
         if now >= expires + LEEWAY {
             return Err(TokenError::Expired);
