@@ -56,6 +56,12 @@ struct KeyFrame {
 /// The document of rows in the order of frames.
 pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
     let frames_count = Clip::length(rows);
+    // The last frame is shown as long as one is on average.
+    let last = rows
+        .iter()
+        .map(|row| seconds(clip, row))
+        .fold(0.0, f64::max);
+    let duration = ((last + 1.0 / clip.rate) * 1000.0).round() / 1000.0;
     let names = clip.names.iter().enumerate();
     let result = names.map(|(target, name)| Region {
         id: format!("object-{}", target + 1),
@@ -64,7 +70,7 @@ pub fn document(clip: &Clip, rows: &[Row]) -> serde_json::Result<String> {
         to_name: "video",
         value: Value {
             frames_count,
-            duration: (1000.0 * frames_count as f64 / clip.rate).round() / 1000.0,
+            duration,
             labels: [name],
             sequence: sequence(clip, rows, target),
         },
@@ -99,12 +105,17 @@ fn sequence(clip: &Clip, rows: &[Row], target: usize) -> Vec<KeyFrame> {
     sequence
 }
 
+/// When a row's frame is shown.
+fn seconds(clip: &Clip, row: &Row) -> f64 {
+    row.time.unwrap_or(row.frame as f64 / clip.rate)
+}
+
 fn key_frame(clip: &Clip, row: &Row) -> KeyFrame {
     let area = row.estimate.target;
     let (width, height) = (f64::from(clip.size.0), f64::from(clip.size.1));
     KeyFrame {
         frame: row.frame + 1,
-        time: row.time.unwrap_or(row.frame as f64 / clip.rate),
+        time: seconds(clip, row),
         enabled: row.estimate.status != Status::Lost,
         rotation: 0,
         x: 100.0 * area.x / width,
