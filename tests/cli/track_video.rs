@@ -425,17 +425,68 @@ fn times_are_those_of_the_video_also_where_its_rate_changes() {
     }
     let found = rows(&succeeds(&[&flags[..], &["--start", "0.5s"]].concat()));
     assert_eq!(found[0].frame, 6);
+    // So are those of a drawn video. It showed the frames at their average rate.
+    let draw = |name: &str, flags: &[&str]| {
+        let drawn = parent.path().join(name);
+        succeeds(
+            &[
+                &["track", text(&video), &target, "--draw", text(&drawn)],
+                flags,
+            ]
+            .concat(),
+        );
+        shown_at(&drawn)
+    };
+    let late = |index: usize, from: usize| index as f64 / 30.0 + f64::from(u8::from(index >= from));
+    // In ten frames from frame 9 back, the break is before frame 5.
+    let backwards = ["--backwards", "--start", "9"];
+    for (name, flags, count, from) in [
+        ("drawn.mp4", &[][..], 12, 6),
+        ("drawn.mov", &[], 12, 6),
+        ("drawn.mkv", &[], 12, 6),
+        ("drawn.webm", &[], 12, 6),
+        ("drawn.gif", &[], 12, 6),
+        ("back.mp4", &backwards, 10, 4),
+        ("later.mp4", &["--start", "3"], 9, 3),
+    ] {
+        let times = draw(name, flags);
+        assert_eq!(times.len(), count, "{name}: {times:?}");
+        for (index, time) in times.iter().enumerate() {
+            // A GIF has hundredths of a second, Matroska thousandths.
+            assert!(
+                (time - late(index, from)).abs() < 6e-3,
+                "{name}, {index}: {times:?}"
+            );
+        }
+    }
+    // An AVI has one rate: 12 frames in the seconds that they are shown.
+    let times = draw("drawn.avi", &[]);
+    assert_eq!(times.len(), 12, "{times:?}");
+    for pair in times.windows(2) {
+        assert!((pair[1] - pair[0] - times[1]).abs() < 1e-3, "{times:?}");
+    }
+}
+
+/// When each frame of a video is shown, in seconds.
+fn shown_at(video: &Path) -> Vec<f64> {
+    let mut command = Command::new("ffprobe");
+    command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv=p=0"]);
+    command.args(["-show_entries", "frame=pts_time", text(video)]);
+    let told = command.output().expect("ffprobe starts").stdout;
+    let told = String::from_utf8(told).expect("text");
+    let times = told.lines().map(|line| line.trim_end_matches(','));
+    times.map(|time| time.parse().expect("a time")).collect()
 }
 
 #[test]
 #[ignore = "needs ffmpeg"]
 fn what_is_no_video_is_told_in_one_line() {
     let parent = folder();
-    let file = parent.path().join("text.mp4");
-    fs::write(&file, "no video").expect("the folder is writable");
+    let file = parent.path().join("noise.mp4");
+    fs::write(&file, [7; 500]).expect("the folder is writable");
     let line = fails(&["track", text(&file), "--box", "1,2,30,40"]);
     assert!(
-        line.contains("text.mp4") && line.contains("cannot be decoded"),
+        line.contains("noise.mp4") && line.contains("cannot be decoded"),
         "{line}"
     );
     let line = fails(&["track", text(&file)]);
@@ -446,6 +497,8 @@ fn what_is_no_video_is_told_in_one_line() {
             &b"\0\0\0\x18ftypheic\0\0\0\0mif1heic"[..],
             "is a photo (HEIC)",
         ),
+        ("page.mp4", b"<!doctype html>\n", "is a text, not a video"),
+        ("cut.mp4", b"", "is empty"),
         ("clip.zip", b"PK\x03\x04\x14\0", "is packed (ZIP)"),
     ] {
         let file = parent.path().join(name);

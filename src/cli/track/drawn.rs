@@ -24,8 +24,8 @@ pub enum Destination {
 pub enum Drawn {
     /// Pictures in a folder.
     Folder(PathBuf),
-    /// A video.
-    Video(VideoFile),
+    /// A video, and when its first frame is shown in the source, where frames have times.
+    Video(VideoFile, Option<f64>),
 }
 
 impl Destination {
@@ -57,15 +57,16 @@ impl Destination {
         }
     }
 
-    /// Begins to write, so many frames a second, of which `first` is the first.
+    /// Begins to write frames of which `first` is the first: at their own times, or, where they have none, so many a
+    /// second.
     pub fn open(&self, rate: Rate, first: &FrameFile) -> Result<Drawn, Box<dyn Error>> {
         match self {
             Self::Folder(folder) => Ok(Drawn::Folder(folder.clone())),
             Self::Video(path) => {
                 let picture = drawn(&first.bytes, &[])?;
-                let video = VideoFile::create(path, rate, &picture);
+                let video = VideoFile::create(path, rate, first.time.is_some(), &picture);
                 let video = video.map_err(|error| format!("--draw {error}"))?;
-                Ok(Drawn::Video(video))
+                Ok(Drawn::Video(video, first.time))
             }
         }
     }
@@ -83,7 +84,12 @@ impl Drawn {
                 fs::write(&file, picture)
                     .map_err(|error| format!("{}: {error}", file.display()))?;
             }
-            Self::Video(video) => video.add(&picture)?,
+            Self::Video(video, first) => {
+                // Backwards, times go down.
+                let seconds = frame.time.zip(*first);
+                let seconds = seconds.map_or(0.0, |(time, first)| (time - first).abs());
+                video.add(&picture, seconds)?;
+            }
         }
         Ok(())
     }
@@ -92,7 +98,7 @@ impl Drawn {
     pub fn finish(self) -> Result<(), String> {
         match self {
             Self::Folder(_) => Ok(()),
-            Self::Video(video) => video.finish(),
+            Self::Video(video, _) => video.finish(),
         }
     }
 }

@@ -257,14 +257,22 @@ fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
     })
 }
 
-/// Tells photos and archives, of which ffmpeg would say that they are damaged videos.
+/// Tells photos, archives and texts, of which ffmpeg would say that they are damaged videos.
 fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
     let mut start = Vec::new();
     fs::File::open(path)?.take(4096).read_to_end(&mut start)?;
     let told = match unread_type(&start) {
         Some(name @ ("HEIC" | "HEIF" | "AVIF")) => format!("is a photo ({name}), not a video"),
         Some(name @ ("gzip" | "ZIP")) => format!("is packed ({name}): unpack it first"),
+        None if start.is_empty() => "is empty".to_owned(),
+        None if is_text(&start) => "is a text, not a video".to_owned(),
         _ => return Ok(()),
     };
     Err(format!("{} {told}", path.display()).into())
+}
+
+/// Whether a file that begins like this is a text: videos have control characters from their first bytes on.
+fn is_text(start: &[u8]) -> bool {
+    let is_letter = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
+    start.iter().all(is_letter)
 }

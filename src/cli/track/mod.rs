@@ -81,8 +81,8 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Also writes every frame with its boxes: green tracking, orange uncertain, red lost. OUT is a new video (.mp4,
     /// .m4v, .mov, .mkv, .webm, .avi, .gif), for which ffmpeg must be installed; or a new folder of JPEG files, if it
-    /// has no ending, or a slash at its end. The video's frames last equally long, at the rate that the source has on
-    /// average, and its pixels are square.
+    /// has no ending, or a slash at its end. The frames of a video keep their times; in an .avi they last equally long, at
+    /// the rate that the source has on average. Its pixels are square.
     #[arg(long, value_name = "OUT")]
     draw: Option<PathBuf>,
 }

@@ -1,4 +1,5 @@
-//! A video that is written frame by frame, by an installed ffmpeg.
+//! A video that is written frame by frame, by an installed ffmpeg. It gets JPEG pictures with their times as an IVF file:
+//! a header of 32 bytes, and before each picture its length and its time.
 
 use super::video_info::{FFMPEG, Rate};
 use std::fs;
@@ -14,9 +15,24 @@ const EVEN: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
 /// A GIF has 256 colours a frame: those that the frame needs.
 const PALETTE: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1";
 
+/// Ticks of a frame's own time, a second: those of MPEG, of which usual frames take a whole number.
+const TICKS: u32 = 90_000;
+
+/// When the pictures of a video are shown.
+#[derive(Debug, Clone, Copy)]
+pub enum Timing {
+    /// Each at its own time.
+    Own,
+    /// So many a second.
+    Equal(Rate),
+}
+
 /// A video being encoded. Its last frames are written when it is [finished](Self::finish).
 pub struct VideoFile {
     path: PathBuf,
+    timing: Timing,
+    /// The time of the next picture is at least this, in ticks.
+    next: u64,
     encoder: Child,
     said: JoinHandle<String>,
 }
@@ -37,32 +53,38 @@ fn ending(path: &Path) -> String {
 }
 
 impl VideoFile {
-    /// A new video of JPEG pictures like this one, with so many a second. It is tried first whether this ffmpeg can
-    /// write such a video there.
+    /// A new video of JPEG pictures like this one. It is tried first whether this ffmpeg can write such a video there.
+    /// Pictures of an AVI are equally long.
     ///
     /// # Errors
     /// It cannot.
-    pub fn create(path: &Path, rate: Rate, picture: &[u8]) -> Result<Self, String> {
-        let mut trial = Self::start(path, rate)?;
-        let added = trial.add(picture);
+    pub fn create(
+        path: &Path,
+        rate: Rate,
+        own_times: bool,
+        picture: &[u8],
+    ) -> Result<Self, String> {
+        let timing = match own_times && ending(path) != "avi" {
+            true => Timing::Own,
+            false => Timing::Equal(rate),
+        };
+        let mut trial = Self::start(path, timing)?;
+        let added = trial.add(picture, 0.0);
         // It tells why nothing could be added, too.
         let finished = trial.finish();
         let _ = fs::remove_file(path);
         finished.and(added)?;
-        Self::start(path, rate)
+        Self::start(path, timing)
     }
 
-    fn start(path: &Path, rate: Rate) -> Result<Self, String> {
+    fn start(path: &Path, timing: Timing) -> Result<Self, String> {
         let mut command = Command::new(FFMPEG);
         command.args(["-hide_banner", "-nostdin", "-v", "error", "-n"]);
-        command.args([
-            "-f",
-            "mjpeg",
-            "-framerate",
-            &rate.to_string(),
-            "-i",
-            "pipe:0",
-        ]);
+        command.args(["-f", "ivf", "-i", "pipe:0"]);
+        if let Timing::Own = timing {
+            let ticks = format!("1:{TICKS}");
+            command.args(["-vsync", "vfr", "-enc_time_base", &ticks]);
+        }
         match ending(path).as_str() {
             "gif" => command.args(["-vf", PALETTE]),
             // Its usual encoder aims at 200 kbit/s otherwise.
@@ -94,21 +116,39 @@ impl VideoFile {
             let _ = stderr.read_to_string(&mut said);
             said
         });
-        Ok(Self {
+        let mut video = Self {
             path: path.to_owned(),
+            timing,
+            next: 0,
             encoder,
             said,
-        })
+        };
+        // An encoder that has ended already is told with the first picture.
+        let _ = video.write(&header(timing));
+        Ok(video)
     }
 
-    /// Adds a picture, a JPEG file.
+    /// Adds a picture, a JPEG file, which is shown so many seconds after the first one.
     ///
     /// # Errors
     /// The encoder has ended; [`Self::finish`] tells why.
-    pub fn add(&mut self, picture: &[u8]) -> Result<(), String> {
+    pub fn add(&mut self, picture: &[u8], seconds: f64) -> Result<(), String> {
+        let ticks = match self.timing {
+            Timing::Own => (seconds * f64::from(TICKS)).round() as u64,
+            Timing::Equal(_) => self.next,
+        };
+        let ticks = ticks.max(self.next);
+        self.next = ticks + 1;
+        let length = u32::try_from(picture.len()).expect("a JPEG file of a frame is below 4 GiB");
+        self.write(&length.to_le_bytes())?;
+        self.write(&ticks.to_le_bytes())?;
+        self.write(picture)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), String> {
         let pipe = self.encoder.stdin.as_mut();
         let pipe = pipe.expect("it is closed at the end only");
-        let written = pipe.write_all(picture);
+        let written = pipe.write_all(bytes);
         written.map_err(|error| format!("{}: {error}", self.path.display()))
     }
 
@@ -130,4 +170,17 @@ impl VideoFile {
             last.unwrap_or("it ended without a word")
         ))
     }
+}
+
+/// What an IVF file begins with. The pictures tell their size.
+fn header(timing: Timing) -> Vec<u8> {
+    let (ticks, seconds) = match timing {
+        Timing::Own => (TICKS, 1),
+        Timing::Equal(rate) => rate.parts(),
+    };
+    let mut header = b"DKIF\0\0\x20\0MJPG".to_vec();
+    for field in [0, ticks, seconds, 0, 0] {
+        header.extend(field.to_le_bytes());
+    }
+    header
 }

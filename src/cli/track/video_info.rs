@@ -1,6 +1,6 @@
 //! What ffprobe tells about a video: its rate, and when each of its frames is shown.
 
-use std::fmt;
+use std::io;
 use std::ops::Range;
 use std::path::Path;
 use std::process::Command;
@@ -66,26 +66,36 @@ impl Rate {
         })
     }
 
+    /// So many frames in so many seconds.
+    pub fn parts(self) -> (u32, u32) {
+        (self.numerator, self.denominator)
+    }
+
     /// As a number.
     pub fn value(self) -> f64 {
         f64::from(self.numerator) / f64::from(self.denominator)
     }
 }
 
-impl fmt::Display for Rate {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}/{}", self.numerator, self.denominator)
-    }
-}
-
 impl VideoInfo {
-    /// What ffprobe tells about the video at `path`; defaults where it cannot.
+    /// What ffprobe tells about the video at `path`; defaults where it cannot, which a warning on standard error says.
     pub fn read(path: &Path) -> Self {
-        let (info, packets) = Self::parse(&ask(path, "packet=pts_time,flags"));
+        Self::told(path).unwrap_or_else(|error| {
+            let rate = Rate::default().value();
+            eprintln!(
+                "bagtrack: times are counted with {rate} frames a second, for want of {FFPROBE} ({error}): install it, it \
+                 comes with {FFMPEG}"
+            );
+            Self::default()
+        })
+    }
+
+    fn told(path: &Path) -> io::Result<Self> {
+        let (info, packets) = Self::parse(&ask(path, "packet=pts_time,flags")?);
         match are_frames(&packets) {
-            true => info,
+            true => Ok(info),
             // They have to be decoded.
-            false => Self::parse(&ask(path, "frame=pts_time")).0,
+            false => Ok(Self::parse(&ask(path, "frame=pts_time")?).0),
         }
     }
 
@@ -157,13 +167,12 @@ impl VideoInfo {
 }
 
 /// What ffprobe says of the video at `path`, and of each of its packets or frames.
-fn ask(path: &Path, each: &str) -> String {
+fn ask(path: &Path, each: &str) -> io::Result<String> {
     let mut command = Command::new(FFPROBE);
     command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
     let entries = format!("format=format_name,start_time:stream=avg_frame_rate:{each}");
     command.args(["-show_entries", &entries]).arg(path);
-    let told = command.output().map(|output| output.stdout);
-    String::from_utf8_lossy(&told.unwrap_or_default()).into_owned()
+    Ok(String::from_utf8_lossy(&command.output()?.stdout).into_owned())
 }
 
 /// Whether packets with these times are the frames that are shown. Where a video was cut, the first packets may be of
@@ -226,10 +235,10 @@ mod tests {
 
     #[test]
     fn a_rate_has_parts_that_encoders_take() {
-        let rate = |text| Rate::parse(text).map(|rate| rate.to_string());
-        assert_eq!(rate("30000/1001").as_deref(), Some("30000/1001"));
-        assert_eq!(rate("10530000/350767").as_deref(), Some("30020/1000"));
-        assert_eq!(rate("12000000/100001").as_deref(), Some("120/1"));
+        let rate = |text| Rate::parse(text).map(Rate::parts);
+        assert_eq!(rate("30000/1001"), Some((30000, 1001)));
+        assert_eq!(rate("10530000/350767"), Some((30020, 1000)));
+        assert_eq!(rate("12000000/100001"), Some((120, 1)));
         assert_eq!(
             (rate("0/0"), rate("N/A"), rate("90000/1")),
             (None, None, None)
