@@ -5,6 +5,7 @@
 
 import json
 import pathlib
+import shlex
 import subprocess
 import sys
 
@@ -48,11 +49,24 @@ INSTALLATIONS = {
         "podAnnotations": {"example.org/team": "video"},
     },
 }
+# What the service takes (crates/sessions/src/store/redis/address.rs), as far as pods can reach it.
+STORES = [f"{name}{tls}{cluster}://:password@a:7000,b:7001" for name in ("redis", "valkey") for tls in ("", "s")
+          for cluster in ("", "-cluster")]
+KEYS = {
+    "0123456789abcdef": "0123456789abcdef",
+    "anna:0123456789abcdef": "0123456789abcdef",
+    "anna:0123456789abcdef,ben:fedcba9876543210": "0123456789abcdef",
+    "anna:0123456789:abcdef,ben:fedcba9876543210": "0123456789:abcdef",
+}
+"""The key that the notes show, by the keys that there are."""
 REFUSED = {
     "a misspelt value": ({"replica": 3}, "replica"),
     "replicas without a store": ({"replicas": 2}, "needs a store"),
     "an ingress without a host": ({"ingress": {"enabled": True}}, "ingress.host"),
     "a store of another kind": ({"store": "file:/var/lib/bagtrack"}, "store"),
+    "a store in a socket, which no pod has": ({"store": "unix:///run/redis.sock"}, "store"),
+    "a key without a name": ({"secret": {"apiKeys": "anna:0123456789abcdef,fedcba9876543210"}}, "number 2 is not name"),
+    "keys without names": ({"secret": {"apiKeys": "0123456789abcdef,fedcba9876543210"}}, "number 1 is not name"),
 }
 
 
@@ -126,6 +140,17 @@ def fits(objects: list[dict], own_secret: bool) -> None:
         assert "replicas" not in by_kind["Deployment"]["spec"]
 
 
+def shown_key(chart: helm.Chart, keys: str) -> str:
+    """The key that the notes' command prints."""
+    files = chart.render({"secret": {"apiKeys": keys}}, name="bagtrack", namespace="video", is_install=True)
+    texts = {path.rsplit("/", 1)[-1]: text for path, text in files.items()}
+    command = next(it for it in texts["NOTES.txt"].splitlines() if it.startswith("KEY="))
+    stored = yaml.safe_load(texts["secret.yaml"])["stringData"]["api-keys"]
+    script = f'kubectl() {{ printf %s "$1" | base64; }}\n{command}\nprintf %s "$KEY"'
+    script = script.replace("$(kubectl", f"$(kubectl {shlex.quote(stored)}")
+    return subprocess.run(["bash", "-c", script], check=True, capture_output=True, text=True).stdout
+
+
 def main() -> None:
     packages = pathlib.Path(sys.argv[1])
     chart = helm.Chart.load(CHART)
@@ -146,6 +171,10 @@ def main() -> None:
         fits(objects, own_secret=name == "own secret")
         kinds |= {it["kind"] for it in objects}
         print(f"{name}: {len(objects)} objects")
+    for store in STORES:
+        chart.validate_schema({"store": store})
+    for keys, first in KEYS.items():
+        assert shown_key(chart, keys) == first, (keys, shown_key(chart, keys))
     templates = {it["name"] for it in chart.templates if it["name"].endswith(".yaml")}
     # Services are two in one file.
     assert len(kinds) == len(templates), (kinds, templates)
