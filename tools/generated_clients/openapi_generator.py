@@ -26,6 +26,8 @@ with ApiClient(Configuration(host=url)) as client:
     restored = sessions.create_session(bytes(sessions.get_snapshot(session.id)), **raw)
     assert restored.frame == len(clip.frames), restored
     assert bytes(sessions.get_bag_picture(restored.id)).startswith(b"\x89PNG")
+    drawn = sessions.post_frames_without_preload_content(restored.id, clip.frames[0], draw=True, **raw)
+    assert drawn.read().startswith(b"\x89PNG"), drawn.status
     try:
         sessions.post_frames(restored.id, b"no picture", **raw)
         raise AssertionError("no picture was taken")

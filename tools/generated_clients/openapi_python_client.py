@@ -40,6 +40,11 @@ with Client(base_url=url) as client:
     snapshot = get_snapshot.sync_detailed(session.id, client=client).content
     restored = create_session.sync(client=client, body=body(snapshot))
     assert restored.frame == len(clip.frames), restored
+    # Where its functions would read every answer as JSON.
+    drawn = client.get_httpx_client().post(
+        f"/sessions/{restored.id}/frames", params={"draw": True}, content=clip.frames[0]
+    )
+    assert drawn.content.startswith(b"\x89PNG"), drawn
     form = CreateForm(frame=body(clip.frames[0]), box=clip.box, seed=SEED)
     again = create_session.sync(client=client, body=form)
     assert flat(post_frames.sync(again.id, client=client, body=body(clip.frames[1])))[0] == 1
