@@ -110,11 +110,33 @@ def test_a_lost_target_gets_no_shape(tmp_path: Path) -> None:
         assert 0 <= left < right <= 320 and 0 <= top < bottom <= 240
 
 
+def test_a_full_disk_leaves_what_somebody_has_drawn(clip: Clip, folder: Path) -> None:
+    resource = pytest.importorskip("resource")
+    begun = annotate(folder, 0, [rectangle("card", corners(clip.box))])
+    drawn = annotate(folder, 1, [rectangle("another", [[1, 2], [30, 40]])])
+    before = drawn.read_text()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # No file gets larger, as on a disk without room.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        with pytest.raises(SystemExit, match="bagtrack-labelme: .*frame1.json cannot be written, and is as it was"):
+            adapter.main([str(begun), "--frames", "1"])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert drawn.read_text() == before
+    assert sorted(path.name for path in folder.glob("*.json*")) == ["frame0.json", "frame1.json"]
+    adapter.main([str(begun), "--frames", "1"])
+    assert [shape["label"] for shape in json.loads(drawn.read_text())["shapes"]] == ["another", "card"]
+
+
 def test_what_cannot_be_used_is_told(folder: Path) -> None:
     with pytest.raises(SystemExit, match="has no rectangle"):
         adapter.main([str(annotate(folder, 0, []))])
     (folder / "other.json").write_text("{}")
     with pytest.raises(SystemExit, match="is no file of labelme"):
         adapter.main([str(folder / "other.json")])
+    (folder / "torn.json").write_text('{"shapes": [')
+    with pytest.raises(SystemExit, match="torn.json cannot be read as JSON: Expecting value"):
+        adapter.main([str(folder / "torn.json")])
     with pytest.raises(ValueError):
         adapter.propagate(annotate(folder, 0, [rectangle("card", [[400, 400], [500, 500]])]))

@@ -15,8 +15,10 @@ import argparse
 import json
 import os
 import re
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Optional
 
@@ -103,10 +105,29 @@ def _pixels(path: Path) -> npt.NDArray[np.uint8]:
 
 
 def _read(file: Path) -> Document:
-    document = json.loads(file.read_text(encoding="utf-8"))
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{file} cannot be read as JSON: {error}") from error
     if not isinstance(document, dict) or "imagePath" not in document or "shapes" not in document:
         raise ValueError(f"{file} is no file of labelme")
     return document
+
+
+def _write(file: Path, document: Document) -> None:
+    """Puts the document in the place of the file at once: where the disk is full, what somebody has drawn stays."""
+    target = file.resolve()
+    new = target.with_name(f"{target.name}.tmp")
+    try:
+        new.write_text(json.dumps(document, ensure_ascii=False, indent=2), encoding="utf-8")
+        if target.exists():
+            shutil.copymode(target, new)
+        os.replace(new, target)
+    except OSError as error:
+        with suppress(OSError):
+            new.unlink()
+        reason = error.strerror or error
+        raise OSError(f"{file} cannot be written, and is as it was: {reason}") from error
 
 
 def _empty(begun: Document, image: Path, folder: Path, frame: npt.NDArray[np.uint8]) -> Document:
@@ -137,11 +158,11 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     try:
         tracker = Tracker(seed=options.seed)
         changed = propagate(options.file, count=options.frames, backwards=options.backwards, tracker=tracker)
+        if not options.dry_run:
+            for file, document in changed.items():
+                _write(file, document)
     except (OSError, ValueError) as error:
         sys.exit(f"bagtrack-labelme: {error}")
-    for file, document in changed.items():
-        if not options.dry_run:
-            file.write_text(json.dumps(document, ensure_ascii=False, indent=2), encoding="utf-8")
     names = [file.name for file in changed]
     print(f"{len(changed)} files with new shapes" + (f", {names[0]} to {names[-1]}" if names else ""))
 
