@@ -103,8 +103,8 @@ def cvat(clip: Clip, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cvat]:
     server.server_close()
 
 
-def run(cvat: Cvat, *options: object) -> int:
-    """The exit status of the program."""
+def run(cvat: Cvat, *options: object) -> int | str:
+    """The exit status of the program, or the line with which it ends with status 1."""
     host = f"http://127.0.0.1:{cvat.server_address[1]}"
     arguments = ["--host", host, "--task", "17", "--frame", START, "--seed", SEED, *options]
     with pytest.raises(SystemExit) as ended:
@@ -176,4 +176,21 @@ def test_nothing_is_changed_where_nothing_can_be_done(cvat: Cvat, capsys: pytest
     cvat.deleted = [START]
     assert run(cvat) == 1
     assert "there is no frame 50" in capsys.readouterr().err
+    assert cvat.patches == []
+
+
+def test_ordinary_mistakes_are_told_in_a_line(cvat: Cvat, monkeypatch: pytest.MonkeyPatch) -> None:
+    cvat.pictures[START + 1] = b"no picture"
+    monkeypatch.setattr("urllib3.util.Retry.sleep", lambda *_: None)
+    told = [
+        run(cvat, "--host", "http://127.0.0.1:9"),
+        run(cvat, "--task", 18),
+        run(cvat, "--frames", 3),
+    ]
+    monkeypatch.setenv("CVAT_ACCESS_TOKEN", "another token")
+    told.append(run(cvat))
+    expected = ["no answer from http://127.0.0.1:9, ", " answered 404 ", "cannot identify image", " answered 401 "]
+    for line, words in zip(told, expected):
+        assert isinstance(line, str) and line.startswith("bagtrack-cvat: ") and "\n" not in line, told
+        assert words in line and len(line) < 400, told
     assert cvat.patches == []

@@ -24,7 +24,9 @@ import numpy as np
 import numpy.typing as npt
 from cvat_sdk import make_client, models
 from cvat_sdk.core.proxies.annotations import AnnotationUpdateAction
+from cvat_sdk.exceptions import ApiException, CvatSdkException, OpenApiException
 from PIL import Image
+from urllib3.exceptions import HTTPError, MaxRetryError
 
 from bagtrack._native import KeyFrames, Tracker
 from bagtrack.adapters import pictures
@@ -32,6 +34,12 @@ from bagtrack.answer import Box
 
 _AHEAD = 4
 """So many frames are on their way from CVAT while one is tracked."""
+_ADVICE = {
+    400: " (are the name after --auth and CVAT_PASSWORD right?)",
+    401: " (is CVAT_ACCESS_TOKEN right?)",
+    403: " (may this user see and change it?)",
+    404: " (is there such a task or job?)",
+}
 
 
 @dataclass(frozen=True)
@@ -142,9 +150,24 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     login = (options.auth, os.environ.get("CVAT_PASSWORD", "")) if options.auth else None
     if not token and not login:
         parser.error("set CVAT_ACCESS_TOKEN, or give --auth USER and set CVAT_PASSWORD")
-    with make_client(options.host, credentials=login, access_token=token) as client:
-        owner = client.tasks.retrieve(options.task) if options.task else client.jobs.retrieve(options.job)
-        sys.exit(_run(owner, options))
+    try:
+        with make_client(options.host, credentials=login, access_token=token) as client:
+            owner = client.tasks.retrieve(options.task) if options.task else client.jobs.retrieve(options.job)
+            status = _run(owner, options)
+    except (CvatSdkException, HTTPError, OpenApiException, OSError, ValueError) as error:
+        sys.exit(f"bagtrack-cvat: {_reason(error, options.host)}")
+    sys.exit(status)
+
+
+def _reason(error: Exception, host: str) -> str:
+    """What went wrong, and where to look, in one line."""
+    if isinstance(error, ApiException) and error.status:
+        # Its text has all headers of the answer.
+        said = " ".join(str(error.body or "").split())[:200]
+        return f"{host} answered {error.status} {error.reason}{_ADVICE.get(error.status, '')}: {said}"
+    if isinstance(error, MaxRetryError):
+        return f"no answer from {host}, look at --host: {error.reason}"
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _run(owner: Any, options: argparse.Namespace) -> int:
