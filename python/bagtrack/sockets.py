@@ -43,7 +43,7 @@ class BaseSocket:
     @staticmethod
     def _document(message: Union[str, bytes]) -> dict[str, Any]:
         document = transport.parse(message)
-        if not isinstance(document, dict) or not document:
+        if not document:
             raise ConnectionLost(f"the service sent a message that is no JSON object: {message!r}")
         return document
 

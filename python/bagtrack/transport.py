@@ -50,12 +50,13 @@ def reply(status: int, headers: Mapping[str, str], body: bytes) -> Reply:
     return Reply(status, {name.lower(): value for name, value in headers.items()}, body, document)
 
 
-def parse(text: Union[str, bytes, bytearray]) -> Any:
-    """A JSON document; an empty object where it cannot be read."""
+def parse(text: Union[str, bytes, bytearray]) -> dict[str, Any]:
+    """A JSON object; an empty one where the text is none."""
     try:
-        return json.loads(text)
+        document = json.loads(text)
     except ValueError:
         return {}
+    return document if isinstance(document, dict) else {}
 
 
 def refused(status: int, body: Union[bytes, bytearray]) -> ConnectionLost:

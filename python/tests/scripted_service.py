@@ -107,6 +107,8 @@ class ScriptedService:
         elif "problem" in reply:
             headers["Content-Type"] = "application/problem+json"
             content = json.dumps({"status": reply["status"], **reply["problem"]})
+        elif "json" in reply:
+            content = json.dumps(reply["json"])
         else:
             headers["Content-Type"] = SNAPSHOT if "snapshot" in reply else "text/html"
             content = reply.get("snapshot", reply.get("text", ""))

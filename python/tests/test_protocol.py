@@ -59,6 +59,15 @@ def test_exchanges(service: ScriptedService, scenario: dict, is_async: bool) -> 
     loop.close()
 
 
+@pytest.mark.parametrize("document", [["no"], "no", 7, None])
+def test_a_refusal_in_json_that_is_no_object_is_told(service: ScriptedService, document: object) -> None:
+    service.expect([{"request": "PUT /sessions/{1}", "frame": "a", "reply": {"status": 400, "json": document}}])
+    with pytest.raises(bagtrack.ServiceError, match="the service answered 400") as refused:
+        bagtrack.Client(service.url).init(b"a", TABLE["box"])
+    assert (refused.value.status, refused.value.problem) == (400, {})
+    service.check()
+
+
 def test_a_client_that_could_not_move_goes_on_at_the_address_that_it_came_from(service: ScriptedService) -> None:
     other = ScriptedService()
     client = bagtrack.Client([service.url, other.url])
