@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence, Union
+from typing import Any, Optional, Sequence, Union, get_args
 
 from bagtrack import transport
 from bagtrack.answer import Answer, Box, BoxLike, Status
@@ -43,6 +43,8 @@ class BaseClient:
         """
         if snapshot_every < 0:
             raise ValueError("snapshot_every is at least 0")
+        if encoding not in get_args(Encoding):
+            raise ValueError(f"encoding is 'jpeg' or 'png', not {encoding!r}")
         self._services = Services(url)
         self._headers = transport.authorization(api_key)
         self._settings = settings(preset, seed, params)

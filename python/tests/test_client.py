@@ -142,6 +142,13 @@ def test_an_address_without_its_scheme_is_refused_at_once() -> None:
         bagtrack.Client(["http://localhost:8080", "localhost:8080"])
 
 
+@pytest.mark.parametrize("encoding", ["PNG", "jpg", ""])
+@pytest.mark.parametrize("make", [bagtrack.Client, bagtrack.AsyncClient])
+def test_an_encoding_that_there_is_not_is_refused(make: Callable, encoding: str) -> None:
+    with pytest.raises(ValueError, match=f"encoding is 'jpeg' or 'png', not '{encoding}'"):
+        make("http://localhost:8080", encoding=encoding)
+
+
 def test_refusals_are_told_and_change_nothing(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
