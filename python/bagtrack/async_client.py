@@ -9,7 +9,7 @@ import httpx
 
 from bagtrack import transport
 from bagtrack.answer import Answer, Box, BoxLike
-from bagtrack.base_client import BaseClient, request_of
+from bagtrack.base_client import BaseClient, lost, request_of
 from bagtrack.encoding import Frame
 from bagtrack.session import SNAPSHOT, four_numbers
 from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Run, Steps
@@ -112,7 +112,7 @@ class AsyncClient(BaseClient):
         try:
             reply = await self._http.request(**request_of(step, self._services))
         except httpx.TransportError as error:
-            return ConnectionLost(str(error) or type(error).__name__)
+            return lost(error)
         return transport.reply(reply.status_code, reply.headers, reply.content)
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ssl
 from typing import Any, Optional, Sequence, Union, get_args
+
+import httpx
 
 from bagtrack import transport
 from bagtrack.answer import Answer, Box, BoxLike, Status
 from bagtrack.encoding import Encoding, Frame, encode
 from bagtrack.session import Session, four_numbers, query_box, settings
-from bagtrack.steps import Request, Steps
+from bagtrack.steps import ConnectionLost, Request, Steps
 from bagtrack.transport import Services
 
 IMAGE = "application/octet-stream"
@@ -104,3 +107,17 @@ def request_of(step: Request, services: Services) -> dict[str, Any]:
     if step.body:
         options.update(content=step.body, headers={"Content-Type": step.media_type})
     return options
+
+
+def lost(error: httpx.TransportError) -> ConnectionLost:
+    """What a request without an answer is to the session. Raises what another try would not mend."""
+    if isinstance(error, (httpx.LocalProtocolError, httpx.UnsupportedProtocol)) or is_certificate_refused(error):
+        raise error
+    return ConnectionLost(str(error) or type(error).__name__)
+
+
+def is_certificate_refused(error: Optional[BaseException]) -> bool:
+    """Whether the service's certificate is the cause."""
+    while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
+        error = error.__cause__ or error.__context__
+    return error is not None

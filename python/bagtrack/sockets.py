@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ssl
 from contextlib import ExitStack, suppress
 from typing import Any, Optional, Union
 
@@ -49,6 +50,9 @@ class BaseSocket:
 
     @staticmethod
     def _broken(error: BaseException) -> ConnectionLost:
+        if isinstance(error, ssl.SSLCertVerificationError):
+            # Another try would not mend it.
+            raise error
         if isinstance(error, InvalidStatus):
             return transport.refused(error.response.status_code, error.response.body or b"{}")
         if isinstance(error, ConnectionClosed) and error.rcvd is not None:

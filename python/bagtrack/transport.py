@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from typing import Any, Mapping, Sequence, Union
+from urllib.parse import urlsplit
 
 from bagtrack.steps import ConnectionLost, Reply
 
@@ -18,6 +19,13 @@ class Services:
         for address in urls:
             if not address.startswith(("http://", "https://")):
                 raise ValueError(f"the address {address!r} does not begin with http:// or https://")
+            try:
+                parts = urlsplit(address)
+                has_host = bool(parts.hostname) and parts.port != 0
+            except ValueError as error:
+                raise ValueError(f"the address {address!r} cannot be used: {error}") from error
+            if not has_host:
+                raise ValueError(f"the address {address!r} names no host and port, like http://localhost:8080")
         self._urls = [address.rstrip("/") for address in urls]
         self._used = 0
 
@@ -41,7 +49,16 @@ class Services:
 
 def authorization(api_key: Union[str, None]) -> dict[str, str]:
     """The headers that say who calls."""
-    return {} if api_key is None else {"Authorization": f"Bearer {api_key}"}
+    if api_key is None:
+        return {}
+    # Files with a key end with a line break.
+    key = api_key.strip()
+    # The key is not shown: messages go into logs.
+    if not key:
+        raise ValueError("the API key is empty: leave api_key out where the service wants none")
+    if not (key.isascii() and key.isprintable()):
+        raise ValueError("the API key has characters that no header takes: it is one line of printable ASCII")
+    return {"Authorization": f"Bearer {key}"}
 
 
 def reply(status: int, headers: Mapping[str, str], body: bytes) -> Reply:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+import httpx
 import numpy as np
 import pytest
 
@@ -140,6 +141,40 @@ def test_a_server_that_is_away_for_a_while_is_waited_for_and_then_given_up(
 def test_an_address_without_its_scheme_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="'localhost:8080' does not begin with http://"):
         bagtrack.Client(["http://localhost:8080", "localhost:8080"])
+
+
+@pytest.mark.parametrize("address", ["http://", "http://:8080", "http://localhost:99999", "http://localhost:0"])
+@pytest.mark.parametrize("make", [bagtrack.Client, bagtrack.AsyncClient])
+def test_an_address_that_names_no_service_is_refused_at_once(make: Callable, address: str) -> None:
+    with pytest.raises(ValueError, match=f"the address '{address}' "):
+        make(address)
+
+
+@pytest.mark.parametrize("make", [bagtrack.Client, bagtrack.AsyncClient])
+def test_a_key_that_no_header_takes_is_refused_at_once_and_not_shown(make: Callable) -> None:
+    for key in ("one-secret\nanother-secret", "geheimnis-\u00fc", " \n"):
+        with pytest.raises(ValueError, match="the API key ") as refused:
+            make("http://localhost:8080", key)
+        assert "secret" not in str(refused.value) and "geheimnis" not in str(refused.value)
+
+
+def test_a_key_may_have_the_line_break_of_its_file(start_server: StartServer, clip: Clip) -> None:
+    url = start_server("--api-keys", "me:0123456789abcdef").url
+    with bagtrack.Client(url, "0123456789abcdef\n", seed=SEED, retry_for=1.0) as client:
+        client.init(clip.files[0].read_bytes(), clip.box)
+        assert client.update(clip.files[1].read_bytes())[1] == clip.answered()[1]
+
+
+@pytest.mark.parametrize("error", [httpx.LocalProtocolError, httpx.UnsupportedProtocol])
+def test_what_another_try_would_not_mend_is_told_at_once(error: type[httpx.TransportError], clip: Clip) -> None:
+    client = bagtrack.Client("http://localhost:8080", retry_for=1.0)
+
+    def fail(_: httpx.Request) -> httpx.Response:
+        raise error("it cannot be sent")
+
+    client._http = httpx.Client(transport=httpx.MockTransport(fail))
+    with pytest.raises(error, match="it cannot be sent"):
+        client.init(b"a frame", clip.box)
 
 
 @pytest.mark.parametrize("encoding", ["PNG", "jpg", ""])

@@ -5,6 +5,7 @@ The certificate is made by openssl, the Caddyfile is that of `docker/`.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import shutil
@@ -113,6 +114,29 @@ def follow(clip: Clip, url: str, key: str | None) -> None:
 
 def test_the_service_itself_speaks_https(clip: Clip, with_own_tls: str) -> None:
     follow(clip, with_own_tls, None)
+
+
+def test_a_certificate_that_nobody_signed_is_told_at_once(
+    clip: Clip, with_own_tls: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SSL_CERT_FILE")
+    frame = clip.files[0].read_bytes()
+    with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
+        bagtrack.Client(with_own_tls, retry_for=1.0).init(frame, clip.box)
+    with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
+        asyncio.run(bagtrack.AsyncClient(with_own_tls, retry_for=1.0).init(frame, clip.box))
+
+
+def test_a_certificate_that_the_stream_does_not_take_is_told_at_once(
+    clip: Clip, with_own_tls: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = [file.read_bytes() for file in clip.files[:3]]
+    with bagtrack.Client(with_own_tls, retry_for=1.0) as client:
+        client.init(frames[0], clip.box)
+        # Streams take the certificates of the system, posts those that they began with.
+        monkeypatch.delenv("SSL_CERT_FILE")
+        with pytest.raises(ssl.SSLCertVerificationError):
+            list(client.track(frames[1:]))
 
 
 def test_caddy_speaks_https_for_it(clip: Clip, behind_caddy: str) -> None:
