@@ -6,6 +6,7 @@
 use super::client::Client;
 use super::holdings::Holdings;
 use super::rates::{self, FrameRate, Rate, RateExceeded};
+use super::video_places::VideoPlaces;
 use bagtrack_net::MessageRate;
 use bagtrack_sessions::clock::{self, Instant, sleep, sleep_until, timeout_at};
 use bagtrack_sessions::{Budget, BudgetFull, Charge, Flow, QuotaExhausted};
@@ -53,7 +54,7 @@ pub struct Account {
     /// They are known as long as one of their clients is.
     _networks: Vec<Arc<Holdings>>,
     requests: Arc<Semaphore>,
-    videos: Arc<Semaphore>,
+    videos: VideoPlaces,
     messages: Arc<MessageRate>,
     asked: DefaultDirectRateLimiter,
     handshakes: DefaultDirectRateLimiter,
@@ -89,7 +90,7 @@ impl Account {
             held: quotas.holdings(&networks),
             _networks: networks,
             requests: places(quotas.requests),
-            videos: places(1),
+            videos: VideoPlaces::new(1),
             messages: Arc::new(rates::limiter(rates::MESSAGES)),
             asked: rates::limiter(rates::ASKED),
             handshakes: rates::limiter(rates::HANDSHAKES),
@@ -121,12 +122,15 @@ impl Account {
         }
     }
 
-    /// Whether it may be forgotten: nothing is held.
+    /// Whether it may be forgotten: nothing is held, and a key has all of its frames again. Addresses are too many to
+    /// remember what they sent.
     pub(super) fn is_idle(&self) -> bool {
-        match self.key {
-            Some(_) => self.held.upload_bytes.held() == 0,
-            None => self.held.is_empty(),
+        if self.key.is_some() {
+            return self.held.upload_bytes.held() == 0;
         }
+        let owes = |((_, burst), left): (Rate, u32)| left < burst.get();
+        let owes = matches!(self.client, Client::Key(_)) && self.frames().is_some_and(owes);
+        self.held.is_empty() && !owes
     }
 
     /// Who counts frames.
@@ -245,11 +249,16 @@ impl Account {
         &self,
         deadline: Instant,
     ) -> Result<OwnedSemaphorePermit, QuotaExhausted> {
-        let place = timeout_at(deadline, place_in_order(&self.videos)).await;
-        place.map_err(|_| QuotaExhausted {
+        let place = self.videos.take_until(deadline).await;
+        place.ok_or(QuotaExhausted {
             what: "videos at a time",
             limit: 1,
         })
+    }
+
+    /// The place for a video that is decoded.
+    pub fn videos(&self) -> VideoPlaces {
+        self.videos.clone()
     }
 
     /// How many frames of WebSockets the client may send.

@@ -68,9 +68,10 @@ pub async fn respond_to_video(
     let video = request.upload.files.swap_remove(0);
     let place;
     (place, request.queue) = VideoPlace::take(&state, &request.client, request.queue).await?;
+    let client = request.client.clone();
     let source = FrameSource::Video(VideoFrames::decode(&state, video, format, place, 0).await?);
     let answer = respond_to(state.clone(), request, source, 1).await?;
-    Ok(video_answer::to_reader(&state, answer))
+    Ok(video_answer::to_reader(&state, &client, answer))
 }
 
 async fn respond_to(

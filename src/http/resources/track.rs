@@ -117,6 +117,7 @@ async fn track_video(
     let targets = boxes.as_slice().len();
     let pictures = VideoFrames::decode(&state, video, format, place, range.passed_over()).await?;
     let charge = state.charge(&request.client);
+    let client = request.client.clone();
     let video = VideoTrack {
         queue: queue.for_frames(targets),
         frames: RangeFrames::new(pictures, range, state.charge(&request.client)),
@@ -134,7 +135,7 @@ async fn track_video(
         end: None,
     };
     let answer = ndjson::respond(state.clone(), request.instance, answers).await?;
-    Ok(video_answer::to_reader(&state, answer))
+    Ok(video_answer::to_reader(&state, &client, answer))
 }
 
 /// Which frames of a video are tracked.

@@ -60,9 +60,14 @@ pub async fn post(
     let mut video = VideoFrames::decode(&state, file, format, place, 0).await?;
     let first = next(&state, &request, &mut video).await;
     let first = first.ok_or_else(Problem::missing_frame)??;
+    let client = request.client.clone();
     let frames = stream::once(ready(Ok(first))).chain(rest(state.clone(), request, video));
     let answer = ([(CONTENT_TYPE, MOTION_JPEG)], Body::from_stream(frames));
-    Ok(video_answer::to_reader(&state, answer.into_response()))
+    Ok(video_answer::to_reader(
+        &state,
+        &client,
+        answer.into_response(),
+    ))
 }
 
 /// The next frame, which counts as one of the client's.

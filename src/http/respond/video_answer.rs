@@ -1,12 +1,13 @@
 //! The answer to a video, which keeps a place for as long as its reader takes.
 //!
 //! A reader may keep the service waiting for some time in all. After that its place goes to a video that waits for one,
-//! and the answer is cut off: else a few readers that take a little now and then would hold all places.
+//! and the answer is cut off: else a few readers that take a little now and then would hold all places, and one of them
+//! that of all who have its key or its address.
 
 use crate::http::state::AppState;
 use axum::body::{Body, BodyDataStream, Bytes};
 use axum::response::Response;
-use bagtrack_quotas::VideoPlaces;
+use bagtrack_quotas::{Client, VideoPlaces};
 use bagtrack_sessions::clock;
 use futures_util::{StreamExt, stream};
 use std::io;
@@ -17,15 +18,15 @@ use tracing::Instrument;
 /// How often a reader may use up the time that a request may take.
 const READER_PATIENCE: u32 = 4;
 
-/// Gives the answer, whose body holds a place for a video, to a reader that may be slow.
-pub fn to_reader(state: &AppState, answer: Response) -> Response {
+/// Gives the answer, whose body holds a place for a video of this client, to a reader that may be slow.
+pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Response {
     let (head, body) = answer.into_parts();
     let (sender, receiver) = mpsc::channel(1);
     let patience = state.config.work_timeout * READER_PATIENCE;
     let sent = send(
         body.into_data_stream(),
         sender,
-        state.videos.clone(),
+        [state.videos.clone(), state.clients.account(client).videos()],
         patience,
     );
     tokio::spawn(sent.in_current_span());
@@ -45,7 +46,7 @@ pub fn to_reader(state: &AppState, answer: Response) -> Response {
 async fn send(
     mut answer: BodyDataStream,
     sender: mpsc::Sender<Option<Bytes>>,
-    places: VideoPlaces,
+    [of_all, of_client]: [VideoPlaces; 2],
     mut patience: Duration,
 ) {
     loop {
@@ -53,7 +54,12 @@ async fn send(
         let room = tokio::select! {
             biased;
             room = sender.reserve() => room,
-            () = places.wanted_from(since + patience) => {
+            () = async {
+                tokio::select! {
+                    () = of_all.wanted_from(since + patience) => {}
+                    () = of_client.wanted_from(since + patience) => {}
+                }
+            } => {
                 tracing::info!("an answer is taken too slowly, and a video waits for its place");
                 return;
             }
