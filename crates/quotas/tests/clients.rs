@@ -114,6 +114,32 @@ async fn who_waits_for_a_request_gets_the_place_that_another_one_leaves() {
     assert!(clients.account(&key()).request().is_ok());
 }
 
+/// Requests of many addresses gave it all of its frames back.
+#[test]
+fn a_key_that_has_sent_its_frames_is_remembered_beside_many_addresses() {
+    let mut config = Config {
+        max_frames: 20,
+        ..Config::default()
+    };
+    config.limits.client_frame_rate = 1;
+    let clients = Clients::new(&config, false);
+    let at_once = clients
+        .account(&key())
+        .frames()
+        .expect("they are counted")
+        .1;
+    while clients.account(&key()).count_frames(1).is_ok() {}
+    for number in 0..5000 {
+        clients.account(&address(number));
+    }
+    let left = clients
+        .account(&key())
+        .frames()
+        .expect("they are counted")
+        .1;
+    assert!(left < at_once, "{left}");
+}
+
 #[test]
 fn of_many_addresses_those_with_nothing_in_use_are_forgotten() {
     let clients = clients();

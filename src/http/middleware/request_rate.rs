@@ -5,6 +5,7 @@
 
 use super::client_identity::{REFUSAL_DELAY, client_at};
 use crate::http::problems::problem::Problem;
+use crate::http::respond::answer::REPLAYED;
 use crate::http::state::AppState;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::Method;
@@ -20,8 +21,8 @@ enum Counts {
     /// It is answered all the same, if late: whoever asks whether the service lives must not take it for dead, for the
     /// haste of another client at its address.
     AsProbe,
-    /// Where it was refused: otherwise it took its turn at the workers.
-    Refused,
+    /// Where it was refused, or answered as before: otherwise it took its turn at the workers.
+    WithoutWork,
 }
 
 impl Counts {
@@ -32,7 +33,7 @@ impl Counts {
         if route.ends_with("/healthz") || route.ends_with("/readyz") {
             Self::AsProbe
         } else if sends_frames && !route.ends_with("/token") {
-            Self::Refused
+            Self::WithoutWork
         } else {
             Self::Always
         }
@@ -57,7 +58,9 @@ pub async fn bound_rate(State(state): State<AppState>, request: Request, next: N
     let counts_now = match counts {
         Counts::Always => false,
         Counts::AsProbe => true,
-        Counts::Refused => response.status().is_client_error(),
+        Counts::WithoutWork => {
+            response.status().is_client_error() || response.headers().contains_key(REPLAYED)
+        }
     };
     if counts_now && count().is_err() {
         sleep(REFUSAL_DELAY).await;
