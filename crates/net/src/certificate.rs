@@ -107,6 +107,8 @@ impl Certificate {
     /// # Errors
     /// See [`CertificateError`]. The certificate is then as before.
     pub fn reload(&self, now: SystemTime) -> Result<(), CertificateError> {
+        check_regular(&self.0.cert, "tls-cert")?;
+        check_regular(&self.0.key, "tls-key")?;
         let read = Arc::new(server_config(&self.0.cert, &self.0.key, now)?);
         let current = self.0.current.write();
         // Nothing panics while it is held.
@@ -188,9 +190,24 @@ fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CertificateError> 
 }
 
 fn read(path: &Path, flag: &'static str) -> Result<Vec<u8>, CertificateError> {
-    std::fs::read(path).map_err(|source| CertificateError::File {
+    std::fs::read(path).map_err(|source| unreadable(path, flag, source))
+}
+
+/// Refuses a pipe, whose writer has gone: reading it again would wait for ever.
+fn check_regular(path: &Path, flag: &'static str) -> Result<(), CertificateError> {
+    let file = std::fs::metadata(path);
+    let refused = match file {
+        Ok(file) if file.is_file() => return Ok(()),
+        Ok(_) => io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file"),
+        Err(error) => error,
+    };
+    Err(unreadable(path, flag, refused))
+}
+
+fn unreadable(path: &Path, flag: &'static str, source: io::Error) -> CertificateError {
+    CertificateError::File {
         path: path.to_owned(),
         flag,
         source,
-    })
+    }
 }
