@@ -51,7 +51,9 @@ impl TryFrom<String> for Name {
 
     fn try_from(text: String) -> Result<Self, String> {
         let is_name = (1..=MAX_NAME).contains(&text.chars().count());
-        match is_name && !text.chars().any(char::is_control) {
+        // XML has none of these.
+        let is_unseen = |sign: char| sign.is_control() || matches!(sign, '\u{fffe}' | '\u{ffff}');
+        match is_name && !text.chars().any(is_unseen) {
             true => Ok(Self(text)),
             false => Err(format!(
                 "a name has 1 to {MAX_NAME} characters, and no control characters"
@@ -111,9 +113,10 @@ pub struct FrameRate(pub f64);
 impl<'de> Deserialize<'de> for FrameRate {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Cow::<str>::deserialize(deserializer)?;
-        let rate = text.parse().ok().filter(|rate| 0.0 < *rate && *rate <= 1e3);
-        rate.map(Self)
-            .ok_or_else(|| D::Error::custom("`rate` is a number of frames a second, up to 1000"))
+        let rate = text.parse().ok().filter(|rate| (1e-3..=1e3).contains(rate));
+        rate.map(Self).ok_or_else(|| {
+            D::Error::custom("`rate` is a number of frames a second, from 0.001 to 1000")
+        })
     }
 }
 
