@@ -44,8 +44,9 @@ pub fn type_name(bytes: &[u8]) -> Option<&'static str> {
     read.or_else(|| unread_type(bytes))
 }
 
-/// Bytes of a packet of an MPEG transport stream, and the first one of each.
+/// Bytes of a packet of an MPEG transport stream, those that cameras put before it, and the first one of each.
 const PACKET: usize = 188;
+const STAMP: usize = 4;
 const SYNC: u8 = 0x47;
 
 /// The name of a type of images, videos or packed files that is known and not read.
@@ -53,7 +54,7 @@ pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
     if bytes.get(4..8) == Some(b"ftyp") {
         return still_image(bytes);
     }
-    let signatures: [(&[u8], &str); 10] = [
+    let signatures: [(&[u8], &str); 17] = [
         (b"II\x2A\x00", "TIFF"),
         (b"MM\x00\x2A", "TIFF"),
         (b"\xFF\x0A", "JPEG XL"),
@@ -62,6 +63,13 @@ pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
         (b"FLV\x01", "FLV"),
         (b"\x30\x26\xB2\x75\x8E\x66\xCF\x11", "WMV"),
         (b"\x00\x00\x01\xBA", "MPEG"),
+        (b"\x00\x00\x01\xB3", "MPEG"),
+        (b"\x00\x00\x00\x01\x67", "raw H.264"),
+        (b"\x00\x00\x00\x01\x40", "raw H.265"),
+        (b"\x06\x0E\x2B\x34", "MXF"),
+        (b"OggS", "Ogg"),
+        (b"DKIF", "IVF"),
+        (b"YUV4MPEG2 ", "Y4M"),
         (b"\x1F\x8B\x08", "gzip"),
         (b"PK\x03\x04", "ZIP"),
     ];
@@ -71,9 +79,11 @@ pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
     // Two letters may begin any text. A bitmap has four zeros after its length.
     let is_bitmap = bytes.starts_with(b"BM") && bytes.get(6..10) == Some(&[0; 4]);
     let is_avi = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ");
-    let is_packets = [0, PACKET, 2 * PACKET]
-        .iter()
-        .all(|at| bytes.get(*at) == Some(&SYNC));
+    let has_packets = |stamp: usize| {
+        let mut starts = (0..3).map(|index| stamp + index * (stamp + PACKET));
+        starts.all(|at| bytes.get(at) == Some(&SYNC))
+    };
+    let is_packets = has_packets(0) || has_packets(STAMP);
     let of_parts = [(is_bitmap, "BMP"), (is_avi, "AVI"), (is_packets, "MPEG-TS")];
     let found = found.map(|(_, name)| *name);
     found.or_else(|| of_parts.iter().find(|(is, _)| *is).map(|(_, name)| *name))
@@ -138,6 +148,12 @@ mod tests {
                 &[&[0x47; 1][..], &[0; 187]].concat().repeat(3),
                 Some("MPEG-TS"),
             ),
+            (
+                &[&[0, 0, 0, 1, 0x47][..], &[0; 187]].concat().repeat(3),
+                Some("MPEG-TS"),
+            ),
+            (b"OggS\0\x02", Some("Ogg")),
+            (b"\x06\x0E\x2B\x34\x02\x05", Some("MXF")),
             (&[0x47; 188], None),
             (b"\x1F\x8B\x08\0", Some("gzip")),
             (b"", None),

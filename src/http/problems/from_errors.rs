@@ -54,7 +54,8 @@ impl From<IngestError> for Problem {
 fn unread(name: &str) -> String {
     let cure = match name {
         "HEIC" | "HEIF" => "On an iPhone: Settings, Camera, Formats, Most Compatible.",
-        "AVI" | "FLV" | "WMV" | "MPEG" | "MPEG-TS" => {
+        "AVI" | "FLV" | "WMV" | "MPEG" | "MPEG-TS" | "MXF" | "Ogg" | "IVF" | "Y4M"
+        | "raw H.264" | "raw H.265" => {
             "Of videos send MP4, WebM or GIF: `ffmpeg -i VIDEO clip.mp4` makes one."
         }
         "gzip" | "ZIP" => "Send the file itself, not packed.",

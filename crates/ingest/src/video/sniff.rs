@@ -11,9 +11,17 @@ pub enum VideoFormat {
     MotionJpeg,
 }
 
+/// What the first box of an MP4 or QuickTime file may be. Older cameras write no `ftyp`.
+const BOXES: [&[u8; 4]; 7] = [
+    b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot",
+];
+
 /// The format of bytes that came with this media type; none where they are no video.
 pub fn video_format(bytes: &[u8], media_type: &str) -> Option<VideoFormat> {
-    let is_container = bytes.get(4..8) == Some(b"ftyp") && type_name(bytes).is_none()
+    let is_boxed = bytes
+        .get(4..8)
+        .is_some_and(|kind| BOXES.iter().any(|known| *known == kind));
+    let is_container = is_boxed && type_name(bytes).is_none()
         || bytes.starts_with(b"\x1A\x45\xDF\xA3")
         || bytes.starts_with(b"GIF8");
     let is_motion = matches!(media_type, "video/x-motion-jpeg" | "video/x-mjpeg");
@@ -35,8 +43,9 @@ mod tests {
         assert_eq!(video_format(jpeg, ""), None);
         let motion = video_format(jpeg, "video/x-motion-jpeg");
         assert_eq!(motion, Some(VideoFormat::MotionJpeg));
-        let video = video_format(b"\0\0\0\x18ftypisom", "");
-        assert_eq!(video, Some(VideoFormat::Container));
+        for start in [b"\0\0\0\x18ftypisom", b"\0\0\0\x08wide\0\x01\x20\x30"] {
+            assert_eq!(video_format(start, ""), Some(VideoFormat::Container));
+        }
         assert_eq!(video_format(b"\0\0\0\x18ftypavif", ""), None);
     }
 }
