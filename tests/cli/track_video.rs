@@ -249,6 +249,18 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
         // With B-frames, and few frames that stand for themselves.
         ("b.mp4", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
         ("b.mkv", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
+        // It counts in frames: a time between two of them is rounded to one.
+        (
+            "ticks.mp4",
+            [
+                "-c:v",
+                "libx264",
+                "-bf",
+                "0",
+                "-video_track_timescale",
+                "30",
+            ],
+        ),
         (
             "late.mov",
             ["-c:v", "mpeg4", "-output_ts_offset", "3", "-g", "20"],
@@ -347,6 +359,139 @@ fn pictures_that_cannot_be_made_after_a_cut_have_no_numbers() {
     let beyond = times.len().to_string();
     let line = fails(&["track", text(&cut), "--box=30,20,24,24", "--start", &beyond]);
     assert!(line.contains(&format!("it has {beyond} frames")), "{line}");
+}
+
+/// Runs ffmpeg in a folder.
+fn ffmpeg_in(folder: &Path, arguments: &str) {
+    let mut command = Command::new("ffmpeg");
+    let command = command.args(["-v", "error"]).current_dir(folder);
+    let command = command.args(arguments.split(' '));
+    assert!(
+        command.status().expect("ffmpeg starts").success(),
+        "{arguments}"
+    );
+}
+
+const TEST_PICTURES: &str = "-f lavfi -i testsrc2=size=160x120:rate=30";
+
+/// The times of the rows of a video, from a frame on, and the line that tells why there are no more.
+fn times_and_end(video: &Path, start: &str) -> (Vec<f64>, String) {
+    let flags = ["--box=50,40,30,30", "--format", "csv", "--start", start];
+    let output = bagtrack(&[&["track", text(video)], &flags[..]].concat());
+    let printed = String::from_utf8(output.stdout).expect("text");
+    let rows = if printed.is_empty() {
+        Vec::new()
+    } else {
+        rows(&printed)
+    };
+    let times = rows.iter().map(|row| row.time.expect("it has a time"));
+    let errors = String::from_utf8(output.stderr).expect("text");
+    (times.collect(), errors)
+}
+
+/// Whether these are all the times at 30 a second from the first one on.
+fn are_even(times: &[f64]) -> bool {
+    let mut pairs = times.windows(2);
+    pairs.all(|pair| (pair[1] - pair[0] - 1.0 / 30.0).abs() < 2e-3)
+}
+
+/// Packets of pictures that others alone are made from had a number each and a time, and all after them were late.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn pictures_of_vp8_that_are_not_shown_have_no_numbers() {
+    let parent = folder();
+    let coded = "-frames:v 90 -c:v libvpx -b:v 300k -auto-alt-ref 1 -lag-in-frames 25";
+    for pass in [1, 2] {
+        let arguments = format!("{TEST_PICTURES} {coded} -y -pass {pass} vp8.webm");
+        ffmpeg_in(parent.path(), &arguments);
+    }
+    for start in [0, 60] {
+        let video = parent.path().join("vp8.webm");
+        let (times, end) = times_and_end(&video, &start.to_string());
+        assert_eq!((times.len(), end.as_str()), (90 - start, ""));
+        assert!(are_even(&times), "{times:?}");
+        assert!((times[0] - start as f64 / 30.0).abs() < 2e-3, "{times:?}");
+    }
+}
+
+/// Each of these had no row, or had not all that can be had.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn what_is_no_damage_of_a_picture_ends_no_video() {
+    let parent = folder();
+    let make = |arguments: &str| ffmpeg_in(parent.path(), arguments);
+    let video = |name: &str| parent.path().join(name);
+    let coded = "-f lavfi -i sine -frames:v 30 -c:v libx264 -c:a aac -shortest whole.mp4";
+    make(&format!("{TEST_PICTURES} {coded}"));
+    // Sound is not decoded.
+    make("-i whole.mp4 -c copy -bsf:a noise=amount=5 noisy.mp4");
+    let (times, end) = times_and_end(&video("noisy.mp4"), "0");
+    assert_eq!((times.len(), end.as_str()), (30, ""));
+    // The end is missing, which ffmpeg says as soon as it looks for the index.
+    make("-i whole.mp4 -an -c:v libvpx-vp9 -cpu-used 8 whole.webm");
+    let bytes = fs::read(video("whole.webm")).expect("it was made");
+    fs::write(video("cut.webm"), &bytes[..bytes.len() * 8 / 10]).expect("it is writable");
+    let (all, end) = times_and_end(&video("cut.webm"), "0");
+    assert!((15..30).contains(&all.len()), "{all:?}");
+    assert!(end.contains("File ended prematurely"), "{end}");
+    let (later, end) = times_and_end(&video("cut.webm"), "5");
+    assert_eq!(later, all[5..]);
+    assert!(end.contains("File ended prematurely"), "{end}");
+    // Two pictures have the same time.
+    let twice = r"setts=ts=if(eq(N\,9)\,PREV_OUTPTS\,TS)";
+    make(&format!("-i whole.webm -c copy -bsf:v {twice} twice.webm"));
+    let (times, end) = times_and_end(&video("twice.webm"), "0");
+    assert_eq!((times.len(), end.as_str()), (30, ""));
+    assert_eq!(times[8], times[9]);
+}
+
+/// Its length is not known beforehand. A reader of the file took the last box for that of all frames to the end.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_track_ends_in_cvat_where_the_video_goes_on_without_known_times() {
+    let parent = folder();
+    let coded = "-frames:v 20 -c:v libx264 film.avi";
+    ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
+    let film = parent.path().join("film.avi");
+    let flags = ["--box=50,40,30,30", "--format", "cvat", "--frames"];
+    for (count, ends) in [("5", 1), ("19", 0), ("30", 0)] {
+        let printed = succeeds(&[&["track", text(&film)], &flags[..], &[count]].concat());
+        assert_eq!(
+            printed.matches("outside=\"1\"").count(),
+            ends,
+            "{count}: {printed}"
+        );
+    }
+}
+
+#[test]
+fn a_folder_has_no_frames_that_are_hidden_and_draws_each_of_the_others() {
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let frames = parent.path().join("frames");
+    fs::create_dir(&frames).expect("the folder is writable");
+    let first = dir.join("img/0001.jpg");
+    let picture = image::open(&first).expect("it is a picture");
+    fs::copy(&first, frames.join("a.jpg")).expect("it is there");
+    picture.save(frames.join("a.png")).expect("it is writable");
+    fs::write(frames.join("._a.jpg"), "of macOS").expect("it is writable");
+    let drawn = format!("{}/", text(&parent.path().join("drawn")));
+    let printed = succeeds(&[
+        "track",
+        text(&frames),
+        &target,
+        "--format",
+        "csv",
+        "--draw",
+        &drawn,
+    ]);
+    assert_eq!(rows(&printed).len(), 2);
+    let mut names: Vec<_> = fs::read_dir(&drawn).expect("it is there").collect();
+    names.sort_by_key(|entry| entry.as_ref().expect("it is there").file_name());
+    let names = names
+        .into_iter()
+        .map(|entry| entry.expect("it is there").file_name());
+    assert_eq!(names.collect::<Vec<_>>(), ["a.jpg", "a.png.jpg"]);
 }
 
 /// A browser's recording of a screen is like this: frames come when something changes.
@@ -475,6 +620,8 @@ fn shown_at(video: &Path) -> Vec<f64> {
     let told = command.output().expect("ffprobe starts").stdout;
     let told = String::from_utf8(told).expect("text");
     let times = told.lines().map(|line| line.trim_end_matches(','));
+    // Some frames have a line of their own for what stands beside them.
+    let times = times.filter(|time| !time.is_empty());
     times.map(|time| time.parse().expect("a time")).collect()
 }
 

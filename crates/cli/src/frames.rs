@@ -25,7 +25,12 @@ pub fn list(dir: &Path) -> Result<Vec<PathBuf>, SequenceError> {
     let unreadable = |error: std::io::Error| SequenceError::new(dir, error.to_string());
     let mut frames = Vec::new();
     for entry in fs::read_dir(&pictures).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
+        let entry = entry.map_err(unreadable)?;
+        // macOS writes a file ._NAME beside NAME to disks of others.
+        if entry.file_name().to_string_lossy().starts_with('.') {
+            continue;
+        }
+        let path = entry.path();
         let extension = path.extension().and_then(|extension| extension.to_str());
         let is_frame = extension.is_some_and(|extension| {
             ["jpg", "jpeg", "png", "webp"].contains(&extension.to_ascii_lowercase().as_str())

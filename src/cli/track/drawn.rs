@@ -80,7 +80,11 @@ impl Drawn {
             Self::Folder(folder) => {
                 let name = frame.file.clone();
                 let name = name.unwrap_or_else(|| format!("{:06}.jpg", frame.index));
-                let file = folder.join(Path::new(&name).with_extension("jpg"));
+                let mut file = folder.join(Path::new(&name).with_extension("jpg"));
+                if file.exists() {
+                    // Of a.jpg and a.png.
+                    file = folder.join(format!("{name}.jpg"));
+                }
                 fs::write(&file, picture)
                     .map_err(|error| format!("{}: {error}", file.display()))?;
             }

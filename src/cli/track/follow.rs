@@ -70,7 +70,7 @@ impl Job {
             size: targets.frame_size(),
             rate: self.frames.rate().value(),
             names: self.names.clone(),
-            goes_on: self.frames.count().is_some_and(|count| length < count),
+            goes_on: self.frames.go_on_after(length),
         };
         or_stop(self.rows.finish(&clip)).map(|_| ())
     }

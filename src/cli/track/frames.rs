@@ -163,6 +163,14 @@ impl Frames {
         }
     }
 
+    /// Whether there is a frame after so many.
+    pub fn go_on_after(&mut self, length: u64) -> bool {
+        match self.count() {
+            Some(count) => length < count,
+            None => self.next().is_ok_and(|frame| frame.is_some()),
+        }
+    }
+
     /// How many frames are left, where that is known.
     pub fn left(&self) -> Option<u64> {
         match (&self.source, self.direction) {

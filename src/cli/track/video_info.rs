@@ -91,15 +91,18 @@ impl VideoInfo {
     }
 
     fn told(path: &Path) -> io::Result<Self> {
-        let (info, packets) = Self::parse(&ask(path, "packet=pts_time,flags")?);
-        match are_frames(&packets) {
+        let told = ask(path, "packet=pts_time,flags")?;
+        let (info, packets) = Self::parse(&told);
+        // Some packets of VP8 are of pictures that are not shown, and nothing tells which.
+        let is_vp8 = told.lines().any(|line| line.starts_with("stream,vp8,"));
+        match are_frames(&packets) && !is_vp8 {
             true => Ok(info),
             // They have to be decoded.
             false => Ok(Self::parse(&ask(path, "frame=pts_time")?).0),
         }
     }
 
-    /// Reads lines like `packet,0.040000,K__` or `frame,0.040000`, `stream,25/1` and `format,"mov,mp4",0.000000`. Gives the
+    /// Reads lines like `packet,0.040000,K__` or `frame,0.040000`, `stream,h264,25/1` and `format,"mov,mp4",0.000000`. Gives the
     /// times in the order of the lines, too.
     fn parse(told: &str) -> (Self, Vec<Option<f64>>) {
         let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -111,7 +114,7 @@ impl VideoInfo {
                 // A packet that an edit list leaves out is decoded, but not shown.
                 ["packet", _, flags, ..] if flags.contains('D') => {}
                 ["packet" | "frame", time, ..] => told_times.push(time.parse::<f64>().ok()),
-                ["stream", fraction, ..] => rate = Rate::parse(fraction),
+                ["stream", _, fraction, ..] => rate = Rate::parse(fraction),
                 ["format", name, .., start] if INDEXED.contains(&name.trim_matches('"')) => {
                     indexed_from = start.parse().ok();
                 }
@@ -130,14 +133,15 @@ impl VideoInfo {
     }
 
     /// Within which seconds after its start time the file is to be decoded so that frame `index` is the first: between
-    /// the frames beside it. None where it has to be decoded from its beginning.
+    /// the frames beside it, and nearer to itself, since ffmpeg rounds to what the file counts in. None where it has to be
+    /// decoded from its beginning.
     pub fn seek_to(&self, index: u64) -> Option<Range<f64>> {
         let index = usize::try_from(index).ok()?;
         let own = self.times.get(index)?;
         let before = self.times.get(index.checked_sub(1)?)?;
         let after = self.times.get(index + 1).unwrap_or(&f64::INFINITY);
         let start = self.indexed_from?;
-        Some((before + own) / 2.0 - start..(own + after) / 2.0 - start)
+        Some((before + 3.0 * own) / 4.0 - start..(own + after) / 2.0 - start)
     }
 
     /// How many frames there are, where that is known.
@@ -170,7 +174,7 @@ impl VideoInfo {
 fn ask(path: &Path, each: &str) -> io::Result<String> {
     let mut command = Command::new(FFPROBE);
     command.args(["-v", "error", "-select_streams", "v:0", "-of", "csv"]);
-    let entries = format!("format=format_name,start_time:stream=avg_frame_rate:{each}");
+    let entries = format!("format=format_name,start_time:stream=codec_name,avg_frame_rate:{each}");
     command.args(["-show_entries", &entries]).arg(path);
     Ok(String::from_utf8_lossy(&command.output()?.stdout).into_owned())
 }
@@ -193,7 +197,8 @@ mod tests {
     #[test]
     fn times_are_in_the_order_of_showing_and_count_from_the_first() {
         // B-frames come before the frames that they are shown after; the first packet is cut off by an edit list.
-        let told = "packet,0.9,KD_\npacket,1.0,K__\npacket,1.2,___\npacket,1.1,___\nstream,10/1\n";
+        let told =
+            "packet,0.9,KD_\npacket,1.0,K__\npacket,1.2,___\npacket,1.1,___\nstream,h264,10/1\n";
         let (info, packets) = VideoInfo::parse(told);
         assert!(are_frames(&packets));
         assert_eq!(info.count(), Some(3));
@@ -207,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
-        let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,10/1\n";
+        let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,h264,10/1\n";
         let seek_to = |format: &str| {
             let (info, _) = VideoInfo::parse(&format!("{packets}{format}\n"));
             let round = |time: f64| (time * 1e6).round() / 1e6;
@@ -216,7 +221,12 @@ mod tests {
                 range.map(|range| (round(range.start), round(range.end)))
             })
         };
-        let expected = [None, Some((0.05, 0.25)), Some((0.25, f64::INFINITY)), None];
+        let expected = [
+            None,
+            Some((0.075, 0.25)),
+            Some((0.325, f64::INFINITY)),
+            None,
+        ];
         assert_eq!(seek_to("format,\"mov,mp4,m4a\",1.000000"), expected);
         assert_eq!(seek_to("format,\"matroska,webm\",1.000000"), expected);
         assert_eq!(seek_to("format,avi,1.000000"), [None; 4]);
@@ -226,7 +236,7 @@ mod tests {
     #[test]
     fn without_times_the_rate_tells() {
         let (info, packets) =
-            VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,30000/1001\n");
+            VideoInfo::parse("packet,N/A,K__\npacket,0.04,___\nstream,h264,30000/1001\n");
         assert!(!are_frames(&packets));
         assert_eq!((info.count(), info.time(30)), (None, 1.001));
         assert_eq!((info.frame_at(1.001), info.frame_at(1.0)), (30, 30));

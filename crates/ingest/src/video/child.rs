@@ -27,6 +27,15 @@ pub struct Launcher {
     pub hides_files: bool,
 }
 
+/// Whose video it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Trust {
+    /// Somebody else's: decoding may take so much, and no more.
+    Foreign,
+    /// That of the person who runs this, who may have all of the machine.
+    Own,
+}
+
 /// Starts the program with this input, and pipes for what it says. It gets nothing of the environment, which may have
 /// secrets, but the path.
 pub(super) fn start<A: AsRef<OsStr>>(
@@ -34,6 +43,7 @@ pub(super) fn start<A: AsRef<OsStr>>(
     program: &str,
     arguments: impl IntoIterator<Item = A>,
     input: Stdio,
+    trust: Trust,
 ) -> Result<Child, VideoError> {
     let mut words = launcher.words.iter().map(OsString::as_os_str);
     let mut command = match words.next() {
@@ -57,23 +67,26 @@ pub(super) fn start<A: AsRef<OsStr>>(
         program: program.to_owned(),
         source,
     })?;
-    limit(&child);
+    limit(&child, trust);
     Ok(child)
 }
 
 /// Sets the limits. Where that fails the program has ended already.
 #[cfg(target_os = "linux")]
-fn limit(child: &Child) {
+fn limit(child: &Child, trust: Trust) {
     use rustix::process::{Pid, Resource, Rlimit, prlimit, setpriority_process};
     let pid = Pid::from_child(child);
     let _ = setpriority_process(Some(pid), NICENESS);
-    for (resource, most) in [
-        (Resource::As, MAX_MEMORY),
-        (Resource::Cpu, MAX_CPU),
+    let of_foreign = match trust {
+        Trust::Foreign => &[(Resource::As, MAX_MEMORY), (Resource::Cpu, MAX_CPU)][..],
+        Trust::Own => &[],
+    };
+    let of_all = [
         (Resource::Fsize, MAX_FILE),
         (Resource::Nofile, MAX_FILES),
         (Resource::Core, 0),
-    ] {
+    ];
+    for &(resource, most) in of_foreign.iter().chain(&of_all) {
         let limit = Rlimit {
             current: Some(most),
             maximum: Some(most),
@@ -84,7 +97,7 @@ fn limit(child: &Child) {
 
 /// Elsewhere a process cannot be limited from outside.
 #[cfg(not(target_os = "linux"))]
-fn limit(_child: &Child) {}
+fn limit(_child: &Child, _trust: Trust) {}
 
 /// A file of these bytes that has no name; none where the system has no such files.
 #[cfg(target_os = "linux")]

@@ -1,6 +1,6 @@
 //! A video being decoded: the process, and the threads that feed it and hear what it says.
 
-use super::child::{self, Launcher};
+use super::child::{self, Launcher, Trust};
 use super::error::{Cost, VideoError};
 use super::output::{self, VideoPicture};
 use super::said::{Fault, Said};
@@ -64,7 +64,7 @@ pub struct VideoDecoder {
     limits: VideoLimits,
     program: String,
     strictness: Strictness,
-    child: Arc<Mutex<Child>>,
+    running: Arc<Mutex<Running>>,
     pictures: BufReader<ChildStdout>,
     said: Said,
     hearing: Option<JoinHandle<()>>,
@@ -74,13 +74,23 @@ pub struct VideoDecoder {
     read: usize,
 }
 
+/// The process, which may be replaced by another one.
+#[derive(Debug)]
+struct Running {
+    child: Child,
+    /// Whether one that replaces it has to end, too.
+    is_stopped: bool,
+}
+
 /// Ends the process from elsewhere.
 #[derive(Debug)]
-pub struct Stop(Arc<Mutex<Child>>);
+pub struct Stop(Arc<Mutex<Running>>);
 
 impl Drop for Stop {
     fn drop(&mut self) {
-        end(&self.0);
+        let mut running = lock(&self.0);
+        running.is_stopped = true;
+        end(&mut running.child);
     }
 }
 
@@ -138,7 +148,10 @@ impl VideoDecoder {
             limits,
             program: program.to_owned(),
             strictness,
-            child: Arc::new(Mutex::new(child)),
+            running: Arc::new(Mutex::new(Running {
+                child,
+                is_stopped: false,
+            })),
             pictures: BufReader::new(stdout),
             said,
             hearing: Some(hearing),
@@ -149,7 +162,7 @@ impl VideoDecoder {
 
     /// Begins anew with this, where first pictures could not be made. What stops the process goes on to do so.
     fn start_again(&mut self, source: Source) -> Result<(), VideoError> {
-        end(&self.child);
+        end(&mut lock(&self.running).child);
         let (source, strictness, from) = match source {
             // They are wanted. From the file's beginning on all can be made.
             Source::File(url, Some(from)) => {
@@ -160,15 +173,21 @@ impl VideoDecoder {
         };
         let mut again = Self::start(source, &self.program, self.limits, strictness)?;
         again.from = from;
-        mem::swap(&mut *lock(&self.child), &mut *lock(&again.child));
+        let mut running = lock(&self.running);
+        mem::swap(&mut running.child, &mut lock(&again.running).child);
+        if running.is_stopped {
+            // While it was started.
+            end(&mut running.child);
+        }
+        drop(running);
         mem::swap(self, &mut again);
-        mem::swap(&mut self.child, &mut again.child);
+        mem::swap(&mut self.running, &mut again.running);
         Ok(())
     }
 
     /// What ends the process when it is dropped, also while another thread waits for a picture.
     pub fn stop(&self) -> Stop {
-        Stop(self.child.clone())
+        Stop(self.running.clone())
     }
 
     /// The next picture; none after the last.
@@ -234,8 +253,8 @@ impl VideoDecoder {
             return Ok(None);
         };
         let _ = hearing.join();
-        let ended = lock(&self.child).wait();
-        if let Some(fault) = self.said.fault() {
+        let ended = lock(&self.running).child.wait();
+        if let Some(fault) = self.said.fault_in_all() {
             return Err(self.error(fault));
         }
         match ended {
@@ -280,7 +299,11 @@ impl Source {
     ) -> Result<Child, VideoError> {
         let begin = |launcher: &Launcher, input: &[&str], stdin: Stdio| {
             let arguments = arguments(input, limits, strictness);
-            child::start(launcher, program, arguments, stdin)
+            let trust = match self {
+                Self::Bytes(..) => Trust::Foreign,
+                Self::File(..) => Trust::Own,
+            };
+            child::start(launcher, program, arguments, stdin, trust)
         };
         let (launcher, bytes, format) = match self {
             Self::Bytes(launcher, bytes, format) => (launcher, bytes, *format),
@@ -343,6 +366,8 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
         "-frames:v",
         &count,
     ];
+    // The encoder refuses two pictures in the time of one.
+    let increasing = "setpts='if(isnan(PREV_OUTPTS),PTS,max(PTS,PREV_OUTPTS+1))'";
     let coded = [
         "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
     ];
@@ -352,7 +377,8 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
         &["-max_pixels", &pixels],
         input,
         &chosen,
-        // By default the encoder counts frames of a constant rate, and refuses two in the time of one.
+        &["-vf", increasing],
+        // By default the encoder counts frames of a constant rate.
         &output::TIME_BASE,
         &coded,
         &output::FORMAT,
@@ -375,18 +401,17 @@ fn is_out_of_time(_status: ExitStatus) -> bool {
 
 impl Drop for VideoDecoder {
     fn drop(&mut self) {
-        end(&self.child);
+        end(&mut lock(&self.running).child);
     }
 }
 
-fn lock(child: &Mutex<Child>) -> std::sync::MutexGuard<'_, Child> {
+fn lock(running: &Mutex<Running>) -> std::sync::MutexGuard<'_, Running> {
     // Nothing panics while it is held.
-    child.lock().unwrap_or_else(PoisonError::into_inner)
+    running.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Ends the process and waits for its end, so that it leaves nothing behind.
-fn end(child: &Mutex<Child>) {
-    let mut child = lock(child);
+fn end(child: &mut Child) {
     let _ = child.kill();
     let _ = child.wait();
 }

@@ -35,6 +35,8 @@ struct Heard {
     takes_missing_references: bool,
     /// The first one that tells more than that something failed.
     fault: Option<Fault>,
+    /// One that holds for the end of the video alone.
+    fault_at_end: Option<Fault>,
     /// Whether the last line was of a codec that may not be read.
     is_unlisted: bool,
 }
@@ -53,9 +55,15 @@ impl Said {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What is wrong, once the program has said it.
+    /// What is wrong with the pictures from here on, once the program has said it.
     pub(super) fn fault(&self) -> Option<Fault> {
         self.lock().fault.clone()
+    }
+
+    /// What is wrong with the video, once the program has ended.
+    pub(super) fn fault_in_all(&self) -> Option<Fault> {
+        let heard = self.lock();
+        heard.fault.clone().or_else(|| heard.fault_at_end.clone())
     }
 
     /// Whether the last line was of a codec that may not be read.
@@ -92,7 +100,12 @@ impl Heard {
     fn take(&mut self, line: &str) {
         // The cache says on every start that it cannot know the length of a pipe.
         let is_noise = line.starts_with("[cache @") || line.contains("Last message repeated");
-        if is_noise || line.is_empty() {
+        if is_noise || line.is_empty() || is_of_sound(line) {
+            return;
+        }
+        // It is said as soon as the index is looked for. The pictures that are there have their numbers.
+        if line.contains("File ended prematurely") {
+            self.fault_at_end.get_or_insert_with(|| fault(line, false));
             return;
         }
         // Sound is not decoded, and its codecs are not read either.
@@ -111,6 +124,17 @@ impl Heard {
             Some(_) => {}
         }
     }
+}
+
+/// Whether a line is of a codec of sound, which is looked at to know what it is, and not decoded.
+fn is_of_sound(line: &str) -> bool {
+    let codec = line
+        .strip_prefix('[')
+        .and_then(|rest| rest.split_once(" @ "));
+    let codecs = [
+        "aac", "aac_latm", "ac3", "eac3", "mp2", "mp3", "dca", "flac", "opus", "vorbis", "alac",
+    ];
+    codec.is_some_and(|(name, _)| codecs.contains(&name.trim_end_matches("float")))
 }
 
 /// Whether a line says that memory cannot be had: that it is not allocated, or the number of the system's error.
@@ -180,7 +204,7 @@ mod tests {
             said.hear(lines.join("\n").as_bytes());
             said.fault()
         };
-        let unlisted = "[aac @ 0x1] Codec (aac) not on whitelist 'h264'";
+        let unlisted = "[prores @ 0x1] Codec (prores) not on whitelist 'h264'";
         let damage = |text: &str| Some(Fault::Damage(text.to_owned()));
         assert_eq!(
             fault(&[unlisted, "    Last message repeated 1 times"]),
@@ -188,6 +212,11 @@ mod tests {
         );
         let lines = ["[h264 @ 0x1] Invalid NAL unit size", "Error while decoding"];
         assert_eq!(fault(&lines), damage("Invalid NAL unit size"));
+        let sound = [
+            "[aac @ 0x1] channel element 2.2 is not allocated",
+            "[mp3float @ 0x1] Header missing",
+        ];
+        assert_eq!(fault(&sound), None);
         let failed = "[mjpeg @ 0x1] get_buffer() failed";
         assert_eq!(fault(&[failed]), Some(Fault::Memory));
         let size = "[h264 @ 0x1] [IMGUTILS @ 0x2] Picture size 0x0 is invalid";
