@@ -70,6 +70,8 @@ export class FrameStream {
     this.ended = new Promise((resolve) => (this.resolveEnded = resolve));
     session.hold(this);
     this.resendFrom(session.frame + 1);
+    // The service may have these, of a stream before this one: it tells.
+    this.sent = this.waiting.length;
     this.connect();
   }
 
@@ -193,7 +195,7 @@ export class FrameStream {
       const detail = `The service needs frame ${next} again, which is not kept any more.`;
       return this.end(new Problem({ type: "frame-out-of-order", status: 409, detail, expected_frame: next }));
     }
-    const again = this.live ? [] : kept.after(next - 1);
+    const again = this.live && next <= frame ? [] : kept.after(next - 1);
     const nobody = () => undefined;
     this.waiting.unshift(...again.map(({ frame, box }) => ({ frame, header: { box }, resolve: nobody, reject: nobody })));
     kept.forgetAfter(next - 1);
@@ -337,7 +339,7 @@ export class FrameStream {
     const left = this.waiting.splice(0);
     // The service may have these: they count, so a post or the next stream sends them again before its own.
     const { kept, frame: last } = this.session;
-    const sent = this.live || this.outOfOrder ? [] : left.slice(0, this.sent);
+    const sent = this.outOfOrder ? [] : left.slice(0, this.sent);
     sent.forEach(({ frame, header }, index) => kept.put({ number: last + 1 + index, frame, box: header.box }));
     left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
     this.resolveEnded(problem);

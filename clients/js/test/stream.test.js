@@ -181,3 +181,33 @@ test("frames without an answer are sent again by the stream or the post that com
   next.close();
   line.close();
 });
+
+test("a stream that is closed with frames on their way is followed by another one, or by posts", async () => {
+  let heard = 0;
+  // Hears only so many messages.
+  class Deaf extends WebSocket {
+    set onmessage(/** @type {(event: MessageEvent) => void} */ hear) {
+      this.addEventListener("message", (event) => (heard -= 1) >= 0 && hear(event));
+    }
+  }
+  for (const live of [false, true]) {
+    for (const next of ["stream", "post"]) {
+      heard = 2;
+      const session = await new Client(service.url, { WebSocket: Deaf }).open(clip.frames[0], clip.box, { seed: SEED });
+      const first = session.stream({ live });
+      await first.track(clip.frames[1]);
+      const settled = [];
+      for (const count of [2, 3, 4, 5]) {
+        settled.push(first.track(clip.frames[count]).catch(() => undefined));
+        while ((await session.read()).frames <= count);
+      }
+      first.close();
+      await Promise.all(settled);
+      heard = Infinity;
+      const second = next === "stream" ? session.stream({ live }) : session;
+      assert.deepEqual(rounded(await second.track(clip.frames[6])), clip.answers[6], `${live ? "live, " : ""}${next}`);
+      if (second !== session) second.close();
+      await session.end();
+    }
+  }
+});
