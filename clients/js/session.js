@@ -227,7 +227,7 @@ export class Session {
     // From here on they count: without an answer they are sent again before the next ones.
     frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
     try {
-      const response = await this.deliver(number, make);
+      const response = await this.deliver(number, make, signal);
       const answer = await response.json();
       this.frame = answer.frame;
       this.box = answer.box;
@@ -292,30 +292,35 @@ export class Session {
    * Makes a call for which the service must have the frames before one, and sends those that it does not have.
    * @param {number} number The first frame that the call does not need.
    * @param {(number: number) => Promise<Response>} call
+   * @param {AbortSignal} [signal]
    */
-  async deliver(number, call) {
+  async deliver(number, call, signal) {
     const backoff = new Backoff(this.client.transport.patience);
     for (let tries = 0; ; tries += 1) {
       try {
-        while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1);
+        while (this.lastAcknowledged < number - 1) await this.resend(this.lastAcknowledged + 1, signal);
         return await call(number);
       } catch (error) {
         const next = this.recovery(error, number);
         // Where every replica loses the session again, this ends with the time for retries.
         const pausing = tries === 0 ? 0 : backoff.next();
         if (pausing === undefined) throw error;
-        if (pausing > 0) await pause(pausing);
-        this.lastAcknowledged = next === undefined ? await this.reopen(/** @type {Problem} */ (error)) : next - 1;
+        if (pausing > 0) await pause(pausing, signal);
+        const lost = /** @type {Problem} */ (error);
+        this.lastAcknowledged = next === undefined ? await this.reopen(lost, signal) : next - 1;
       }
     }
   }
 
-  /** @param {number} number A frame that the service does not have. */
-  async resend(number) {
+  /**
+   * @param {number} number A frame that the service does not have.
+   * @param {AbortSignal} [signal]
+   */
+  async resend(number, signal) {
     const kept = this.kept.find(number);
     if (!kept) throw new Error(`The service needs frame ${number} again, which is not kept any more.`);
-    if (kept.box) await this.put(number, kept.frame, kept.box);
-    else await this.post("POST", "frames", { frame: number }, kept.frame);
+    if (kept.box) await this.put(number, kept.frame, kept.box, signal);
+    else await this.post("POST", "frames", { frame: number }, kept.frame, signal);
     this.lastAcknowledged = number;
   }
 
@@ -342,13 +347,14 @@ export class Session {
   /**
    * Opens the session again after the service has lost it, under another id.
    * @param {Problem} lost What told so.
+   * @param {AbortSignal} [signal]
    * @returns {Promise<number>} The last frame that it has then.
    */
-  async reopen(lost) {
+  async reopen(lost, signal) {
     const { origin } = this.kept;
     if (!origin) throw lost;
     try {
-      const opened = await this.client.create(origin.request);
+      const opened = await this.client.create({ ...origin.request, signal });
       [this.id, this.isDraining] = [opened.id, opened.isDraining];
       return opened.frame;
     } catch (error) {

@@ -3,8 +3,12 @@
 import { Backoff } from "./backoff.js";
 import { Problem } from "./problem.js";
 
-/** The connection is taken for dead when there is no answer for so long. */
+/** The connection is taken for dead when there is no answer for so many milliseconds, and one more for so many bytes. */
 const ATTEMPT = 30_000;
+const BYTES = 50;
+
+/** @param {any} body */
+const sizeOf = (body) => body?.byteLength ?? body?.size ?? body?.length ?? 0;
 
 /**
  * @typedef {object} Request
@@ -101,7 +105,9 @@ export class Transport {
     const attempt = new AbortController();
     const abort = () => attempt.abort(signal?.reason);
     signal?.addEventListener("abort", abort, { once: true });
-    const timer = setTimeout(() => attempt.abort(), ATTEMPT);
+    const parts = body instanceof FormData ? [...body.values()] : [body];
+    const bytes = parts.reduce((sum, part) => sum + sizeOf(part), 0);
+    const timer = setTimeout(() => attempt.abort(), ATTEMPT + bytes / BYTES);
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
       // Read to its end here, where a line that breaks on the way is a failure to be tried again.

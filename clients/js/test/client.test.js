@@ -262,3 +262,39 @@ test("a session leaves a service that is about to end", async () => {
     await Promise.all([first.stop(), second.stop()]);
   }
 });
+
+test("a signal ends the sending of a frame that is sent again", async () => {
+  const line = await openLine(service.port);
+  const session = await new Client(line.url, { patience: 1000 }).open(clip.frames[0], clip.box, options);
+  line.shut(true);
+  line.cut();
+  for (const frame of clip.frames.slice(1, 3)) {
+    await assert.rejects(session.track(frame, AbortSignal.timeout(100)), { name: "TimeoutError" });
+  }
+  line.shut(false);
+  assert.deepEqual(rounded(await session.track(clip.frames[3])), clip.answers[3]);
+  line.close();
+});
+
+test("a large frame has longer to go over a slow line", async (context) => {
+  context.mock.timers.enable({ apis: ["setTimeout"] });
+  const client = new Client("http://127.0.0.1:9", { patience: 0 });
+  const own = globalThis.fetch;
+  /** @type {AbortSignal[]} */
+  const signals = [];
+  globalThis.fetch = (_, { signal }) => {
+    signals.push(signal);
+    return new Promise((_, reject) => signal.addEventListener("abort", () => reject(signal.reason)));
+  };
+  try {
+    const opening = client.open(new Uint8Array(6e6), clip.box).catch(() => undefined);
+    const small = client.open(clip.frames[0], clip.box).catch(() => undefined);
+    context.mock.timers.tick(100_000);
+    assert.deepEqual(signals.map(({ aborted }) => aborted), [false, true]);
+    context.mock.timers.tick(100_000);
+    assert.ok(signals[0].aborted);
+    await Promise.all([opening, small]);
+  } finally {
+    globalThis.fetch = own;
+  }
+});

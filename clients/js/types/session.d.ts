@@ -161,10 +161,14 @@ export declare class Session {
      * Makes a call for which the service must have the frames before one, and sends those that it does not have.
      * @param {number} number The first frame that the call does not need.
      * @param {(number: number) => Promise<Response>} call
+     * @param {AbortSignal} [signal]
      */
-    deliver(number: number, call: (number: number) => Promise<Response>): Promise<Response>;
-    /** @param {number} number A frame that the service does not have. */
-    resend(number: number): Promise<void>;
+    deliver(number: number, call: (number: number) => Promise<Response>, signal?: AbortSignal): Promise<Response>;
+    /**
+     * @param {number} number A frame that the service does not have.
+     * @param {AbortSignal} [signal]
+     */
+    resend(number: number, signal?: AbortSignal): Promise<void>;
     /**
      * The frame to go on with after an error; undefined: the session is to be opened again. Throws the error where neither
      * helps.
@@ -176,7 +180,8 @@ export declare class Session {
     /**
      * Opens the session again after the service has lost it, under another id.
      * @param {Problem} lost What told so.
+     * @param {AbortSignal} [signal]
      * @returns {Promise<number>} The last frame that it has then.
      */
-    reopen(lost: Problem): Promise<number>;
+    reopen(lost: Problem, signal?: AbortSignal): Promise<number>;
 }
