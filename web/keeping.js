@@ -67,19 +67,21 @@ export class Keeping {
       const project = (await projects()).projectOf(run);
       const { isLocal, source } = run;
       const files = this.source === source ? undefined : smallFiles(source);
-      if (files) this.hasFiles = files.length > 0;
       const clip = clipOf(source);
-      const isWhole = !!clip || this.hasFiles || source.isAbsent === true;
       const { imageNames } = source;
       // In one step: a page that is left ends it, and begins no other.
-      await keepWork({ id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames }, files);
+      const work = { id, at: Date.now(), isLocal, project, states: statesOf(run), clip, imageNames };
+      const hasRoom = await keepWork(work, files);
+      const hasFiles = files ? hasRoom && files.length > 0 : this.hasFiles;
+      const isWhole = !!clip || hasFiles || source.isAbsent === true;
       if (run !== this.page.run) return isWhole;
+      this.hasFiles = hasFiles;
       this.source = source;
       this.isSafe = this.timer === undefined && isWhole;
       this.tell(`Kept in this browser: ${told(project)}.${isWhole ? "" : " The pictures are not kept."}`);
       return isWhole;
     } catch (error) {
-      this.tell(`The browser keeps nothing of this (${error instanceof Error ? error.message : error}).`);
+      this.tell(`The browser keeps nothing of this (${error instanceof Error ? error.message || error.name : error}).`);
       return false;
     }
   }

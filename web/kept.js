@@ -60,18 +60,22 @@ async function within(mode, run) {
 /** @param {IDBValidKey} key */
 const read = (key) => within("readonly", (store) => store.get(key));
 
-/** Keeps a run. Where there is no room, the oldest entry that no tab has open makes room.
+/** Keeps a run. Where there is no room, it is kept without its files; where that is no help, the oldest entry that no tab
+ * has open makes room.
  * @param {Kept} kept
  * @param {File[]} [files] Instead of those that it has.
- * @returns {Promise<unknown>} */
+ * @returns {Promise<boolean>} Whether there was room for the files. */
 export async function keepWork(kept, files) {
   try {
-    return await within("readwrite", (store) => {
+    await within("readwrite", (store) => {
       if (files) store.put(files, ["files", kept.id]);
       return store.put(kept, ["work", kept.id]);
     });
+    return true;
   } catch (error) {
-    const oldest = Object(error).name === "QuotaExceededError" ? (await freeWorks()).pop() : undefined;
+    if (Object(error).name !== "QuotaExceededError") throw error;
+    if (files?.length) return keepWork(kept, []).then(() => false);
+    const oldest = (await freeWorks()).pop();
     if (!oldest) throw error;
     await forget(oldest.id);
     return keepWork(kept, files);

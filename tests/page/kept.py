@@ -7,6 +7,9 @@ from clips import FRAMES, H264
 from files import GRAY, check_rows, choose_file, sent_box
 from studio import to_frame
 
+LARGE = 20 << 20
+"""Bytes of a file that the browser has no room for."""
+
 
 def told(table):
     return [(row["frame"], numbers(row), row["status"], row["target"], row["name"]) for row in table]
@@ -167,6 +170,34 @@ def left_for_another_source(checks):
     after = rows(page)
     assert told(after[: len(before)]) == told(before) and len(after) == FRAMES
     page.context.close()
+
+
+def no_room_for_the_file(checks):
+    """A file for which the browser has no room is not kept: its rows are, and all that was kept before."""
+    path = checks.files.folder / "large.mp4"
+    # A box of nothing at its end makes it large.
+    nothing = LARGE.to_bytes(4, "big") + b"free" + bytes(LARGE - 8)
+    path.write_bytes(checks.files.file("clip.mp4", 30, H264).read_bytes() + nothing)
+    page = checks.page(where="here")
+    other = page.context.new_page()
+    other.goto(page.url)
+    browser = other.context.new_cdp_session(other)
+    # The browser looks at it only now and then: it has to be there from the beginning.
+    browser.send("Storage.overrideQuotaForOrigin", {"origin": checks.service.url, "quotaSize": LARGE})
+    kept_run(checks, page)
+    page.close()
+    offers(other, ["card"])
+    other.locator("#here").evaluate("button => button.click()")
+    choose_file(other, path)
+    drag(other, sent_box(checks.files.truth[0]))
+    to_the_end(other)
+    kept_says(other, f"{FRAMES} rows. The pictures are not kept.")
+    offers(other, ["card"])
+    before = rows(other)
+    other.reload()
+    said(other, "Choose large.mp4 to see its pictures")
+    assert told(rows(other)) == told(before)
+    other.context.close()
 
 
 PASTED = """(input) => {
@@ -330,6 +361,7 @@ ALL = [
     reloaded_in_the_middle,
     renamed_and_reloaded,
     each_tab_for_itself,
+    no_room_for_the_file,
     left_for_another_source,
     project_opened_again,
     project_without_its_video,
