@@ -60,8 +60,8 @@ async function within(mode, run) {
 /** @param {IDBValidKey} key */
 const read = (key) => within("readonly", (store) => store.get(key));
 
-/** Keeps a run. Where there is no room, it is kept without its files; where that is no help, the oldest entry that no tab
- * has open makes room.
+/** Keeps a run. Where there is no room, it is kept without its files, or the oldest entry that no tab has open makes
+ * room.
  * @param {Kept} kept
  * @param {File[]} [files] Instead of those that it has.
  * @returns {Promise<boolean>} Whether there was room for the files. */

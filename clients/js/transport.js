@@ -3,9 +3,8 @@
 import { Backoff } from "./backoff.js";
 import { Problem } from "./problem.js";
 
-/** The connection is taken for dead when there is no answer for so many milliseconds, and one more for so many bytes. */
+/** The connection is taken for dead when there is no answer for so many milliseconds, one more for 50 bytes. */
 const ATTEMPT = 30_000;
-const BYTES = 50;
 
 /** @param {any} body */
 const sizeOf = (body) => body?.byteLength ?? body?.size ?? body?.length ?? 0;
@@ -107,7 +106,7 @@ export class Transport {
     signal?.addEventListener("abort", abort, { once: true });
     const parts = body instanceof FormData ? [...body.values()] : [body];
     const bytes = parts.reduce((sum, part) => sum + sizeOf(part), 0);
-    const timer = setTimeout(() => attempt.abort(), ATTEMPT + bytes / BYTES);
+    const timer = setTimeout(() => attempt.abort(), ATTEMPT + bytes / 50);
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
       // Read to its end here, where a line that breaks on the way is a failure to be tried again.
