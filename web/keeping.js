@@ -98,7 +98,7 @@ export class Keeping {
   /** A run that is about to be stopped can go on later, where its source can be opened again. */
   letGoOn() {
     const { run } = this.page;
-    if (!run || run.wake || !run.source.goTo) return;
+    if (!run?.source.goTo) return;
     const { files = [], name, imageNames } = run.source;
     const clip = clipOf(run.source);
     if (!clip && files.length === 0) return;
@@ -106,7 +106,7 @@ export class Keeping {
       wake(run, async () => {
         const source = await (clip ? openClip(clip) : openFiles(files, imageNames));
         await source.first();
-        return Object.assign(source, { name });
+        return Object.assign(source, { name, imageNames });
       });
   }
 
