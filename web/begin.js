@@ -66,6 +66,6 @@ export class Beginning {
       page.stage.show(picture.image);
       if (isWanted()) this.tell(time, picture.frame);
     });
-    this.going = this.going.catch((error) => page.fail(error));
+    this.going = this.going.catch((error) => run === page.run && page.fail(error));
   }
 }

@@ -202,13 +202,18 @@ export class Page {
   async follow(own, box) {
     this.message.follow();
     this.again = () => this.follow(own, box);
+    const { picture } = own;
     await this.beginning.going;
+    if (own !== this.run) return;
     this.enter("following");
     try {
+      // The bar has gone on since: the box is of what was shown.
+      if (picture !== own.picture) own.picture = (await own.source.goTo?.(picture.time, picture.frame)) ?? picture;
       if (this.frozen) own.picture = await this.frozen;
       await own.begin(box);
       if (own === this.run) this.say(FOLLOWING);
     } catch (error) {
+      if (own !== this.run) return;
       this.enter("first");
       this.fail(error);
     }

@@ -2,7 +2,7 @@
 
 import pathlib
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, said, slow, to_the_end
+from browser import choose, drag, frames, kept_rows, near, numbers, rows, said, slow, to_the_end
 from clips import FRAMES, H264
 from files import check_distance, choose_file, sent_box
 from service import Service
@@ -90,6 +90,66 @@ def gone_on_after_a_stop(checks):
         page.context.close()
 
 
+def stopped_after_a_reload(checks):
+    """A run that is stopped after the page was loaded anew goes on all the same."""
+    page = checks.page(where="here")
+    slow(page)
+    choose_file(page, checks.files.file("clip.mp4", 30, H264))
+    drag(page, sent_box(checks.files.truth[0]))
+    frames(page, 20)
+    page.locator("#pause").click()
+    kept_rows(page)
+    page.reload()
+    said(page, "clip.mp4 is here again")
+    page.locator("#stop").click()
+    said(page, "or go on")
+    page.locator("#resume").click()
+    to_the_end(page)
+    assert [int(row["frame"]) for row in rows(page)] == list(range(FRAMES))
+    page.context.close()
+
+
+def failed_after_it_was_left(checks):
+    """A run whose session fails once another one has taken its place leaves that alone."""
+    page = checks.page(allowed=("500",))
+    held = []
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: held.append(route))
+    choose(page, "leaves")
+    with page.expect_request(opening):
+        drag(page, checks.clips["leaves"]["truth"][0])
+    page.locator("#here").evaluate("button => button.click()")
+    page.locator("#sources summary").click()
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    with page.expect_response(opening):
+        held[0].fulfill(status=500, content_type="application/problem+json", body='{"status": 500}')
+    page.locator("#pause").click()
+    to_the_end(page)
+    assert page.locator("#message.bad").count() == 0
+    page.context.close()
+
+
+def drawn_before_it_is_shown(checks):
+    """A box that is drawn while the frame where to begin is on its way is of the one that is still shown."""
+    page = checks.page(where="here")
+    held = []
+    page.route("**/sample/card/50.jpg", lambda route: route.continue_() if held else held.append(route))
+    choose(page, "card")
+    moved = "bar => { bar.value = '2'; bar.dispatchEvent(new Event('input')); }"
+    with page.expect_request("**/sample/card/50.jpg"):
+        page.locator("#begin-at").evaluate(moved)
+    truth = checks.clips["card"]["truth"]
+    drag(page, truth[0])
+    held[0].continue_()
+    to_the_end(page)
+    table = rows(page)
+    assert [int(row["frame"]) for row in table] == list(range(150)) and near(table, truth) > 140
+    page.context.close()
+
+
 def played_again(checks):
     """Space plays what was tracked, from its beginning, and pauses; figures are those of the frame that is shown."""
     page = checks.page(where="here")
@@ -120,4 +180,12 @@ def played_again(checks):
     page.context.close()
 
 
-ALL = [stopped_with_the_service, service_with_other_keys, gone_on_after_a_stop, played_again]
+ALL = [
+    stopped_with_the_service,
+    service_with_other_keys,
+    gone_on_after_a_stop,
+    stopped_after_a_reload,
+    failed_after_it_was_left,
+    drawn_before_it_is_shown,
+    played_again,
+]
