@@ -2,7 +2,7 @@
 
 use bagtrack_config::Config;
 use bagtrack_quotas::{Client, ClientSessions, Clients, RequestPermit};
-use bagtrack_sessions::{OpenError, SessionQuota};
+use bagtrack_sessions::{OpenError, SessionQuota, clock};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::Duration;
@@ -112,6 +112,21 @@ async fn who_waits_for_a_request_gets_the_place_that_another_one_leaves() {
     assert!(clients.account(&key()).request().is_err());
     drop(given);
     assert!(clients.account(&key()).request().is_ok());
+}
+
+/// Whoever had it kept it as long as it liked, and nobody else of its key got one.
+#[tokio::test(start_paused = true)]
+async fn the_place_for_a_video_is_wanted_where_another_of_the_client_waits() {
+    let clients = clients();
+    let account = clients.account(&key());
+    let after = |seconds| clock::now() + Duration::from_secs(seconds);
+    let held = account.video_until(after(1)).await.expect("it is free");
+    let of_page = clients.account(&page());
+    let next = tokio::spawn(async move { of_page.video_until(after(60)).await.is_ok() });
+    account.videos().wanted_from(after(30)).await;
+    assert!(!next.is_finished());
+    drop(held);
+    assert!(next.await.expect("it does not panic"));
 }
 
 /// Requests of many addresses gave it all of its frames back.

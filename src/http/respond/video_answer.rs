@@ -8,7 +8,7 @@ use crate::http::state::AppState;
 use axum::body::{Body, BodyDataStream, Bytes};
 use axum::response::Response;
 use bagtrack_quotas::{Client, VideoPlaces};
-use bagtrack_sessions::clock;
+use bagtrack_sessions::clock::{self, Instant};
 use futures_util::{StreamExt, stream};
 use std::io;
 use std::time::Duration;
@@ -46,7 +46,7 @@ pub fn to_reader(state: &AppState, client: &Client, answer: Response) -> Respons
 async fn send(
     mut answer: BodyDataStream,
     sender: mpsc::Sender<Option<Bytes>>,
-    [of_all, of_client]: [VideoPlaces; 2],
+    places: [VideoPlaces; 2],
     mut patience: Duration,
 ) {
     loop {
@@ -54,12 +54,7 @@ async fn send(
         let room = tokio::select! {
             biased;
             room = sender.reserve() => room,
-            () = async {
-                tokio::select! {
-                    () = of_all.wanted_from(since + patience) => {}
-                    () = of_client.wanted_from(since + patience) => {}
-                }
-            } => {
+            () = wanted_from(&places, since + patience) => {
                 tracing::info!("an answer is taken too slowly, and a video waits for its place");
                 return;
             }
@@ -75,5 +70,13 @@ async fn send(
             Ok(None) => return room.send(None),
             Err(_) => return,
         }
+    }
+}
+
+/// Ready when it is `from` or later, and a video of anybody, or another one of the client, waits for a place.
+async fn wanted_from([of_all, of_client]: &[VideoPlaces; 2], from: Instant) {
+    tokio::select! {
+        () = of_all.wanted_from(from) => {}
+        () = of_client.wanted_from(from) => {}
     }
 }

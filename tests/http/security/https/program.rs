@@ -55,6 +55,15 @@ async fn a_new_certificate_is_read_on_sighup_and_a_wrong_one_is_left() {
     program.signal(Signal::HUP);
     let line = program.logs("the certificate stays as it was");
     assert!(line.contains("--tls-key"), "{line}");
+
+    // A pipe without a writer. This SIGHUP and all later ones waited for it.
+    std::fs::remove_file(files.certificate()).unwrap();
+    let mut command = Command::new("mkfifo");
+    let made = command.arg(files.certificate()).status().await.unwrap();
+    assert!(made.success());
+    program.signal(Signal::HUP);
+    let line = program.logs("the certificate stays as it was");
+    assert!(line.contains("it is no regular file"), "{line}");
     assert_eq!(shown(&authority, &program).await, second);
 }
 
