@@ -146,8 +146,10 @@ def file_with_corrections(checks):
     table = rows(page)
     scale = SIZE[0] / SENT[0]
     own = {"x": 200 * scale, "y": 200 * scale, "width": 80 * scale, "height": 60 * scale}
-    drawn = [row for row in table[1:] if all(abs(float(row[side]) - own[side]) < 2 for side in own)]
+    # Nothing moves there, so boxes that were tracked may stay near. They are never quite as sure as what was drawn.
+    drawn = [row for row in table[1:] if row["score"] == "1"]
     assert len(drawn) == 1, drawn
+    assert all(abs(float(drawn[0][side]) - own[side]) < 2 for side in own), drawn
     assert [int(row["frame"]) for row in table] == list(range(len(table)))
     shown = frame_numbers(video, *SENT)
     assert len(shown) >= 30 and shown == list(range(len(shown))), shown
