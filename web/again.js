@@ -104,35 +104,40 @@ export async function trackBack(run, object, frame, { tell, signal }) {
 }
 
 /**
- * Brings objects to the last frame again, after the page was loaded anew or a correction was undone: from their states, or
- * from their last boxes.
+ * Brings an object with a new session to the last frame again, after the page was loaded anew or a change was undone: from
+ * its states, or from its last box.
  * @param {Run} run
- * @param {FollowedObject[]} objects
+ * @param {FollowedObject} object
+ * @param {number} [last] Its rows after this frame, up to the next box that was drawn, are tracked anew.
  */
-export async function catchUp(run, objects) {
-  const { picture, source } = run;
-  for (const object of objects) {
-    const last = [...object.rows.values()].pop();
-    if (!last) continue;
-    object.follower.end();
-    object.follower = run.follower();
-    const from = await object.goBackBefore(run.lastFrame + 1);
-    if (object.isForgotten) run.told.anew();
-    object.isForgotten = false;
-    if (from === undefined) {
-      await object.follower.open(picture, scaled(last.box, picture.image, source.size));
-      object.frames = [picture.frame];
-      continue;
-    }
-    for (const number of run.frames.shown.filter((number) => number > from)) {
-      const passed = await run.frames.at(number);
-      if (!passed) continue;
-      const row = object.rows.get(number);
-      const header = row?.corrected ? { box: scaled(row.box, passed.image, source.size) } : {};
-      if (await object.follower.track(passed, header)) object.frames.push(number);
-      close(passed);
-    }
+export async function catchUp(run, object, last = run.lastFrame) {
+  const { source } = run;
+  const row = [...object.rows.values()].filter(({ frame }) => frame <= last).pop();
+  if (!row) return;
+  const until = object.drawnAfter(last);
+  let from = await object.goBackBefore(last + 1);
+  if (object.isForgotten) run.told.anew();
+  object.isForgotten = false;
+  if (from === undefined) {
+    const known = last < run.lastFrame ? await run.frames.at(row.frame) : undefined;
+    const picture = known ?? run.picture;
+    await object.follower.open(picture, scaled(row.box, picture.image, source.size));
+    if (known) close(known);
+    from = picture.frame;
+    object.frames = [from];
   }
+  for (const number of run.frames.shown) {
+    if (number <= from) continue;
+    const passed = await run.frames.at(number);
+    if (!passed) continue;
+    const { box, corrected } = object.rows.get(number) ?? {};
+    const header = box && corrected ? { box: scaled(box, passed.image, source.size) } : {};
+    const answer = await object.follower.track(passed, header);
+    if (answer && number > last && number < until) run.note(object, answer, passed, false);
+    else if (answer) object.frames.push(number);
+    close(passed);
+  }
+  object.sort();
 }
 
 /**
@@ -148,7 +153,11 @@ export async function goOn(run, source) {
   }
   await run.alone(async () => {
     run.isResting = false;
-    await catchUp(run, run.objects);
+    for (const object of run.objects) {
+      object.follower.end();
+      object.follower = run.follower();
+      await catchUp(run, object);
+    }
     await source.goTo?.(run.picture.time, run.picture.frame);
   });
   if (!run.isOver && !run.isResting) run.play();

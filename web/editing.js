@@ -163,7 +163,7 @@ export class Editing {
       this.page.repaint();
       this.page.changed();
     } catch (error) {
-      this.page.fail(error);
+      if (run === this.page.run) this.page.fail(error);
     }
   }
 

@@ -38,12 +38,13 @@ export class Undoing {
    * @param {Run} run
    * @returns {Promise<string>} The name of the object; empty where there is none. */
   async undo(run) {
-    for (let step = this.steps.pop(); step; step = this.steps.pop()) {
-      const object = run.objects.find(({ number }) => number === step?.number);
-      if (!object) continue;
-      if (step.rows) await bringBack(run, object, step);
-      else run.remove(object);
-      return object.name;
+    for (const step of [...this.steps].reverse()) {
+      const object = run.objects.find(({ number }) => number === step.number);
+      // Where this fails, the step stays.
+      if (object && step.rows) await bringBack(run, object, step);
+      else if (object) run.remove(object);
+      this.steps = this.steps.filter((other) => other !== step);
+      if (object) return object.name;
     }
     return "";
   }
@@ -56,13 +57,17 @@ export class Undoing {
  */
 async function bringBack(run, object, { rows = new Map(), saves, last, follower }) {
   await run.alone(async () => {
-    const later = [...object.rows].filter(([frame]) => frame > last);
-    object.rows = new Map([...rows, ...later]);
-    object.sort();
     const isSame = object.follower === follower;
-    object.saves = [...saves, ...object.saves.filter(({ after = -1 }) => isSame && after > last)];
-    // A run that goes on later catches up then.
-    const isAtWork = !run.wake && (run.isLocal || !run.isResting);
-    if (!isSame && isAtWork) await (await import("./again.js")).catchUp(run, [object]);
+    // A run that goes on later catches up then, unless rows follow from what is undone.
+    const isAnew = !isSame && (run.lastFrame > last || (!run.wake && (run.isLocal || !run.isResting)));
+    const draft = object.draft(isAnew ? run.follower() : object.follower);
+    draft.frames = object.frames;
+    draft.rows = new Map([...rows, ...[...object.rows].filter(([frame]) => frame > last)]);
+    draft.sort();
+    draft.saves = [...saves, ...object.saves.filter(({ after = -1 }) => isSame && after > last)];
+    if (isAnew) await (await import("./again.js")).catchUp(run, draft, last);
+    if (!run.objects.includes(object)) return draft.follower.end();
+    if (isAnew) object.follower.end();
+    [object.follower, object.frames, object.rows, object.saves] = [draft.follower, draft.frames, draft.rows, draft.saves];
   });
 }

@@ -2,11 +2,12 @@
 
 import json
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, rows_when, said, saved, slow, to_the_end
+from browser import choose, drag, frames, kept_rows, near, numbers, rows, rows_when, said, saved, slow, to_the_end
 from clips import FRAMES, H264
-from files import choose_file, sent_box
+from files import SECRET, choose_file, sent_box
 from kept import kept_says
 from kept import told as whole
+from service import Service
 from studio import to_frame, values
 
 OFF = [30, 200, 80, 60]
@@ -109,6 +110,62 @@ def undone_while_it_is_followed(checks):
         page.context.close()
 
 
+def undone_after_more_frames(checks):
+    """A wrong box is undone after more frames were tracked: those that followed from it are tracked anew."""
+    for where, begun, stops in (("here", 40, False), ("there", 40, True), ("here", 10, True)):
+        page = checks.page(where=where)
+        slow(page)
+        truth = checks.clips["card"]["truth"]
+        choose(page, "card")
+        drag(page, truth[0])
+        frames(page, begun)
+        page.locator("#pause").click()
+        before = kept_rows(page)
+        drag(page, OFF)
+        rows_when(page, lambda table: numbers(table[-1])[1] > 150)
+        page.locator("#pause").click()
+        frames(page, len(before) + 15)
+        page.locator("#stop" if stops else "#pause").click()
+        wrong = kept_rows(page)
+        page.locator("#undo").click()
+        said(page, "is undone")
+        table = rows(page)
+        assert len(table) == len(wrong) and values(table[: len(before)]) == values(before)
+        assert near(table, truth) > 0.8 * len(table), [numbers(row) for row in table]
+        page.locator("#resume" if stops else "#pause").click()
+        to_the_end(page)
+        table = rows(page)
+        assert len(table) == 150 and near(table, truth) > 120
+        page.context.close()
+
+
+def undone_without_the_service(checks):
+    """What cannot be undone while the service is away stays as it is, and is undone when it is back."""
+    service = Service(checks.program, **SECRET)
+    page = checks.page(url=service.url, allowed=("WebSocket", "ERR_CONNECTION", "Failed to load"))
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    frames(page, 40)
+    page.locator("#pause").click()
+    before = kept_rows(page)
+    drag(page, OFF)
+    wrong = rows_when(page, lambda table: numbers(table[-1])[1] > 150)
+    service.process.kill()
+    service.process.wait()
+    page.locator("#undo").click()
+    page.locator("#message.bad").wait_for()
+    assert values(rows(page)) == values(wrong)
+    service = Service(checks.program, port=service.port, **SECRET)
+    page.locator("#message").evaluate("place => { place.textContent = ''; place.className = ''; }")
+    page.locator("#undo").click()
+    said(page, "is undone")
+    assert values(rows(page)) == values(before)
+    page.locator("#pause").click()
+    to_the_end(page)
+    page.context.close()
+    service.stop()
+
+
 def box_at_the_edge(checks):
     """Arrows move a box to the edge of the picture and no further, and a paused run goes on after it."""
     page = checks.page(where="here")
@@ -158,4 +215,12 @@ def refused_box(checks):
     page.context.close()
 
 
-ALL = [tracked_anew_and_cancelled, up_to_the_next_correction, undone_while_it_is_followed, box_at_the_edge, refused_box]
+ALL = [
+    tracked_anew_and_cancelled,
+    up_to_the_next_correction,
+    undone_while_it_is_followed,
+    undone_after_more_frames,
+    undone_without_the_service,
+    box_at_the_edge,
+    refused_box,
+]
