@@ -82,20 +82,26 @@ async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     stream.send(pictures::png(1)).await;
     assert_eq!(stream.message().await["frame"], 1);
 
-    // The clocks of the two may be a minute apart.
-    app.clock.advance(Duration::from_secs(125));
+    // The clocks of the two may be a minute apart. No stream could be opened in that minute.
+    app.clock.advance(Duration::from_secs(65));
+    drop(stream);
+    let opened = StreamClient::try_open(app.address, &id, "", &headers).await;
+    let mut stream = opened.unwrap();
+    stream.send(pictures::png(2)).await;
+    assert_eq!(stream.message().await["frame"], 2);
+    app.clock.advance(Duration::from_secs(60));
     let refused = app.get_session(&id).await;
     let challenge = "Bearer realm=\"bagtrack\", error=\"invalid_token\"";
     assert_eq!(refused.headers()["www-authenticate"], challenge);
     let problem = expect_problem(refused, "unauthorized").await;
     let detail = problem["detail"].as_str().unwrap();
     assert!(detail.contains("has expired"), "{detail}");
-    stream.send(pictures::png(2)).await;
+    stream.send(pictures::png(3)).await;
     assert_eq!(problem_slug(&stream.message().await), "unauthorized");
     assert_eq!(stream.close_code().await, 4401);
     // What she gave a page is good for its own time.
     app.key = Some(made["token"].as_str().unwrap().to_owned());
-    expect(app.post_frame(&id, pictures::png(2)).await, StatusCode::OK).await;
+    expect(app.post_frame(&id, pictures::png(3)).await, StatusCode::OK).await;
 }
 
 #[tokio::test]

@@ -84,7 +84,7 @@ pub enum TokenError {
 pub struct Identity {
     /// The client.
     pub owner: Owner,
-    /// When the token ends.
+    /// From when the token is no longer taken: its end, and the leeway of clocks that differ.
     pub expires: SystemTime,
 }
 
@@ -202,7 +202,7 @@ impl TokenVerifier {
             (known.keys.clone(), known.checked.get(&digest).cloned())
         };
         if let Some(identity) = checked {
-            return match now < identity.expires + LEEWAY {
+            return match now < identity.expires {
                 true => Ok(identity),
                 false => Err(TokenError::Expired),
             };
@@ -293,8 +293,8 @@ impl TokenVerifier {
         if claims.get("iss").and_then(Value::as_str) != Some(&self.0.issuer) {
             return Err(TokenError::Issuer);
         }
-        let expires = moment(claims, "exp")?.ok_or_else(|| missing("exp"))?;
-        if now >= expires + LEEWAY {
+        let expires = moment(claims, "exp")?.ok_or_else(|| missing("exp"))? + LEEWAY;
+        if now >= expires {
             return Err(TokenError::Expired);
         }
         if moment(claims, "nbf")?.is_some_and(|begins| now + LEEWAY < begins) {
