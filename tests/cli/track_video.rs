@@ -445,6 +445,38 @@ fn what_is_no_damage_of_a_picture_ends_no_video() {
     assert_eq!(times[8], times[9]);
 }
 
+/// Of a broadcast that is received from some moment on, the first pictures cannot be made. Nothing was tracked.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_recording_that_begins_between_key_pictures_is_tracked_from_the_next_one_on() {
+    let parent = folder();
+    for coded in [
+        "libx264 -bf 2",
+        "libx265 -x265-params log-level=none",
+        "mpeg2video -q:v 4",
+    ] {
+        let name = coded.split(' ').next().expect("the encoder");
+        let coded = format!("-frames:v 90 -c:v {coded} -g 30 {name}.ts");
+        ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
+        let (whole, cut) = (
+            format!("{name}.ts"),
+            parent.path().join(format!("cut-{name}.ts")),
+        );
+        let bytes = fs::read(parent.path().join(whole)).expect("it was made");
+        let packets = bytes.len() / 188;
+        fs::write(&cut, &bytes[packets / 6 * 188..]).expect("it is writable");
+        let (all, end) = times_and_end(&cut, "0");
+        assert_eq!(end, "", "{name}");
+        // Beside the first key picture some cannot be made, either.
+        assert!(
+            (58..90).contains(&all.len()) && are_even(&all[3..]),
+            "{name}: {all:?}"
+        );
+        let (later, end) = times_and_end(&cut, "20");
+        assert_eq!((later.as_slice(), end.as_str()), (&all[20..], ""), "{name}");
+    }
+}
+
 /// Its length is not known beforehand. A reader of the file took the last box for that of all frames to the end.
 #[test]
 #[ignore = "needs ffmpeg"]

@@ -142,13 +142,23 @@ fn is_memory(line: &str) -> bool {
     line.contains("allocat") || line.contains("(-12 ")
 }
 
-/// Whether a line says of H.264 or H.265 that a picture is missing which others are made from.
+/// Whether a line says that a picture is missing which others are made from, or what is told before such a picture, as at
+/// the start of a recording that begins between two of them.
 fn is_reference(line: &str) -> bool {
     let says = [
+        // Of H.264 and H.265.
         "eference picture",
         "mmco: ",
         "co located POCs",
         "find ref with POC",
+        // Of H.264, and what follows from it.
+        "non-existing PPS",
+        "non-existing SPS",
+        "decode_slice_header error",
+        "no frame!",
+        // Of H.265, and of MPEG-2.
+        "PPS id out of range",
+        "Invalid frame dimensions 0x0",
     ];
     says.iter().any(|text| line.contains(text))
 }
