@@ -2,7 +2,7 @@
 
 use bagtrack_ingest::{IngestError, Limits};
 use bagtrack_tracker::{Frame, FrameFormat, ycbcr};
-use image::codecs::jpeg::JpegEncoder;
+use image::codecs::jpeg::{JpegEncoder, PixelDensity, PixelDensityUnit};
 use image::{ImageFormat, ImageResult, RgbImage};
 use std::io::Cursor;
 
@@ -14,6 +14,8 @@ pub struct Picture {
     pub(super) image: RgbImage,
     /// Pixels of the picture for each pixel of the uploaded frame, across and down.
     pub(super) scale: (f64, f64),
+    /// The shape of the file's pixels, across and down, where it is a JPEG file: those of many videos are no squares.
+    density: Option<PixelDensity>,
 }
 
 impl Picture {
@@ -31,9 +33,9 @@ impl Picture {
                 has_color: true,
             }
         };
-        Ok(Self::of(bagtrack_ingest::decode_to(
-            bytes, limits, &format,
-        )?))
+        let mut picture = Self::of(bagtrack_ingest::decode_to(bytes, limits, &format)?);
+        picture.density = density(bytes);
+        Ok(picture)
     }
 
     fn of(frame: Frame) -> Self {
@@ -64,6 +66,7 @@ impl Picture {
                 f64::from(width) / f64::from(source.0),
                 f64::from(height) / f64::from(source.1),
             ),
+            density: None,
         }
     }
 
@@ -88,8 +91,24 @@ impl Picture {
     /// The picture has more than 65,535 pixels on a side.
     pub fn jpeg(&self) -> ImageResult<Vec<u8>> {
         let mut bytes = Vec::new();
-        let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+        let mut encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+        if let Some(density) = self.density {
+            encoder.set_pixel_density(density);
+        }
         self.image.write_with_encoder(encoder)?;
         Ok(bytes)
     }
+}
+
+/// The density of a JPEG file's pixels, from its JFIF header: without its unit, their shape.
+fn density(jpeg: &[u8]) -> Option<PixelDensity> {
+    let jfif = jpeg.strip_prefix(&[0xff, 0xd8, 0xff, 0xe0])?.get(2..)?;
+    // After the version and the unit.
+    let sides = jfif.strip_prefix(b"JFIF\0")?.get(3..7)?;
+    let side = |at: usize| u16::from_be_bytes([sides[at], sides[at + 1]]);
+    let density = (side(0), side(2));
+    (density.0 > 0 && density.1 > 0).then_some(PixelDensity {
+        density,
+        unit: PixelDensityUnit::PixelAspectRatio,
+    })
 }

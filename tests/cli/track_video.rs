@@ -526,6 +526,25 @@ fn a_folder_has_no_frames_that_are_hidden_and_draws_each_of_the_others() {
     assert_eq!(names.collect::<Vec<_>>(), ["a.jpg", "a.png.jpg"]);
 }
 
+/// The pixels of DV, of DVDs and of many cameras are no squares. What was drawn was shown too narrow.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
+    let parent = folder();
+    let coded = "-frames:v 9 -vf setsar=16/11 -c:v libx264 wide.mp4";
+    ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
+    for name in ["drawn.mp4", "drawn.mkv"] {
+        let (source, drawn) = (parent.path().join("wide.mp4"), parent.path().join(name));
+        let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
+        succeeds(&[&["track", text(&source)], &flags[..]].concat());
+        let mut command = Command::new("ffprobe");
+        command.args(["-v", "error", "-of", "csv=p=0", "-show_entries"]);
+        command.args(["stream=sample_aspect_ratio", text(&drawn)]);
+        let told = command.output().expect("ffprobe starts").stdout;
+        assert_eq!(String::from_utf8_lossy(&told).trim(), "16:11", "{name}");
+    }
+}
+
 /// A browser's recording of a screen is like this: frames come when something changes.
 #[test]
 #[ignore = "needs ffmpeg"]
