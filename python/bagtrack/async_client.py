@@ -110,10 +110,10 @@ class AsyncClient(BaseClient):
             return None
         assert isinstance(step, Request)
         try:
-            reply = await self._http.request(**request_of(step, self._services))
+            response = await self._http.request(**request_of(step, self._services))
         except httpx.TransportError as error:
             return lost(error)
-        return transport.reply(reply.status_code, reply.headers, reply.content)
+        return transport.reply(response)
 
 
 async def each(frames: Iterable[Frame]) -> AsyncIterator[Frame]:

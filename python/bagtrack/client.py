@@ -111,7 +111,7 @@ class Client(BaseClient):
             return None
         assert isinstance(step, Request)
         try:
-            reply = self._http.request(**request_of(step, self._services))
+            response = self._http.request(**request_of(step, self._services))
         except httpx.TransportError as error:
             return lost(error)
-        return transport.reply(reply.status_code, reply.headers, reply.content)
+        return transport.reply(response)

@@ -10,7 +10,10 @@ TEMPORARY = (408, 429, 502, 503, 504)
 
 
 class ServiceError(Exception):
-    """The service refused a request; the session is as it was. Its problem document (RFC 9457) says what to do."""
+    """The service refused a request; the session is as it was. Its problem document (RFC 9457) says what to do.
+
+    Also an answer that is none of the service's, such as a page of a proxy: its status is below 400.
+    """
 
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
         super().__init__(problem.get("detail") or problem.get("title") or f"the service answered {status}")

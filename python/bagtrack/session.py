@@ -6,13 +6,14 @@ import json
 import time
 import uuid
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any, Callable, Optional, TypeVar
 
 from bagtrack.answer import Answer, Box, BoxLike, parse_box
 from bagtrack.backoff import Backoff, RecoveryBackoff
 from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Steps
 
+T = TypeVar("T")
 SNAPSHOT = "application/vnd.bagtrack.snapshot"
 GONE = (404, 410)
 MOST_KEPT = 256
@@ -27,6 +28,24 @@ class Upload:
 
     body: bytes
     box: Optional[Box] = None
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What the service says of a session that it has opened."""
+
+    id: str
+    frame: int
+    box: Box
+    params: dict[str, Any]
+
+    @classmethod
+    def parse(cls, document: dict[str, Any]) -> Opened:
+        """Reads it from the answer."""
+        params = dict(document["parameters"])
+        # What opens the session again needs it.
+        params["seed"]
+        return cls(document["id"], int(document["frame"]), parse_box(document["box"]), params)
 
 
 @dataclass(frozen=True)
@@ -46,6 +65,33 @@ def four_numbers(box: BoxLike) -> Box:
     except (TypeError, ValueError) as error:
         raise ValueError("a box is four numbers: x, y, width, height") from error
     return (x, y, width, height)
+
+
+def understood(reply: Reply, read: Callable[[dict[str, Any]], T]) -> T:
+    """What the answer says. `ServiceError` where it was refused, or is none of the service's."""
+    if reply.status >= 400:
+        raise ServiceError(reply.status, reply.document)
+    try:
+        return read(reply.document)
+    except (KeyError, TypeError, ValueError) as error:
+        raise not_understood(reply) from error
+
+
+def not_understood(reply: Reply) -> ServiceError:
+    """Says what came in place of an answer, and from where."""
+    came = reply.headers.get("content-type", "no content type")
+    if "location" in reply.headers:
+        came += f", which leads to {reply.headers['location']}"
+    begin = reply.body[:60].decode(errors="replace")
+    detail = f"{reply.url} answered {reply.status} with what is no answer of bagtrack ({came}): {begin!r}"
+    return ServiceError(reply.status, {"detail": detail})
+
+
+def snapshot_of(reply: Reply) -> bytes:
+    """The snapshot in an answer; `ServiceError` where there is none."""
+    if reply.status < 400 and reply.headers.get("content-type") != SNAPSHOT:
+        raise not_understood(reply)
+    return understood(reply, lambda _: reply.body)
 
 
 def query_box(box: Box) -> str:
@@ -77,12 +123,12 @@ class Session:
     def open(self, query: dict[str, str], body: bytes, media_type: str) -> Steps[None]:
         """Opens a session from a first frame or a snapshot; ends the one that there was."""
         yield from self.close()
-        document = yield from self._create(query, body, media_type)
-        self._reset_to(document, query, body, media_type)
-        self.answer = Answer(self.last_acknowledged, parse_box(document["box"]), 1.0, "tracking")
+        opened = yield from self._create(query, body, media_type)
+        self._reset_to(opened, query, body, media_type)
+        self.answer = Answer(opened.frame, opened.box, 1.0, "tracking")
         if media_type == SNAPSHOT:
             reply = yield from self.call(Request("GET", self.path()))
-            self.answer = Answer.parse(self._checked(reply).document["answer"])
+            self.answer = understood(reply, lambda document: Answer.parse(document["answer"]))
 
     def advance(self, body: bytes, box: Optional[Box] = None) -> Steps[Answer]:
         """Sends the next frame."""
@@ -114,6 +160,7 @@ class Session:
                 raise ServiceUnavailable(f"the service needs frame {number} again, which is not kept any more")
             reply = yield from self.call(self._post(number, upload))
             if reply.status < 400:
+                understood(reply, Answer.parse)
                 self.last_acknowledged = max(self.last_acknowledged, number)
                 if number == until:
                     return reply
@@ -162,11 +209,11 @@ class Session:
             raise lost
         origin = self._origin
         try:
-            document = yield from self._create(origin.query, origin.body, origin.media_type)
+            opened = yield from self._create(origin.query, origin.body, origin.media_type)
         except ServiceError as refused:
             # Such as a service with other keys, which does not take the snapshot.
             raise lost from refused
-        self.id, self.last_acknowledged = document["id"], document["frame"]
+        self.id, self.last_acknowledged = opened.id, opened.frame
 
     def checkpoint(self, reply: Reply) -> Steps[None]:
         """Makes sure, after the reply to a frame, that the session can go on elsewhere."""
@@ -209,7 +256,7 @@ class Session:
                 yield from self.catch_up(self.answer.frame)
             reply = yield from self.call(Request("GET", self.path("/snapshot")))
             if reply.status not in GONE:
-                return self._checked(reply).body
+                return snapshot_of(reply)
             problem = ServiceError(reply.status, reply.document)
             # An answer that is lost is asked for at the next replica, which may not have the session.
             yield from self._pause(backoff, problem)
@@ -274,15 +321,14 @@ class Session:
                 raise ServiceUnavailable(f"no answer within {self.retry_for:g} s: {reason}") from reason
             yield Pause(pause)
 
-    def _create(self, query: dict[str, str], body: bytes, media_type: str) -> Steps[dict[str, Any]]:
+    def _create(self, query: dict[str, str], body: bytes, media_type: str) -> Steps[Opened]:
         request = Request("PUT", f"/sessions/{uuid.uuid4()}", {**query, "verbose": "true"}, body, media_type)
         reply = yield from self.call(request)
-        document: dict[str, Any] = self._checked(reply).document
-        return document
+        return understood(reply, Opened.parse)
 
-    def _reset_to(self, document: dict[str, Any], query: dict[str, str], body: bytes, media_type: str) -> None:
-        self.id, self.params = document["id"], document["parameters"]
-        self.last_acknowledged = document["frame"]
+    def _reset_to(self, opened: Opened, query: dict[str, str], body: bytes, media_type: str) -> None:
+        self.id, self.params = opened.id, opened.params
+        self.last_acknowledged = opened.frame
         if media_type != SNAPSHOT:
             # The same boxes come again only with the seed that was drawn.
             query = {**query, "seed": str(self.params["seed"])}
@@ -300,11 +346,9 @@ class Session:
         """Takes a snapshot, of frame `number` or a later one; without it the older one and more frames are kept."""
         try:
             reply = yield Request("GET", self.path("/snapshot"))
-        except ConnectionLost:
+            origin = Origin(number, {}, snapshot_of(reply), SNAPSHOT)
+        except (ConnectionLost, ServiceError):
             return None
-        if reply.status != 200:
-            return None
-        origin = Origin(number, {}, reply.body, SNAPSHOT)
         self._forget(number)
         self._origin = origin
         return origin
@@ -319,24 +363,17 @@ class Session:
         try:
             path = f"/sessions/{uuid.uuid4()}"
             reply = yield Request("PUT", path, origin.query, origin.body, origin.media_type)
-        except ConnectionLost:
-            reply = None
-        if reply is not None and reply.status in (200, 201):
-            self.id, self.last_acknowledged = reply.document["id"], reply.document["frame"]
-        else:
+            moved = understood(reply, lambda document: (document["id"], document["frame"]))
+        except (ConnectionLost, ServiceError):
             yield PreviousService()
+        else:
+            self.id, self.last_acknowledged = moved
 
     def _forget(self, until: int) -> None:
         """Forgets the frames up to this one, which the service does not ask for again."""
         self._uploads = {number: it for number, it in self._uploads.items() if number > until}
         if self._origin is not None and self._origin.frame < until:
             self._origin = None
-
-    @staticmethod
-    def _checked(reply: Reply) -> Reply:
-        if reply.status >= 400:
-            raise ServiceError(reply.status, reply.document)
-        return reply
 
 
 def settings(preset: str, seed: Optional[int], params: dict[str, Any]) -> dict[str, str]:

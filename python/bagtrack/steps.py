@@ -33,6 +33,8 @@ class Reply:
     body: bytes
     document: Any
     """The body as JSON; an empty object where it is none."""
+    url: str = ""
+    """Where it came from."""
 
     @property
     def is_draining(self) -> bool:

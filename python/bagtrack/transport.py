@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Mapping, Sequence, Union
+from typing import Any, Sequence, Union
 from urllib.parse import urlsplit
+
+import httpx
 
 from bagtrack.steps import ConnectionLost, Reply
 
@@ -61,10 +63,13 @@ def authorization(api_key: Union[str, None]) -> dict[str, str]:
     return {"Authorization": f"Bearer {key}"}
 
 
-def reply(status: int, headers: Mapping[str, str], body: bytes) -> Reply:
+def reply(response: httpx.Response) -> Reply:
     """A reply, with its body read as JSON where it is that."""
+    headers, body = response.headers, response.content
     document = parse(body) if "json" in headers.get("content-type", "") else {}
-    return Reply(status, {name.lower(): value for name, value in headers.items()}, body, document)
+    # Without what may be secret or long: it is for messages.
+    url = str(response.request.url.copy_with(userinfo=b"", query=None))
+    return Reply(response.status_code, {name.lower(): value for name, value in headers.items()}, body, document, url)
 
 
 def parse(text: Union[str, bytes, bytearray]) -> dict[str, Any]:
