@@ -1,13 +1,30 @@
 //! Keyword arguments to the tracker's parameters.
 
 use bagtrack_tracker::{Params, Preset};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use serde_json::{Map, Value};
 
 /// Seeds drawn here are below this, so that JSON numbers hold them exactly in every language.
 const SEED_END: u64 = 1 << 53;
+
+/// The seed in an argument: one that is not in its range is a `ValueError`, as with other parameters.
+///
+/// # Errors
+/// It is no whole number, or not in its range.
+pub fn extract_seed(value: &Bound<'_, PyAny>) -> PyResult<Option<u64>> {
+    let seed: PyResult<Option<u64>> = value.extract();
+    match seed {
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+            Err(PyValueError::new_err(format!(
+                "the seed is a whole number from 0 to {}, not {value}",
+                u64::MAX
+            )))
+        }
+        seed => seed,
+    }
+}
 
 /// The parameters of `preset` with single ones set otherwise. Where the seed is None, one is drawn from Python's `random`.
 ///

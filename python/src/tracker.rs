@@ -2,7 +2,7 @@
 
 use super::frame::frame;
 use super::model::PyNanoTrack;
-use super::params::{by_name, params};
+use super::params::{by_name, extract_seed, params};
 use super::target::{Numbers, numbers, rect};
 use bagtrack_tracker::{Estimate, Expert, Params, Search, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -63,7 +63,7 @@ impl PyTracker {
     fn new(
         py: Python<'_>,
         preset: &str,
-        seed: Option<u64>,
+        #[pyo3(from_py_with = extract_seed)] seed: Option<u64>,
         model: Option<Py<PyNanoTrack>>,
         params: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {

@@ -167,6 +167,13 @@ def test_parameters_are_checked_and_told(clip: Clip) -> None:
     assert bagtrack.Tracker(seed=None).params["seed"] != bagtrack.Tracker(seed=None).params["seed"]
     with pytest.raises(ValueError, match="robust or paper, not \"fast\""):
         bagtrack.Tracker("fast")
+    for make in (bagtrack.Tracker, bagtrack.cv.Tracker_create):
+        for seed in (-1, 2**64, np.int64(-1)):
+            with pytest.raises(ValueError, match=f"the seed is a whole number from 0 to {2**64 - 1}, not {seed}"):
+                make(seed=seed)
+        with pytest.raises(TypeError):
+            make(seed=1.5)
+    assert bagtrack.Tracker(seed=2**64 - 1).params["seed"] == 2**64 - 1
     with pytest.raises(TypeError, match="no parameter particle; the parameters are particles, patch_width"):
         bagtrack.Tracker(particle=10)
     with pytest.raises(TypeError, match="no parameter search;"):
