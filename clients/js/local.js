@@ -22,6 +22,8 @@ export class LocalClient {
   constructor() {
     /** @type {Promise<any> | undefined} */
     this.worker = undefined;
+    /** @type {Problem | undefined} Why the worker before has ended. */
+    this.lastProblem = undefined;
     /** @type {Map<number, Waiting>} Calls without an answer. */
     this.waiting = new Map();
     this.calls = 0;
@@ -31,8 +33,7 @@ export class LocalClient {
 
   /** Loads the tracker, so that the first session need not wait for it. */
   async warm() {
-    this.worker ??= this.start();
-    await this.worker;
+    await this.started();
   }
 
   /**
@@ -79,6 +80,7 @@ export class LocalClient {
   /** @param {Problem} problem */
   fail(problem) {
     this.worker = undefined;
+    this.lastProblem = problem;
     for (const { reject } of this.waiting.values()) reject(problem);
     this.waiting.clear();
   }
@@ -94,10 +96,12 @@ export class LocalClient {
     if (signal?.aborted) return Promise.reject(signal.reason);
     const taken = "image" in call ? sendable(call.image) : undefined;
     taken?.catch(() => undefined);
+    const { lastProblem } = this;
     const sending = this.before.then(async () => {
-      this.worker ??= this.start();
-      const worker = await this.worker;
+      this.check(lastProblem);
+      const worker = await this.started();
       const { sent, handed } = (await taken) ?? { sent: undefined, handed: [] };
+      this.check(lastProblem);
       this.calls += 1;
       const number = this.calls;
       // Fails with what cannot be copied; then nothing waits.
@@ -113,20 +117,43 @@ export class LocalClient {
     return sending.then(({ answer }) => answer);
   }
 
-  async start() {
+  /** Refuses a call whose worker has ended since it was made: another one would not know what it is about.
+   * @param {Problem | undefined} lastProblem The last one at that time. */
+  check(lastProblem) {
+    if (this.lastProblem !== lastProblem) throw this.lastProblem;
+  }
+
+  /** The worker, which is started where there is none. */
+  started() {
+    if (this.worker) return this.worker;
+    const worker = this.start((problem) => {
+      // One that was ended long ago takes nothing along.
+      if (this.worker === worker) this.fail(problem);
+    });
+    this.worker = worker;
+    return worker;
+  }
+
+  /** @param {(problem: Problem) => void} ends */
+  async start(ends) {
     // Bundlers know a worker by these very words.
     const isBrowser = typeof Worker !== "undefined";
     const worker = isBrowser ? new Worker(new URL("./worker.js", import.meta.url), { type: "module" }) : await startThread();
     await new Promise((resolve, reject) => {
+      const fail = (/** @type {string} */ detail) => {
+        const problem = new Problem({ type: "internal", status: 500, detail });
+        reject(problem);
+        ends(problem);
+      };
       worker.addEventListener("message", (/** @type {MessageEvent} */ { data }) => {
         if (data.isReady) resolve(undefined);
-        else this.receive(worker, data);
+        else this.receive(worker, data, ends);
       });
-      worker.addEventListener("error", (/** @type {ErrorEvent} */ { message }) => {
-        const problem = new Problem({ type: "internal", status: 500, detail: message || "The tracker cannot be loaded." });
-        reject(problem);
-        this.fail(problem);
-      });
+      worker.addEventListener("error", (/** @type {ErrorEvent} */ { message }) =>
+        fail(message || "The tracker cannot be loaded."),
+      );
+      // Node.js alone tells when a worker ends without an error.
+      worker.addEventListener("exit", () => fail("The worker with the tracker has ended, and all sessions with it."));
     });
     return worker;
   }
@@ -134,15 +161,16 @@ export class LocalClient {
   /**
    * @param {any} worker
    * @param {any} answer
+   * @param {(problem: Problem) => void} ends
    */
-  receive(worker, { number, value, problem, isBroken }) {
+  receive(worker, { number, value, problem, isBroken }, ends) {
     const waiting = this.waiting.get(number);
     this.waiting.delete(number);
     if (problem) waiting?.reject(new Problem(problem));
     else waiting?.resolve(value);
     if (isBroken) {
       worker.terminate();
-      this.fail(new Problem(problem));
+      ends(new Problem(problem));
     }
     // A process may end that waits for nothing.
     if (this.waiting.size === 0) worker.unref?.();

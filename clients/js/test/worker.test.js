@@ -67,6 +67,45 @@ test("a call that cannot be sent fails alone", async () => {
   await client.close();
 });
 
+test("calls fail whose worker is ended by somebody else, and the next session has another worker", async () => {
+  const client = new LocalClient();
+  const session = await client.open(image, box, options);
+  const worker = await client.worker;
+  // The last one is still to be sent.
+  const calls = [session.track(image), session.read(), client.open(image, box), session.snapshot()];
+  const settled = Promise.allSettled(calls);
+  await worker.terminate();
+  for (const call of await settled) {
+    assert.equal(call.status, "rejected");
+    assert.ok(slug("internal")(call.reason) && /worker .* has ended/.test(call.reason.message), `${call.reason}`);
+  }
+  assert.equal(client.waiting.size, 0);
+  await assert.rejects(session.track(image), slug("session-not-found"));
+  const next = await client.open(image, box, options);
+  assert.equal((await next.track(image)).frame, 1);
+  await client.close();
+});
+
+test("the end of a worker takes no session of the next one along", async () => {
+  const client = new LocalClient();
+  await client.open(image, box, options);
+  const old = await client.worker;
+  const closing = client.close();
+  const opening = client.open(image, box, options);
+  await new Promise((resolve) => old.on("exit", resolve));
+  await closing;
+  assert.equal((await (await opening).track(image)).frame, 1);
+  await client.close();
+});
+
+test("a call before `close` starts no worker after it", async () => {
+  const client = new LocalClient();
+  const call = client.open(image, box, options);
+  await client.close();
+  await assert.rejects(call, slug("session-not-found"));
+  assert.equal(client.worker, undefined);
+});
+
 test("bundlers find the worker, and can put its modules into one script", () => {
   const folder = new URL("../", import.meta.url);
   const text = (/** @type {string} */ name) => readFileSync(new URL(name, folder), "utf8");

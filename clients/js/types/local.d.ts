@@ -12,6 +12,8 @@ export type Waiting = {
 export declare class LocalClient {
     /** @type {Promise<any> | undefined} */
     worker: Promise<any> | undefined;
+    /** @type {Problem | undefined} Why the worker before has ended. */
+    lastProblem: Problem | undefined;
     /** @type {Map<number, Waiting>} Calls without an answer. */
     waiting: Map<number, Waiting>;
     calls: number;
@@ -56,12 +58,19 @@ export declare class LocalClient {
      * @returns {Promise<any>}
      */
     call(name: keyof import("./worker.js").Calls, call: any, signal?: AbortSignal): Promise<any>;
-    start(): Promise<any>;
+    /** Refuses a call whose worker has ended since it was made: another one would not know what it is about.
+     * @param {Problem | undefined} lastProblem The last one at that time. */
+    check(lastProblem: Problem | undefined): void;
+    /** The worker, which is started where there is none. */
+    started(): Promise<any>;
+    /** @param {(problem: Problem) => void} ends */
+    start(ends: (problem: Problem) => void): Promise<any>;
     /**
      * @param {any} worker
      * @param {any} answer
+     * @param {(problem: Problem) => void} ends
      */
-    receive(worker: any, { number, value, problem, isBroken }: any): void;
+    receive(worker: any, { number, value, problem, isBroken }: any, ends: (problem: Problem) => void): void;
 }
 /** A session in this page or process. */
 export declare class LocalSession {
