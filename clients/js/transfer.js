@@ -14,9 +14,23 @@ export async function sendable(image) {
     return { sent, handed: [sent] };
   }
   const isDrawn = ["HTMLCanvasElement", "OffscreenCanvas", "HTMLVideoElement"].includes(image.constructor?.name);
-  if (!isDrawn) return { sent: image, handed: [] };
+  if (!isDrawn) return withoutTheRest(image);
   const sent = await createImageBitmap(/** @type {ImageBitmapSource} */ (image));
   return { sent, handed: [sent] };
+}
+
+/** The image, with copies of what are parts of larger buffers: a message has the whole buffer of each array.
+ * @param {any} image
+ * @returns {{sent: Image, handed: Transferable[]}} */
+function withoutTheRest(image) {
+  // Shared memory is not copied at all.
+  const isPart = (/** @type {any} */ { BYTES_PER_ELEMENT: bytes, byteLength, buffer } = {}) =>
+    bytes === 1 && buffer instanceof ArrayBuffer && byteLength < buffer.byteLength;
+  const parts = ["data", "luma", "cb", "cr"].filter((name) => isPart(image[name] ?? undefined));
+  if (parts.length === 0) return { sent: image, handed: [] };
+  const copies = parts.map((name) => new Uint8Array(image[name]));
+  const sent = { ...image, ...Object.fromEntries(parts.map((name, at) => [name, copies[at]])) };
+  return { sent, handed: copies.map(({ buffer }) => buffer) };
 }
 
 /** Gives up what was handed over.

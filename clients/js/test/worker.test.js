@@ -67,6 +67,37 @@ test("a call that cannot be sent fails alone", async () => {
   await client.close();
 });
 
+test("of an array that is a part of a larger buffer only that part is sent", async () => {
+  const large = new ArrayBuffer(8_000_000);
+  const part = new Uint8Array(large, 1_000_000, luma.length);
+  part.set(luma);
+  const chroma = new Uint8Array(large, 2_000_000, luma.length / 4).fill(128);
+  const data = new Uint8ClampedArray(large, 3_000_000, 4 * luma.length).fill(255);
+  luma.forEach((gray, at) => data.fill(gray, 4 * at, 4 * at + 3));
+  const client = new LocalClient();
+  await client.warm();
+  const worker = await client.worker;
+  const { postMessage } = worker;
+  /** @type {number[]} */
+  const sizes = [];
+  worker.postMessage = (/** @type {any} */ message, /** @type {Transferable[]} */ handed) => {
+    const arrays = Object.values(message.call.image).filter(ArrayBuffer.isView);
+    sizes.push(arrays.reduce((sum, { buffer }) => sum + buffer.byteLength, 0));
+    postMessage.call(worker, message, handed);
+  };
+  const given = [image, { width, height, luma: part }, { width, height, data }, { ...image, cb: chroma, cr: chroma }];
+  const boxes = [];
+  for (const each of given) {
+    const session = await client.open(each, box, options);
+    boxes.push((await session.track(each)).box);
+  }
+  const bytes = [luma.length, luma.length, data.length, 1.5 * luma.length];
+  assert.deepEqual(sizes, bytes.flatMap((size) => [size, size]));
+  assert.deepEqual(boxes[1], boxes[0]);
+  assert.deepEqual(part, luma, "the caller's array is its own");
+  await client.close();
+});
+
 test("calls fail whose worker is ended by somebody else, and the next session has another worker", async () => {
   const client = new LocalClient();
   const session = await client.open(image, box, options);
