@@ -2,6 +2,7 @@
 
 mod addresses;
 mod balancers;
+mod broken_off;
 mod chaos;
 mod clip;
 mod failures;
