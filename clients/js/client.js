@@ -1,12 +1,12 @@
 // A service: it opens sessions.
 
-import { boxText } from "./given.js";
+import { boxText, frameOf } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
 import { Session } from "./session.js";
 import { Transport } from "./transport.js";
 
 /**
- * @typedef {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} Frame A JPEG, PNG or WebP file.
+ * @typedef {Blob | ArrayBuffer | Uint8Array} Frame A JPEG, PNG or WebP file.
  *
  * @typedef {object} OpenOptions
  * @property {"robust" | "paper"} [preset]
@@ -57,7 +57,7 @@ export class Client {
     // The same boxes come again only with the same seed.
     const drawn = seed ?? crypto.getRandomValues(new Uint32Array(1))[0];
     const query = { box: boxText(box), preset, seed: drawn, parameters: json };
-    return this.create({ query, body: frame, type: "application/octet-stream", signal });
+    return this.create({ query, body: frameOf(frame), type: "application/octet-stream", signal });
   }
 
   /**
@@ -67,8 +67,8 @@ export class Client {
    * @param {number} [patience] Milliseconds in which a call that fails for a moment is made again; as the client's.
    * @returns {Promise<Session>}
    */
-  restore(snapshot, signal, patience) {
-    return this.create({ ...restoring(snapshot), signal, patience });
+  async restore(snapshot, signal, patience) {
+    return this.create({ ...restoring(frameOf(snapshot)), signal, patience });
   }
 
   /**

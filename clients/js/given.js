@@ -12,12 +12,16 @@ export function checkImage(image) {
   throw unsupported("An image is { width, height, data }, planes, a picture, a video or a Blob.");
 }
 
-/** Refuses what a WebSocket would send as a text, or not at all.
- * @param {unknown} frame */
-export function checkFrame(frame) {
+/** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
+ * send as a text or not at all is none, and shared memory is sent by no browser.
+ * @param {import("./client.js").Frame} frame
+ * @returns {Blob | Uint8Array<ArrayBuffer>} */
+export function frameOf(frame) {
+  if (ArrayBuffer.isView(frame)) return new Uint8Array(frame.buffer, frame.byteOffset, frame.byteLength).slice();
   // By their names: those of another realm, such as a frame's or a test runner's, are of other classes.
-  const isFile = /^\[object (Blob|File|ArrayBuffer)\]$/.test(Object.prototype.toString.call(frame));
-  if (isFile || ArrayBuffer.isView(frame)) return;
+  const name = Object.prototype.toString.call(frame);
+  if (/^\[object (Blob|File)\]$/.test(name)) return /** @type {Blob} */ (frame);
+  if (name === "[object ArrayBuffer]") return new Uint8Array(/** @type {ArrayBuffer} */ (frame)).slice();
   throw unsupported("A frame is a Blob, an ArrayBuffer or a Uint8Array with a JPEG, PNG or WebP file.");
 }
 

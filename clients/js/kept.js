@@ -7,7 +7,7 @@
  *
  * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
- * @property {import("./client.js").Frame} frame
+ * @property {Blob | Uint8Array<ArrayBuffer>} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
  */
 
@@ -16,7 +16,7 @@ export const MOST_KEPT = 256;
 const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 
 /** The request that goes on where a snapshot was taken.
- * @param {import("./client.js").Frame} snapshot
+ * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot
  * @returns {import("./transport.js").Request} */
 export function restoring(snapshot) {
   return { body: snapshot, type: SNAPSHOT };

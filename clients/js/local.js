@@ -49,7 +49,7 @@ export class LocalClient {
   }
 
   /** Opens a session that goes on where a snapshot was taken: here, by another local session, or by the service.
-   * @param {Uint8Array<ArrayBuffer>} snapshot
+   * @param {Uint8Array} snapshot
    * @param {AbortSignal} [signal] */
   async restore(snapshot, signal) {
     const id = ++lastId;
@@ -223,7 +223,7 @@ export class LocalSession {
 
   /**
    * Tracks several frames.
-   * @param {Image[]} images
+   * @param {Iterable<Image>} images
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer[]>}
    */

@@ -1,7 +1,7 @@
 // A session: frames go in, boxes come back.
 
 import { Backoff } from "./backoff.js";
-import { boxOf, boxText, checkFrame } from "./given.js";
+import { boxOf, boxText, frameOf } from "./given.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
@@ -31,7 +31,7 @@ import { pause } from "./transport.js";
  * @typedef {import("./client.js").Frame} Frame
  *
  * @typedef {object} Sent A request with the next frames.
- * @property {Frame[]} frames
+ * @property {(Blob | Uint8Array<ArrayBuffer>)[]} frames
  * @property {Box} [box] Where the user corrects it.
  * @property {(number: number) => Promise<Response>} make
  * @property {AbortSignal} [signal]
@@ -81,23 +81,25 @@ export class Session {
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer>}
    */
-  track(frame, signal) {
-    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, frame, signal);
-    return this.next({ frames: [frame], make, signal });
+  async track(frame, signal) {
+    const own = frameOf(frame);
+    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, own, signal);
+    return this.next({ frames: [own], make, signal });
   }
 
   /**
    * Sends several frames at once. If one is bad, none is taken.
-   * @param {Frame[]} frames
+   * @param {Iterable<Frame>} frames
    * @param {AbortSignal} [signal]
    * @returns {Promise<Answer[]>}
    */
   async trackAll(frames, signal) {
-    if (frames.length === 0) return [];
+    const own = [...frames].map(frameOf);
+    if (own.length === 0) return [];
     const body = new FormData();
-    for (const frame of frames) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
+    for (const frame of own) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
     const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, body, signal);
-    const answer = await this.next({ frames: [...frames], make, signal });
+    const answer = await this.next({ frames: own, make, signal });
     return answer.answers ?? [answer];
   }
 
@@ -109,9 +111,9 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   async correct(frame, box, signal) {
-    const own = boxOf(box);
-    const make = (/** @type {number} */ number) => this.put(number, frame, own, signal);
-    return this.next({ frames: [frame], box: own, make, signal });
+    const [own, ownBox] = [frameOf(frame), boxOf(box)];
+    const make = (/** @type {number} */ number) => this.put(number, own, ownBox, signal);
+    return this.next({ frames: [own], box: ownBox, make, signal });
   }
 
   /** The session's state; the service does not count this as a frame.
@@ -200,7 +202,7 @@ export class Session {
 
   /**
    * @param {number} number
-   * @param {Frame} frame
+   * @param {Blob | Uint8Array<ArrayBuffer>} frame
    * @param {Box} box
    * @param {AbortSignal} [signal]
    */
@@ -214,7 +216,6 @@ export class Session {
    */
   async next(sent) {
     if (this.open) throw new Error("The session has a stream: send the frames there, or close it.");
-    sent.frames.forEach(checkFrame);
     const made = this.before.then(() => this.send(sent));
     this.before = made.catch(() => undefined);
     return made;

@@ -17,8 +17,8 @@ const MOST_BYTES = 16 << 20;
 const refused = (detail) => new Problem({ type: "invalid-snapshot", status: 422, detail });
 
 /** The tracker's own snapshot in one of the service; another one as it is.
- * @param {Uint8Array<ArrayBuffer>} snapshot
- * @returns {Promise<Uint8Array<ArrayBuffer>>} */
+ * @param {Uint8Array} snapshot
+ * @returns {Promise<Uint8Array>} */
 export async function trackerOf(snapshot) {
   if (!MAGIC.every((byte, at) => snapshot[at] === byte)) return snapshot;
   const version = snapshot[MAGIC.length];
@@ -26,7 +26,7 @@ export async function trackerOf(snapshot) {
   const from = MAGIC.length + 1;
   const length = new DataView(snapshot.buffer, snapshot.byteOffset + from).getUint32(0, true);
   if (length > MOST_BYTES) throw refused("The snapshot is damaged.");
-  const compressed = snapshot.subarray(from + 4, snapshot.length - CODE_BYTES);
+  const compressed = snapshot.slice(from + 4, snapshot.length - CODE_BYTES);
   const content = await inflated(compressed, length).catch(() => undefined);
   const end = content && varint(content);
   if (!end || end.next + end.value > content.length) throw refused("The snapshot is damaged.");

@@ -1,7 +1,7 @@
 // A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice. A session
 // that the service has lost is opened again.
 
-import { boxOf, checkFrame, checkWindow } from "./given.js";
+import { boxOf, checkWindow, frameOf } from "./given.js";
 import { Problem } from "./problem.js";
 import { pause } from "./transport.js";
 
@@ -19,7 +19,7 @@ import { pause } from "./transport.js";
  * @property {(isUp: boolean) => void} [onLine] Is told when the line breaks and when it is up again.
  *
  * @typedef {object} Waiting A frame without an answer.
- * @property {import("./client.js").Frame} frame
+ * @property {Blob | Uint8Array<ArrayBuffer>} frame
  * @property {{box?: import("./session.js").Box, see?: boolean}} header
  * @property {(answer: StreamAnswer | undefined) => void} resolve
  * @property {(problem: unknown) => void} reject
@@ -86,11 +86,11 @@ export class FrameStream {
   track(frame, { box, see } = {}) {
     if (this.isEnded) return Promise.reject(new Error("The stream has ended."));
     return new Promise((resolve, reject) => {
-      checkFrame(frame);
+      const own = frameOf(frame);
       const header = { box: box == null ? undefined : boxOf(box), see };
       // Of live frames that cannot be sent yet, the newest is kept.
       if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
-      this.waiting.push({ frame, header, resolve, reject });
+      this.waiting.push({ frame: own, header, resolve, reject });
       if (this.lost) this.reopen(this.lost);
       else this.transmit();
     });

@@ -143,7 +143,7 @@ export class Tracker {
   }
 
   /** A tracker that goes on from a snapshot: of `save`, or of the service.
-   * @param {Uint8Array<ArrayBuffer>} snapshot */
+   * @param {Uint8Array} snapshot */
   static async load(snapshot) {
     await load();
     const bytes = await trackerOf(snapshot);

@@ -51,6 +51,70 @@ function failure(error) {
   return error.isTemporary ? { unavailable: true } : { refused: error.status, kind: error.slug };
 }
 
+const OPENED = { request: "PUT /sessions/{1}", frame: "a", reply: { status: 201, created: 0 } };
+const posted = (/** @type {number} */ number, /** @type {string} */ frame, /** @type {object} */ reply) => ({
+  request: `POST /sessions/{1}/frames?frame=${number}`,
+  frame,
+  reply,
+});
+
+/** A service with this script, for the length of a test.
+ * @param {(service: ScriptedService) => Promise<void>} run */
+async function withService(run) {
+  const service = new ScriptedService();
+  await service.start();
+  try {
+    await run(service);
+    service.check();
+  } finally {
+    service.stop();
+  }
+}
+
+test("a frame that is sent again is what it was, also where its buffer has another one since", () =>
+  withService(async (service) => {
+    const gone = { status: 404, problem: { type: "/docs/problems#session-not-found" } };
+    service.exchanges = [
+      OPENED,
+      posted(1, "b", { status: 200, answer: 1 }),
+      posted(2, "c", { status: 200, answer: 2 }),
+      posted(3, "d", gone),
+      { ...OPENED, request: "PUT /sessions/{2}" },
+      ...[[1, "b"], [2, "c"], [3, "d"]].map(([number, frame]) => ({
+        ...posted(Number(number), String(frame), { status: 200, answer: number }),
+        request: `POST /sessions/{2}/frames?frame=${number}`,
+      })),
+    ];
+    // One of them in shared memory, which cannot be sent itself: the session would try it for ever.
+    const buffers = [bytes("a"), new Uint8Array(new SharedArrayBuffer(1)), bytes("a").buffer];
+    const filled = (/** @type {number} */ at, /** @type {string} */ text) => {
+      new Uint8Array(/** @type {any} */ (buffers[at]).buffer ?? buffers[at]).set(bytes(text));
+      return buffers[at];
+    };
+    const session = await clientOf(service.url).open(filled(0, "a"), boxOf(TABLE.box));
+    await session.track(filled(1, "b"));
+    await session.track(filled(2, "c"));
+    filled(0, "x");
+    filled(2, "y");
+    assert.equal((await session.track(filled(1, "d"))).frame, 3);
+  }));
+
+test("several frames may come from a generator", () =>
+  withService(async (service) => {
+    const answers = [1, 2].map((frame) => ({ frame, box: boxOf(TABLE.box), score: 1, status: "tracking" }));
+    service.exchanges = [OPENED];
+    const session = await clientOf(service.url).open(bytes("a"), boxOf(TABLE.box));
+    service.answer = (request, body, response) => {
+      assert.match(body, /\r\n\r\nb\r\n.*\r\n\r\nc\r\n/s);
+      response.writeHead(200).end(JSON.stringify({ ...answers[1], answers }));
+    };
+    const given = await session.trackAll((function* () {
+      yield bytes("b");
+      yield bytes("c");
+    })());
+    assert.deepEqual([given.map(({ frame }) => frame), session.kept.last], [[1, 2], 2]);
+  }));
+
 for (const { name, client, steps } of TABLE.scenarios) {
   test(`exchanges: ${name}`, async () => {
     const service = new ScriptedService();

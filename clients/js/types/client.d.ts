@@ -1,6 +1,6 @@
 import { Session } from "./session.js";
 import { Transport } from "./transport.js";
-export type Frame = Blob | ArrayBuffer | Uint8Array<ArrayBuffer>;
+export type Frame = Blob | ArrayBuffer | Uint8Array;
 export type OpenOptions = {
     preset?: "robust" | "paper";
     /**

@@ -4,9 +4,11 @@ export declare const unsupported: (detail: string) => Problem;
 /** Refuses what is no image for a tracker here.
  * @param {unknown} image */
 export declare function checkImage(image: unknown): void;
-/** Refuses what a WebSocket would send as a text, or not at all.
- * @param {unknown} frame */
-export declare function checkFrame(frame: unknown): void;
+/** The frame itself, whose buffer its owner may fill with another one afterwards; or a refusal. What a WebSocket would
+ * send as a text or not at all is none, and shared memory is sent by no browser.
+ * @param {import("./client.js").Frame} frame
+ * @returns {Blob | Uint8Array<ArrayBuffer>} */
+export declare function frameOf(frame: import("./client.js").Frame): Blob | Uint8Array<ArrayBuffer>;
 /** @param {number} window Frames on their way at a time. */
 export declare function checkWindow(window: number): number;
 /** The box itself, which its owner may change afterwards; or a refusal.

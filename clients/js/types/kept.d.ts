@@ -4,7 +4,7 @@ export type Origin = {
 };
 export type KeptFrame = {
     number: number;
-    frame: import("./client.js").Frame;
+    frame: Blob | Uint8Array<ArrayBuffer>;
     /**
      * Where the user corrected it.
      */
@@ -17,15 +17,15 @@ export type KeptFrame = {
  *
  * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
- * @property {import("./client.js").Frame} frame
+ * @property {Blob | Uint8Array<ArrayBuffer>} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
  */
 /** Most frames that are kept. */
 export declare const MOST_KEPT = 256;
 /** The request that goes on where a snapshot was taken.
- * @param {import("./client.js").Frame} snapshot
+ * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot
  * @returns {import("./transport.js").Request} */
-export declare function restoring(snapshot: import("./client.js").Frame): import("./transport.js").Request;
+export declare function restoring(snapshot: Blob | ArrayBuffer | Uint8Array<ArrayBuffer>): import("./transport.js").Request;
 export declare class Kept {
     /** While there is one, all frames after it are kept. */
     origin: Origin | undefined;

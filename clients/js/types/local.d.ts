@@ -32,9 +32,9 @@ export declare class LocalClient {
         signal?: AbortSignal;
     }): Promise<LocalSession>;
     /** Opens a session that goes on where a snapshot was taken: here, by another local session, or by the service.
-     * @param {Uint8Array<ArrayBuffer>} snapshot
+     * @param {Uint8Array} snapshot
      * @param {AbortSignal} [signal] */
-    restore(snapshot: Uint8Array<ArrayBuffer>, signal?: AbortSignal): Promise<LocalSession>;
+    restore(snapshot: Uint8Array, signal?: AbortSignal): Promise<LocalSession>;
     /**
      * Tracks the next frame of several sessions.
      * @param {LocalSession[]} sessions
@@ -99,11 +99,11 @@ export declare class LocalSession {
     track(image: Image, signal?: AbortSignal): Promise<Answer>;
     /**
      * Tracks several frames.
-     * @param {Image[]} images
+     * @param {Iterable<Image>} images
      * @param {AbortSignal} [signal]
      * @returns {Promise<Answer[]>}
      */
-    trackAll(images: Image[], signal?: AbortSignal): Promise<Answer[]>;
+    trackAll(images: Iterable<Image>, signal?: AbortSignal): Promise<Answer[]>;
     /**
      * Takes the next frame with the right box in it. It may be one that was tracked before.
      * @param {Image} image

@@ -32,7 +32,7 @@ export type View = {
 };
 export type Frame = import("./client.js").Frame;
 export type Sent = {
-    frames: Frame[];
+    frames: (Blob | Uint8Array<ArrayBuffer>)[];
     /**
      * Where the user corrects it.
      */
@@ -81,11 +81,11 @@ export declare class Session {
     track(frame: Frame, signal?: AbortSignal): Promise<Answer>;
     /**
      * Sends several frames at once. If one is bad, none is taken.
-     * @param {Frame[]} frames
+     * @param {Iterable<Frame>} frames
      * @param {AbortSignal} [signal]
      * @returns {Promise<Answer[]>}
      */
-    trackAll(frames: Frame[], signal?: AbortSignal): Promise<Answer[]>;
+    trackAll(frames: Iterable<Frame>, signal?: AbortSignal): Promise<Answer[]>;
     /**
      * Sends a frame as the next one with the right box in it. It may be one that was sent before.
      * @param {Frame} frame
@@ -133,11 +133,11 @@ export declare class Session {
     post(method: string, path: string, query: Record<string, string | number>, body: BodyInit, signal?: AbortSignal): Promise<Response>;
     /**
      * @param {number} number
-     * @param {Frame} frame
+     * @param {Blob | Uint8Array<ArrayBuffer>} frame
      * @param {Box} box
      * @param {AbortSignal} [signal]
      */
-    put(number: number, frame: Frame, box: Box, signal?: AbortSignal): Promise<Response>;
+    put(number: number, frame: Blob | Uint8Array<ArrayBuffer>, box: Box, signal?: AbortSignal): Promise<Response>;
     /**
      * Makes a request with the next frames after those before.
      * @param {Sent} sent

@@ -29,7 +29,7 @@ export type StreamOptions = {
     onLine?: (isUp: boolean) => void;
 };
 export type Waiting = {
-    frame: import("./client.js").Frame;
+    frame: Blob | Uint8Array<ArrayBuffer>;
     header: {
         box?: import("./session.js").Box;
         see?: boolean;

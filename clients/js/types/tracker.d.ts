@@ -34,8 +34,8 @@ export declare class Tracker {
     static create(image: Image | Frame, box: Box, options?: TrackerOptions): Promise<Tracker>;
     get wasm(): Wasm;
     /** A tracker that goes on from a snapshot: of `save`, or of the service.
-     * @param {Uint8Array<ArrayBuffer>} snapshot */
-    static load(snapshot: Uint8Array<ArrayBuffer>): Promise<Tracker>;
+     * @param {Uint8Array} snapshot */
+    static load(snapshot: Uint8Array): Promise<Tracker>;
     /** The whole state as bytes: for `load`, and for a service that takes unsigned snapshots. */
     save(): Uint8Array<ArrayBuffer>;
     /**
