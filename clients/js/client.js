@@ -3,7 +3,7 @@
 import { boxText, frameOf } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
 import { Session } from "./session.js";
-import { Transport } from "./transport.js";
+import { Transport, documentOf } from "./transport.js";
 
 /**
  * @typedef {Blob | ArrayBuffer | Uint8Array} Frame A JPEG, PNG or WebP file.
@@ -79,14 +79,14 @@ export class Client {
    */
   async attach(id) {
     const response = await this.transport.call("GET", `sessions/${encodeURIComponent(id)}`);
-    const view = await response.json();
+    const view = await documentOf(response, "id", "answer");
     return new Session(this, view.id, view.answer.frame, view.answer.box, response.headers);
   }
 
   /** @param {import("./transport.js").Request} request */
   async create(request) {
     const response = await this.transport.call("PUT", `sessions/${newId()}`, request);
-    const { id, frame, box } = await response.json();
+    const { id, frame, box } = await documentOf(response, "id", "frame", "box");
     const { query, body, type } = request;
     const origin = this.snapshotEvery > 0 ? { frame, request: { query, body, type } } : undefined;
     return new Session(this, id, frame, box, response.headers, origin, true);

@@ -13,7 +13,7 @@
 
 /** Most frames that are kept. */
 export const MOST_KEPT = 256;
-const SNAPSHOT = "application/vnd.bagtrack.snapshot";
+export const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 
 /** The request that goes on where a snapshot was taken.
  * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot

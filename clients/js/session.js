@@ -5,7 +5,7 @@ import { boxOf, boxText, frameOf } from "./given.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
-import { pause } from "./transport.js";
+import { documentOf, pause, snapshotOf } from "./transport.js";
 
 /**
  * @typedef {object} Box In pixels of the uploaded frame; it may reach over the edge.
@@ -39,6 +39,8 @@ import { pause } from "./transport.js";
 
 /** A service that is about to end may be the only one for a while: milliseconds until the next try to go elsewhere. */
 const MOVE_EVERY = 1000;
+/** What is read of an answer to a frame. */
+const ANSWER = ["frame", "box"];
 
 export class Session {
   /**
@@ -119,14 +121,13 @@ export class Session {
   /** The session's state; the service does not count this as a frame.
    * @returns {Promise<View>} */
   async read() {
-    return (await this.call("GET", "")).json();
+    return documentOf(await this.call("GET", ""), "id", "answer");
   }
 
   /** The whole session as bytes, for `client.restore`.
    * @returns {Promise<Uint8Array<ArrayBuffer>>} */
   async snapshot() {
-    const taken = await this.deliver(this.frame + 1, () => this.call("GET", "/snapshot"));
-    return new Uint8Array(await taken.arrayBuffer());
+    return snapshotOf(await this.deliver(this.frame + 1, () => this.call("GET", "/snapshot")));
   }
 
   /** A picture (PNG) of what the tracker keeps of the target.
@@ -139,7 +140,7 @@ export class Session {
    * @param {number} [seconds] How long it is good for (3600).
    * @returns {Promise<string>} */
   async token(seconds) {
-    return (await (await this.call("POST", "/token", { query: { seconds } })).json()).token;
+    return (await documentOf(await this.call("POST", "/token", { query: { seconds } }), "token")).token;
   }
 
   /** Sends frames over a WebSocket, many at a time. Until it is closed no frames are sent otherwise.
@@ -229,7 +230,7 @@ export class Session {
     frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
     try {
       const response = await this.deliver(number, make, signal);
-      const answer = await response.json();
+      const answer = await documentOf(response, ...ANSWER);
       this.frame = answer.frame;
       this.box = answer.box;
       this.lastAcknowledged = Math.max(this.lastAcknowledged, this.frame);
@@ -269,8 +270,8 @@ export class Session {
     const { transport } = this.client;
     const { id, frame } = this;
     const taken = this.noteReading(transport.attempt("GET", transport.at(`sessions/${id}/snapshot`), {}));
-    const response = await taken.catch(() => undefined);
-    return response && { frame, request: restoring(await response.arrayBuffer()) };
+    const snapshot = await taken.then(snapshotOf).catch(() => undefined);
+    return snapshot && { frame, request: restoring(snapshot) };
   }
 
   /** Takes a snapshot; without it the older one and more frames are kept. */
@@ -320,8 +321,10 @@ export class Session {
   async resend(number, signal) {
     const kept = this.kept.find(number);
     if (!kept) throw new Error(`The service needs frame ${number} again, which is not kept any more.`);
-    if (kept.box) await this.put(number, kept.frame, kept.box, signal);
-    else await this.post("POST", "frames", { frame: number }, kept.frame, signal);
+    const { frame, box } = kept;
+    const sent = box ? this.put(number, frame, box, signal) : this.post("POST", "frames", { frame: number }, frame, signal);
+    // A page of a proxy does not say that the service has it.
+    await documentOf(await sent, ...ANSWER);
     this.lastAcknowledged = number;
   }
 

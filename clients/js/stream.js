@@ -3,7 +3,7 @@
 
 import { boxOf, checkWindow, frameOf } from "./given.js";
 import { Problem } from "./problem.js";
-import { pause } from "./transport.js";
+import { documentOf, pause } from "./transport.js";
 
 /**
  * @typedef {object} Seen What the tracker saw, where that was asked for.
@@ -295,7 +295,7 @@ export class FrameStream {
     // A page is not told why a stream cannot be opened; this call tells.
     const { transport } = this.session.client;
     const url = transport.at(`sessions/${this.session.id}`);
-    const seen = await transport.attempt("GET", url, {}).then((response) => response.json()).catch((error) => error);
+    const seen = await transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames")).catch((error) => error);
     if (this.isEnded) return;
     if (seen instanceof Error) {
       const isTemporary = seen instanceof Problem && seen.isTemporary;

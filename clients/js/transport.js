@@ -1,6 +1,7 @@
 // Calls over HTTP: a call that fails for a moment is made again.
 
 import { Backoff } from "./backoff.js";
+import { SNAPSHOT } from "./kept.js";
 import { Problem } from "./problem.js";
 
 /** The connection is taken for dead when there is no answer for so many milliseconds, one more for 50 bytes. */
@@ -36,6 +37,41 @@ export function pause(milliseconds, signal) {
     }, milliseconds);
     signal?.addEventListener("abort", abort, { once: true });
   });
+}
+
+/**
+ * What an answer says. A problem where it is none of the service's, such as a page of a proxy.
+ * @param {Response} response
+ * @param {...string} members What its document has.
+ * @returns {Promise<any>}
+ */
+export async function documentOf(response, ...members) {
+  const text = await response.text();
+  try {
+    const document = JSON.parse(text);
+    if (members.every((member) => document[member] !== undefined)) return document;
+  } catch {
+    // It is told below.
+  }
+  throw notUnderstood(response, text);
+}
+
+/** The snapshot in an answer.
+ * @param {Response} response */
+export async function snapshotOf(response) {
+  if (response.headers.get("content-type") !== SNAPSHOT) throw notUnderstood(response, await response.text());
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+/** Says what came in place of an answer, and from where.
+ * @param {Response} response
+ * @param {string} text */
+function notUnderstood({ url, status, headers }, text) {
+  const came = headers.get("content-type") ?? "no content type";
+  const from = url.replace(/\?.*/s, "");
+  const begin = JSON.stringify(text.slice(0, 60));
+  const detail = `${from} answered ${status} with what is no answer of bagtrack (${came}): ${begin}`;
+  return new Problem({ type: "", status, detail });
 }
 
 export class Transport {
@@ -110,7 +146,11 @@ export class Transport {
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
       // Read to its end here, where a line that breaks on the way is a failure to be tried again.
-      if (response.ok) return new Response(response.status === 204 ? null : await response.arrayBuffer(), response);
+      if (response.ok) {
+        const whole = new Response(response.status === 204 ? null : await response.arrayBuffer(), response);
+        // Where it came from, after redirections, is not taken over.
+        return Object.defineProperty(whole, "url", { value: response.url });
+      }
       const problem = await response.json().catch(() => ({ title: response.statusText }));
       const seconds = Number(response.headers.get("retry-after") ?? undefined);
       throw new Problem({ ...problem, status: response.status }, Number.isFinite(seconds) ? seconds : undefined);

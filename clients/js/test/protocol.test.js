@@ -115,6 +115,51 @@ test("several frames may come from a generator", () =>
     assert.deepEqual([given.map(({ frame }) => frame), session.kept.last], [[1, 2], 2]);
   }));
 
+const PAGE = { status: 200, text: "<html>Please log in</html>" };
+const NO_ANSWERS = { page: PAGE, "other JSON": { status: 200, json: { ok: true } }, null: { status: 200, json: null } };
+
+for (const [name, reply] of Object.entries(NO_ANSWERS)) {
+  const told = /\/sessions\/.* answered 200 with what is no answer of bagtrack \(/;
+  const isTold = (/** @type {any} */ error) =>
+    error instanceof Problem && error.status === 200 && !error.isTemporary && told.test(error.message);
+
+  test(`what is no answer of the service is told with its address, and the session goes on: ${name}`, () =>
+    withService(async (service) => {
+      const snapshot = { request: "GET /sessions/{1}/snapshot", reply };
+      const lost = { status: 409, problem: { type: "/docs/problems#frame-out-of-order", expected_frame: 1 } };
+      service.exchanges = [
+        { ...OPENED, request: "PUT /sessions/{0}", reply },
+        OPENED,
+        posted(1, "b", reply),
+        posted(1, "c", { status: 200, answer: 1 }),
+        // The first frame stays what opens the session again.
+        snapshot,
+        posted(2, "d", lost),
+        // Nor is a frame that is sent again taken for one that has arrived.
+        posted(1, "c", reply),
+        posted(1, "c", { status: 200, answer: 1 }),
+        posted(2, "e", { status: 200, answer: 2 }),
+        snapshot,
+        snapshot,
+        { request: "GET /sessions/{1}", reply },
+      ];
+      const client = clientOf(service.url, { snapshot_every: 1 });
+      await assert.rejects(client.open(bytes("a"), boxOf(TABLE.box)), (error) => {
+        assert.ok(reply !== PAGE || error.message.endsWith('(text/html): "<html>Please log in</html>"'), error.message);
+        assert.doesNotMatch(error.message, /seed/, "the query is long");
+        return isTold(error);
+      });
+      const session = await client.open(bytes("a"), boxOf(TABLE.box));
+      await assert.rejects(session.track(bytes("b")), isTold);
+      assert.equal((await session.track(bytes("c"))).frame, 1);
+      await assert.rejects(session.track(bytes("d")), isTold);
+      assert.equal((await session.track(bytes("e"))).frame, 2);
+      assert.equal(session.kept.origin?.frame, 0);
+      await assert.rejects(session.snapshot(), isTold);
+      await assert.rejects(session.read(), isTold);
+    }));
+}
+
 for (const { name, client, steps } of TABLE.scenarios) {
   test(`exchanges: ${name}`, async () => {
     const service = new ScriptedService();

@@ -90,7 +90,8 @@ export class ScriptedService {
       const half = 'HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{"frame"';
       return response.socket.end(half);
     }
-    const { status, headers, answer, created, problem, snapshot, text } = reply;
+    const { status, headers, answer, created, problem, snapshot, text, json } = reply;
+    let type = snapshot === undefined ? "text/html" : SNAPSHOT;
     let content = snapshot ?? text ?? "";
     if (problem) content = JSON.stringify({ status, ...problem });
     const frame = answer ?? created;
@@ -99,6 +100,8 @@ export class ScriptedService {
       const more = created === undefined ? {} : { id, parameters: { seed: Number(this.seed) } };
       content = JSON.stringify({ ...told, ...more });
     }
-    response.writeHead(status, { Connection: "close", ...headers }).end(content);
+    if (json !== undefined) content = JSON.stringify(json);
+    if (snapshot === undefined && text === undefined) type = "application/json";
+    response.writeHead(status, { Connection: "close", "Content-Type": type, ...headers }).end(content);
   }
 }

@@ -22,6 +22,7 @@ export type KeptFrame = {
  */
 /** Most frames that are kept. */
 export declare const MOST_KEPT = 256;
+export declare const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 /** The request that goes on where a snapshot was taken.
  * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot
  * @returns {import("./transport.js").Request} */

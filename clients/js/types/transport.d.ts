@@ -26,6 +26,16 @@ export type Request = {
  * @returns {Promise<void>}
  */
 export declare function pause(milliseconds: number, signal?: AbortSignal): Promise<void>;
+/**
+ * What an answer says. A problem where it is none of the service's, such as a page of a proxy.
+ * @param {Response} response
+ * @param {...string} members What its document has.
+ * @returns {Promise<any>}
+ */
+export declare function documentOf(response: Response, ...members: string[]): Promise<any>;
+/** The snapshot in an answer.
+ * @param {Response} response */
+export declare function snapshotOf(response: Response): Promise<Uint8Array<ArrayBuffer>>;
 export declare class Transport {
     url: URL;
     key: string;
