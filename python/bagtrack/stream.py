@@ -11,6 +11,8 @@ from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.session import GONE, Session, Upload
 from bagtrack.steps import ConnectionLost, NextService, Pause, Reply, Steps
 
+MOST_ON_THEIR_WAY = 32
+
 
 @dataclass(frozen=True)
 class Connect:
@@ -54,6 +56,8 @@ class Stream:
     """The frames of a caller through a session's stream. `run` is a generator of steps."""
 
     def __init__(self, session: Session, window: int) -> None:
+        if not 1 <= window <= MOST_ON_THEIR_WAY:
+            raise ValueError(f"window is from 1 to {MOST_ON_THEIR_WAY}, not {window}")
         self._session = session
         self._window = window
         self._sent = 0

@@ -302,6 +302,26 @@ def test_a_stream_tells_of_a_bad_frame_and_the_session_goes_on(start_server: Sta
         assert [answer.box for answer in client.track(bodies[10:20])] == clip.answered()[10:20]
 
 
+@pytest.mark.parametrize("window", [0, -1, 33])
+def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServer, clip: Clip, window: int) -> None:
+    body = clip.files[0].read_bytes()
+
+    async def follow() -> None:
+        async with bagtrack.AsyncClient(url) as client:
+            await client.init(body, clip.box)
+            async for _ in client.track([body], window):
+                pass
+
+    url = start_server().url
+    with bagtrack.Client(url) as client:
+        client.init(body, clip.box)
+        # Without an answer it waited for ever.
+        with pytest.raises(ValueError, match=f"window is from 1 to 32, not {window}"):
+            next(client.track([body], window))
+    with pytest.raises(ValueError, match=f"window is from 1 to 32, not {window}"):
+        asyncio.run(follow())
+
+
 def test_frames_on_their_way_count_when_a_stream_is_left(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
