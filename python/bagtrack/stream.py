@@ -116,11 +116,14 @@ class Stream:
             if "type" in document:
                 self._refuse(document)
             self._tries = 0
-            session.answer = Answer.parse(document)
+            answer = session.answer = Answer.parse(document)
             session.last_acknowledged = max(session.last_acknowledged, session.answer.frame)
             if session.needs_checkpoint(document):
                 reply = as_reply(document)
-            yield Yield(session.answer)
+            yield Yield(answer)
+            if session.answer is not answer:
+                # The frames on their way have other numbers now.
+                raise RuntimeError("the client was used otherwise while `track` went on: leave its loop first")
 
     def _next_upload(self) -> Steps[Optional[Upload]]:
         number = self._sent + 1

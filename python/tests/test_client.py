@@ -322,6 +322,21 @@ def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServ
         asyncio.run(follow())
 
 
+def test_a_client_that_is_used_otherwise_in_the_midst_of_a_stream_says_so(start_server: StartServer, clip: Clip) -> None:
+    bodies = [file.read_bytes() for file in clip.files]
+    with bagtrack.Client(start_server().url, seed=SEED) as client:
+        client.init(bodies[0], clip.box)
+        answers = []
+        # It ended after the first answer, as if there were no more frames.
+        with pytest.raises(RuntimeError, match="leave its loop first"):
+            for answer in client.track(bodies[1:5]):
+                answers.append(answer.frame)
+                client.update(bodies[5])
+        assert answers == [1]
+        client.init(bodies[0], clip.box)
+        assert [answer.box for answer in client.track(bodies[1:10])] == clip.answered()[1:10]
+
+
 def test_frames_on_their_way_count_when_a_stream_is_left(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
