@@ -8,6 +8,8 @@ import uuid
 from dataclasses import dataclass
 from typing import Any, Callable, Optional, TypeVar
 
+import numpy as np
+
 from bagtrack.answer import Answer, Box, BoxLike, parse_box
 from bagtrack.backoff import Backoff, RecoveryBackoff
 from bagtrack.errors import ServiceError, ServiceUnavailable
@@ -382,5 +384,12 @@ def settings(preset: str, seed: Optional[int], params: dict[str, Any]) -> dict[s
     if seed is not None:
         query["seed"] = str(seed)
     if params:
-        query["parameters"] = json.dumps(params)
+        query["parameters"] = json.dumps(params, default=plain_number)
     return query
+
+
+def plain_number(value: object) -> Any:
+    """One of NumPy's numbers, which `Tracker` takes too, as JSON has it."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a parameter is a number, a truth value or a text, not {type(value).__name__}")

@@ -205,6 +205,16 @@ def test_refusals_are_told_and_change_nothing(start_server: StartServer, clip: C
         assert client.answer == bagtrack.Answer(5, (100, 80, 40, 30), 1.0, "tracking")
 
 
+def test_parameters_may_be_numbers_of_numpy(start_server: StartServer, clip: Clip) -> None:
+    given = {"particles": np.int64(50), "alpha": np.float32(0.5), "sigma": np.float64(20.5), "seed": np.uint8(3)}
+    with bagtrack.Client(start_server().url, **given) as client:
+        client.init(clip.files[0].read_bytes(), clip.box)
+        params = {"particles": 50, "alpha": 0.5, "sigma": 20.5, "seed": 3}
+        assert client.params.items() >= params.items()
+    with pytest.raises(TypeError, match="a parameter is a number, a truth value or a text, not ndarray"):
+        bagtrack.Client("http://localhost:8080", alpha=np.zeros(2))
+
+
 def test_a_key_is_sent(start_server: StartServer, clip: Clip, tmp_path) -> None:
     keys = tmp_path / "keys"
     keys.write_text("somebody:a-key-of-sufficient-length-for-tests\n")
@@ -322,7 +332,7 @@ def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServ
         asyncio.run(follow())
 
 
-def test_a_client_that_is_used_otherwise_in_the_midst_of_a_stream_says_so(start_server: StartServer, clip: Clip) -> None:
+def test_a_client_that_is_used_otherwise_within_a_stream_says_so(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
         client.init(bodies[0], clip.box)
