@@ -74,6 +74,14 @@ function notUnderstood({ url, status, headers }, text) {
   return new Problem({ type: "", status, detail });
 }
 
+/** The key without the line break of its file; or a refusal, which does not show it, since messages go into logs.
+ * @param {string} key */
+function keyOf(key) {
+  const own = key.trim();
+  if (/^[ -~]+$/.test(own)) return own;
+  throw new TypeError("The key has characters that no header takes: it is one line of printable ASCII.");
+}
+
 export class Transport {
   /**
    * @param {string | URL} url Where the service is.
@@ -82,6 +90,9 @@ export class Transport {
    */
   constructor(url, key, patience) {
     this.url = new URL(url);
+    // `localhost:8080` is a URL, too, of the scheme `localhost`.
+    if (!/^https?:$/.test(this.url.protocol))
+      throw new TypeError(`The address ${url} does not begin with http:// or https://.`);
     if (!this.url.pathname.endsWith("/")) this.url.pathname += "/";
     this.key = key;
     this.patience = patience;
@@ -133,8 +144,10 @@ export class Transport {
    * @param {Request} request
    */
   async attempt(method, url, { body, type, signal }) {
+    if (url.username || url.password)
+      throw new TypeError("The address has a name or a password, with which no request is sent: give a key.");
     const headers = new Headers();
-    if (this.key) headers.set("authorization", `Bearer ${this.key}`);
+    if (this.key) headers.set("authorization", `Bearer ${keyOf(this.key)}`);
     if (type) headers.set("content-type", type);
     signal?.throwIfAborted();
     const attempt = new AbortController();

@@ -13,6 +13,17 @@ let service;
 before(async () => (service = await startService()));
 after(() => service.stop());
 
+test("an address or a key that no request takes is told at once, and a key is not shown", async () => {
+  for (const address of ["localhost:8080", "ftp://localhost/", "ws://localhost:8080"])
+    assert.throws(() => new Client(address), new RegExp(`TypeError: The address ${address} does not begin with http:`));
+  const [frame] = clip.frames;
+  const isTold = (/** @type {any} */ error) => error instanceof TypeError && !/secret/.test(error.message);
+  await assert.rejects(new Client("http://me:secret@localhost:8080").open(frame, clip.box), isTold);
+  for (const key of ["one-secret\nanother-secret", "secret-\u00fc", "secret-\u2603", " \n"])
+    await assert.rejects(new Client(service.url, { key }).open(frame, clip.box), isTold, JSON.stringify(key));
+  await (await new Client(service.url, { key: "the-key-of-a-file\n" }).open(frame, clip.box)).end();
+});
+
 /** @param {any[]} answers
  * @param {number} [first] */
 function sameAsTheLibrary(answers, first = 1) {
