@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import pathlib
 import time
 
@@ -164,6 +165,12 @@ def rows_when(page, holds):
         assert time.monotonic() < late, table[-1]
         page.wait_for_timeout(200)
     return table
+
+
+def drawn_frames(page):
+    """The frames with a box that was drawn, as the project has them."""
+    [stored] = json.loads(saved(page, "#save-project"))["objects"]
+    return [row[0] for row in stored["rows"] if row[8]]
 
 
 def kept_rows(page):

@@ -2,7 +2,21 @@
 
 import json
 
-from browser import choose, drag, frames, kept_rows, near, numbers, rows, rows_when, said, saved, slow, to_the_end
+from browser import (
+    choose,
+    drag,
+    drawn_frames,
+    frames,
+    kept_rows,
+    near,
+    numbers,
+    rows,
+    rows_when,
+    said,
+    saved,
+    slow,
+    to_the_end,
+)
 from clips import FRAMES, H264
 from files import SECRET, choose_file, sent_box
 from kept import kept_says
@@ -12,12 +26,6 @@ from studio import to_frame, values
 
 OFF = [30, 200, 80, 60]
 """A box of the ground, off the target."""
-
-
-def keys(page):
-    """The frames with a box that was drawn, as the project has them."""
-    [stored] = json.loads(saved(page, "#save-project"))["objects"]
-    return [row[0] for row in stored["rows"] if row[8]]
 
 
 def tracked_clip(checks, where="here"):
@@ -45,7 +53,7 @@ def tracked_anew_and_cancelled(checks):
         cancel()
         said(page, "Cancelled")
         assert page.locator("#cancel").is_hidden()
-        assert whole(rows(page)) == whole(before) and keys(page) == [0]
+        assert whole(rows(page)) == whole(before) and drawn_frames(page) == [0]
     drag(page, OFF)
     said(page, "Following anew: frame 1")
     page.reload()
@@ -66,16 +74,16 @@ def up_to_the_next_correction(checks):
     drag(page, [10, 20, 60, 60])
     said(page, "Followed anew from frame 50")
     third = rows(page)
-    assert keys(page) == [0, 50, 100]
+    assert drawn_frames(page) == [0, 50, 100]
     assert values(third[:50]) == values(first[:50]) and values(third[100:]) == values(second[100:])
     assert numbers(third[50])[:2] == [10, 20] and len(third) == 150
     page.locator("#undo").click()
     said(page, "is undone")
-    assert values(rows(page)) == values(second) and keys(page) == [0, 100]
+    assert values(rows(page)) == values(second) and drawn_frames(page) == [0, 100]
     page.keyboard.press("Control+z")
     page.wait_for_timeout(300)
     assert page.locator("#undo").is_disabled()
-    assert values(rows(page)) == values(first) and keys(page) == [0]
+    assert values(rows(page)) == values(first) and drawn_frames(page) == [0]
     to_frame(page, 20)
     page.locator("#backwards").click()
     said(page, "Followed 19 frames backwards")
