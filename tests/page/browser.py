@@ -14,6 +14,12 @@ FRAMES_A_SECOND = 25
 TO_THE_END = 60_000
 DRAW = "Draw a box around what to follow"
 WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
+TELLS = """addEventListener("DOMContentLoaded", () => {
+    window.told = [];
+    const tell = (changes) => changes.forEach(({ addedNodes }) => addedNodes.forEach((text) => told.push(text.data)));
+    new MutationObserver(tell).observe(document.getElementById("message"), { childList: true });
+});"""
+"""Writes down what the page says."""
 
 
 class Checks:
@@ -39,6 +45,7 @@ class Checks:
         """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes. `where` it
         tracks: `there` at the service, or `here` in the page."""
         context = (browser or self.browser).new_context(**{"viewport": {"width": 1000, "height": 1100}, **options})
+        context.add_init_script(TELLS)
         page = context.new_page()
         url = url or self.service.url
 
@@ -82,6 +89,19 @@ def said(page, text):
     except Exception:
         print("  it says:", page.locator("#message").inner_text())
         raise
+
+
+def was_said(page, text):
+    """Waits until the page has said this, since it was loaded. It may say something else by now."""
+    late = time.monotonic() + TO_THE_END / 1000
+    while text not in (told := "\n".join(page.evaluate("window.told"))):
+        assert time.monotonic() < late, told
+        page.wait_for_timeout(100)
+
+
+def say_nothing(page):
+    """Empties the page's message, so that one can wait for the same one again."""
+    page.locator("#message").evaluate("place => { place.textContent = ''; place.className = ''; }")
 
 
 def choose(page, clip):
@@ -144,6 +164,28 @@ def slow(page):
     return lambda: session.send("Emulation.setCPUThrottlingRate", {"rate": 1})
 
 
+HELD = """(count) => {
+    const own = window.createImageBitmap;
+    let given = 0;
+    const released = new Promise((resolve) => (window.release = resolve));
+    window.createImageBitmap = async (...what) => {
+        if ((given += 1) > count) await released;
+        return own(...what);
+    };
+}"""
+
+
+def held(page, count):
+    """Lets the page read this many of the frames that it keeps; the next one waits for what this returns."""
+    page.evaluate(HELD, count)
+    return lambda: page.evaluate("window.release()")
+
+
+def stop(page):
+    """Stops the run. Where it has ended already, this does nothing."""
+    page.evaluate("document.getElementById('stop').click()")
+
+
 def to_the_end(page):
     said(page, "The video has ended")
 
@@ -174,14 +216,16 @@ def drawn_frames(page):
 
 
 def kept_rows(page):
-    """The rows, once the browser keeps them. The frame that was under way when the run was stopped may come late."""
-    for _ in range(6):
+    """The rows, once the browser keeps them. Frames that were under way when the run was stopped may come late."""
+    for _ in range(10):
         found = rows(page)
+        page.wait_for_timeout(300)
         try:
             page.locator("#kept-text").filter(has_text=f", {len(found)} rows").wait_for(timeout=5000)
-            return found
         except TimeoutError:
-            pass
+            continue
+        if len(rows(page)) == len(found):
+            return found
     raise AssertionError(f"of {len(found)} rows the page says: {page.locator('#kept-text').text_content()}")
 
 

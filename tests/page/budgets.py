@@ -4,6 +4,7 @@ The promises are for a machine that has a core to spare. Where it has none, figu
 """
 
 import os
+import time
 
 from browser import DRAW, choose, drag, said
 
@@ -60,9 +61,18 @@ TRACK = """async ([count, frames]) => {
 
 def asked():
     """What is asked for of what is promised, and words for it."""
-    load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    is_quiet = load < cores
-    return 1 if is_quiet else BUSY, "" if is_quiet else f"; not held to it: load {load:.0f} on {cores} cores"
+    load, cores, got = os.getloadavg()[0], os.cpu_count() or 1, share_of_a_core()
+    if load < cores and got > 0.9:
+        return 1, ""
+    return BUSY, f"; not held to it: load {load:.0f} on {cores} cores, {got:.0%} of one for this process"
+
+
+def share_of_a_core():
+    """What a process gets that asks for a whole one: the load is a mean of the last minute."""
+    begun, used = time.monotonic(), time.process_time()
+    while (passed := time.monotonic() - begun) < 0.3:
+        pass
+    return (time.process_time() - used) / passed
 
 
 def first_box_after_drawing(checks):

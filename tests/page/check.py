@@ -27,7 +27,24 @@ import sources
 import stopped
 import studio
 import welcome
-from browser import DRAW, TO_THE_END, WEB, Checks, choose, corners, drag, frames, near, numbers, rows, said, saved, to_the_end
+from browser import (
+    DRAW,
+    TO_THE_END,
+    WEB,
+    Checks,
+    choose,
+    corners,
+    drag,
+    frames,
+    kept_rows,
+    near,
+    numbers,
+    rows,
+    said,
+    saved,
+    to_the_end,
+    was_said,
+)
 from clips import Clips
 from playwright.sync_api import sync_playwright
 from service import Line, Service
@@ -80,7 +97,8 @@ def weight_and_first_picture(checks):
         choose(page, "card")
         seconds.append(time.monotonic() - started)
     print(f"  the first picture after {min(seconds):.2f} s")
-    assert min(seconds) <= MAX_SECONDS_TO_PICTURE, seconds
+    share, _ = budgets.asked()
+    assert min(seconds) <= MAX_SECONDS_TO_PICTURE / share, seconds
 
 
 def sample_by_mouse(checks):
@@ -111,9 +129,9 @@ def lost_and_found(checks):
     truth = checks.clips["leaves"]["truth"]
     choose(page, "leaves")
     drag(page, truth[0])
-    said(page, "The target is lost")
+    was_said(page, "The target is lost")
     checks.shot(page, "lost-dark")
-    said(page, "Found again")
+    was_said(page, "Found again")
     to_the_end(page)
     checks.shot(page, "ended-dark")
     checks.no_axe_violations(page, "ended, dark")
@@ -161,9 +179,11 @@ def phone_by_touch(checks):
             finger("touchMove", (x, y - 12 * step))
             page.wait_for_timeout(16)
         finger("touchEnd")
+        late = time.monotonic() + 10
+        while (scrolled := page.evaluate("scrollY") - before) <= 50:
+            assert time.monotonic() < late, scrolled
+            page.wait_for_timeout(50)
         stands_still(page)
-        scrolled = page.evaluate("scrollY") - before
-        assert scrolled > 50, scrolled
         page.evaluate("y => scrollTo(0, y)", before)
 
     swipe()
@@ -237,8 +257,7 @@ def shortcuts(checks):
     page.keyboard.press("Space")
     page.locator("body[data-state=paused]").wait_for()
     assert page.evaluate("scrollY") == scrolled
-    page.wait_for_timeout(300)
-    last = int(page.locator("#timeline").get_attribute("aria-valuenow"))
+    last = len(kept_rows(page)) - 1
     page.locator("#back").click()
     at = lambda frame: page.locator(f"#timeline[aria-valuenow='{frame}']").wait_for()
     at(last - 1)
@@ -291,10 +310,12 @@ def camera(checks):
         (left, top), (right, bottom) = corners(page, checks.clips["card"]["truth"][0])
         page.mouse.move(left, top)
         page.mouse.down()
-        page.wait_for_timeout(200)
-        still = page.evaluate(PICTURE)
-        page.wait_for_timeout(300)
-        assert page.evaluate(PICTURE) == still, "the picture moves while the box is drawn"
+        late = time.monotonic() + 10
+        still = ""
+        while (now := page.evaluate(PICTURE)) != still:
+            assert time.monotonic() < late, "the picture moves while the box is drawn"
+            still = now
+            page.wait_for_timeout(300)
         page.mouse.move(right, bottom, steps=4)
         page.mouse.up()
         frames(page, 30)
@@ -328,7 +349,7 @@ def page_of_another_origin(checks):
         page.goto(f"{origin}/camera.html?service={service.url}")
         page.locator("#message").filter(has_text="Drag a box").wait_for()
         drag(page, checks.clips["card"]["truth"][0])
-        page.locator("#message").filter(has_text=re.compile("Frame [3-9][0-9]: ")).wait_for(timeout=TO_THE_END)
+        page.locator("#message").filter(has_text=re.compile("Frame ([3-9][0-9]|[0-9]{3,}): ")).wait_for(timeout=TO_THE_END)
         drag(page, checks.clips["card"]["truth"][0])
         told = page.locator("#message").inner_text()
         assert re.fullmatch("Frame [0-9]+: (tracking|uncertain|lost)", told), told

@@ -3,7 +3,7 @@
 import json
 import statistics
 
-from browser import DRAW, distance, drag, drawn_frames, frames, rows, said, saved, slow, to_the_end
+from browser import DRAW, distance, drag, drawn_frames, frames, rows, said, saved, slow, stop, to_the_end, was_said
 from clips import FRAMES, H264, SIZE, VP8, frame_numbers, run
 from service import Line, Service
 
@@ -141,8 +141,7 @@ def file_with_corrections(checks):
     page.locator("#pause").click()
     frames(page, 30)
     video = saved_video(checks, page, "corrected.webm")
-    # Where it has ended already, this does nothing.
-    page.evaluate("document.getElementById('stop').click()")
+    stop(page)
     table = rows(page)
     scale = SIZE[0] / SENT[0]
     own = {"x": 200 * scale, "y": 200 * scale, "width": 80 * scale, "height": 60 * scale}
@@ -185,7 +184,7 @@ def service_killed(checks):
         follow_file(checks, page, path)
         frames(page, 45)
         mortal.restart()
-        said(page, says)
+        was_said(page, says)
         to_the_end(page)
         check_rows(rows(page), path, checks.files.truth, list(range(FRAMES)), [n / 30 for n in range(FRAMES)])
         page.context.close()
@@ -193,7 +192,7 @@ def service_killed(checks):
 
 
 def paused_past_the_expiry(checks):
-    service = Service(checks.program, "--session-idle", "1")
+    service = Service(checks.program, "--session-idle", "3")
     page = checks.page(url=service.url, allowed=("404", "410"))
     slow(page)
     path = checks.files.file("clip.mp4", 30, H264)
@@ -221,7 +220,7 @@ def plain_http(checks):
     path = checks.files.file("clip.mp4", 30, H264)
     follow_file(checks, page, path)
     frames(page, 30)
-    page.locator("#stop").click()
+    stop(page)
     table = rows(page)
     assert page.locator("#no-encoder").is_visible()
     video = saved_video(checks, page, "saved.mkv")

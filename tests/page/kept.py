@@ -2,7 +2,7 @@
 
 import json
 
-from browser import choose, drag, frames, kept_rows, numbers, rows, said, saved, slow, to_the_end
+from browser import choose, drag, frames, kept_rows, numbers, rows, said, saved, say_nothing, slow, stop, to_the_end
 from clips import FRAMES, H264
 from files import GRAY, check_rows, choose_file, sent_box
 from studio import to_frame
@@ -151,7 +151,7 @@ def left_for_another_source(checks):
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 20)
     page.locator("#pause").click()
-    before = rows(page)
+    before = kept_rows(page)
     page.locator("#file").set_input_files(text)
     page.locator("#message.bad").wait_for()
     same_rows(page, before)
@@ -337,7 +337,7 @@ def project_without_its_video(checks):
     choose_file(page, path)
     drag(page, sent_box(checks.files.truth[0]))
     frames(page, 30)
-    page.locator("#stop").click()
+    stop(page)
     before = kept_rows(page)
     project = saved_project(checks, page, "alone")
 
@@ -349,7 +349,7 @@ def project_without_its_video(checks):
         page.locator("#list input[type=radio]").check()
         act()
         page.locator("#message.bad").filter(has_text="Choose clip.mp4 first").wait_for()
-        page.locator("#message").evaluate("place => { place.textContent = ''; place.className = ''; }")
+        say_nothing(page)
     assert told(rows(page)) == told(before)
     page.context.close()
 

@@ -150,10 +150,11 @@ def recorded_in_a_browser(checks):
         drag(page, [100, 100, 30, 30])
         to_the_end(page)
         table, times = rows(page), times_of(path)
-        assert len(times) > 20, times
+        assert len(times) > 10, times
         told = [float(row["time"]) for row in table]
         assert len(told) == len(times) and max(map(abs, map(float.__sub__, told, times))) < 0.0015, (told, times)
-        assert abs(float(table[-1]["x"]) - 140) < 6, (kind, table[-1])
+        # It moves 20 pixels a second. A busy machine draws its last frame earlier.
+        assert times[-1] > 1 and abs(float(table[-1]["x"]) - 100 - 20 * times[-1]) < 6, (kind, table[-1])
     page.context.close()
 
 
@@ -303,7 +304,8 @@ def size_while_drawing(checks):
     choose_file(page, checks.files.file("clip.mp4", 30, H264))
     page.evaluate(TEXTS)
     drag(page, [200, 200, 200, 100])
-    [width, height] = map(int, page.evaluate("window.texts").pop().split(" × "))
+    # Other texts are those of the timeline.
+    [width, height] = map(int, [text for text in page.evaluate("window.texts") if " × " in text].pop().split(" × "))
     assert abs(width - 220) <= 2 and abs(height - 110) <= 2, (width, height)
     page.context.close()
 
