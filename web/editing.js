@@ -146,19 +146,17 @@ export class Editing {
     }
   }
 
-  /** Leaves what is tracked again as it was before. */
   cancel() {
     this.cancelling.abort();
   }
 
-  /** Brings back what was before the last correction. */
   async undo() {
     const { run } = this.page;
     if (!run || run.isRedoing || run.isOver || this.undoing.steps.length === 0) return;
     try {
       const name = await this.undoing.undo(run);
       if (run !== this.page.run) return;
-      this.page.say(name ? `The last correction of ${name} is undone.` : "There is nothing to undo.");
+      this.page.say(name ? `The last change to ${name} is undone.` : "There is nothing to undo.");
       this.page.isUnsaved = true;
       this.page.repaint();
       this.page.changed();
@@ -175,7 +173,6 @@ export class Editing {
     this.page.repaint();
   }
 
-  /** Shows what can be done now. */
   show() {
     button("undo").disabled = this.undoing.steps.length === 0;
   }
@@ -213,6 +210,7 @@ export class Editing {
       remove: (object) => {
         const { run, seen } = this.page;
         if (!run) return;
+        this.undoing.push({ ...this.undoing.before(run, object), follower: undefined, deleted: object });
         run.remove(object);
         if (object === seen.shown || !run.chosen) seen.reset();
         seen.figures(run);

@@ -67,7 +67,6 @@ export class Page {
     this.enter("start");
   }
 
-  /** Whether there are rows. */
   get hasRows() {
     return this.state === "following" || this.state === "paused" || this.state === "ended";
   }
@@ -234,7 +233,6 @@ export class Page {
     button("backwards").disabled = !isKnown || shown.frame === 0 || run.isOver;
   }
 
-  /** Shows again what is shown, after a change. */
   repaint() {
     const isLast = !this.viewed && this.seen.shown === this.run?.chosen;
     if (this.hasRows && this.shown) this.show(this.shown, isLast ? this.particles : undefined);

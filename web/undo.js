@@ -1,15 +1,16 @@
-// Undoing corrections: each brings back the rows and states of one object as they were before it.
+// Undoing corrections and deletions: each brings back the rows and states of one object as they were before it.
 
 /**
  * @typedef {import("./objects.js").FollowedObject} FollowedObject
  * @typedef {import("./run.js").Run} Run
  *
- * @typedef {object} Step An object before it is corrected.
+ * @typedef {object} Step An object before it is changed.
  * @property {number} number Of the object.
  * @property {Map<number, import("./objects.js").Row>} [rows] Nothing for an object that is added.
  * @property {import("./kept.js").State[]} saves
  * @property {number} last The last frame.
  * @property {import("./follower.js").Follower} [follower] The session, where it learns nothing of the correction.
+ * @property {FollowedObject} [deleted]
  */
 
 const MOST_STEPS = 50;
@@ -34,19 +35,17 @@ export class Undoing {
     this.steps = [...this.steps, step].slice(-MOST_STEPS);
   }
 
-  /** Brings back what was before the last correction of an object that there is.
+  /** Brings back what was before the last change.
    * @param {Run} run
-   * @returns {Promise<string>} The name of the object; empty where there is none. */
+   * @returns {Promise<string | undefined>} The name of the object, where it is there. */
   async undo(run) {
-    for (const step of [...this.steps].reverse()) {
-      const object = run.objects.find(({ number }) => number === step.number);
-      // Where this fails, the step stays.
-      if (object && step.rows) await bringBack(run, object, step);
-      else if (object) run.remove(object);
-      this.steps = this.steps.filter((other) => other !== step);
-      if (object) return object.name;
-    }
-    return "";
+    const [step] = this.steps.slice(-1);
+    const object = step.deleted ?? run.objects.find(({ number }) => number === step.number);
+    // Where this fails, the step stays.
+    if (object && step.rows) await bringBack(run, object, step);
+    else if (object) run.remove(object);
+    this.steps = this.steps.filter((other) => other !== step);
+    return object?.name;
   }
 }
 
@@ -55,19 +54,22 @@ export class Undoing {
  * @param {FollowedObject} object
  * @param {Step} step
  */
-async function bringBack(run, object, { rows = new Map(), saves, last, follower }) {
+async function bringBack(run, object, { rows = new Map(), saves, last, follower, deleted }) {
   await run.alone(async () => {
     const isSame = object.follower === follower;
     // A run that goes on later catches up then, unless rows follow from what is undone.
-    const isAnew = !isSame && (run.lastFrame > last || (!run.wake && (run.isLocal || !run.isResting)));
+    const isAnew = !isSame && !run.source.isAbsent && (run.lastFrame > last || (!run.wake && (run.isLocal || !run.isResting)));
     const draft = object.draft(isAnew ? run.follower() : object.follower);
     draft.frames = object.frames;
     draft.rows = new Map([...rows, ...[...object.rows].filter(([frame]) => frame > last)]);
     draft.sort();
     draft.saves = [...saves, ...object.saves.filter(({ after = -1 }) => isSame && after > last)];
     if (isAnew) await (await import("./again.js")).catchUp(run, draft, last);
-    if (!run.objects.includes(object)) return draft.follower.end();
+    if (!deleted && !run.objects.includes(object)) return draft.follower.end();
     if (isAnew) object.follower.end();
     [object.follower, object.frames, object.rows, object.saves] = [draft.follower, draft.frames, draft.rows, draft.saves];
+    if (!deleted) return;
+    run.objects = [...run.objects, object].sort((one, other) => one.number - other.number);
+    run.chosen = object;
   });
 }

@@ -22,7 +22,7 @@ from files import SECRET, choose_file, sent_box
 from kept import kept_says
 from kept import told as whole
 from service import Service
-from studio import to_frame, values
+from studio import of_target, to_frame, values
 
 OFF = [30, 200, 80, 60]
 """A box of the ground, off the target."""
@@ -154,6 +154,36 @@ def undone_after_more_frames(checks):
         page.context.close()
 
 
+def deletion_undone(checks):
+    """An object that was deleted comes back when that is undone, and is followed on; corrections before it are undone."""
+    for where in ("here", "there"):
+        page = checks.page(where=where)
+        truth = checks.clips["card"]["truth"]
+        choose(page, "card")
+        drag(page, truth[0])
+        frames(page, 40)
+        page.locator("#pause").click()
+        before = kept_rows(page)
+        page.locator("#add").click()
+        drag(page, OFF)
+        page.locator("#list li:nth-child(2)").wait_for()
+        page.get_by_role("button", name="Delete Object 1").click()
+        page.locator("#pause").click()
+        frames(page, len(before) + 15)
+        page.locator("#pause").click()
+        page.locator("#undo").click()
+        said(page, "Object 1 is undone")
+        table = of_target(rows(page), 0)
+        assert len(table) > len(before) + 10 and values(table[: len(before)]) == values(before)
+        page.locator("#undo").click()
+        said(page, "Object 2 is undone")
+        page.locator("#pause").click()
+        to_the_end(page)
+        table = rows(page)
+        assert len(of_target(table, 0)) == len(table) == 150 and near(table, truth) > 120
+        page.context.close()
+
+
 def undone_without_the_service(checks):
     """What cannot be undone while the service is away stays as it is, and is undone when it is back."""
     service = Service(checks.program, **SECRET)
@@ -235,6 +265,7 @@ ALL = [
     up_to_the_next_correction,
     undone_while_it_is_followed,
     undone_after_more_frames,
+    deletion_undone,
     undone_without_the_service,
     box_at_the_edge,
     refused_box,

@@ -351,6 +351,10 @@ def project_without_its_video(checks):
         page.locator("#message.bad").filter(has_text="Choose clip.mp4 first").wait_for()
         say_nothing(page)
     assert told(rows(page)) == told(before)
+    page.locator("#list .remove").click()
+    page.locator("#undo").click()
+    said(page, "is undone")
+    assert told(rows(page)) == told(before)
     page.context.close()
 
 
