@@ -1,7 +1,7 @@
 // A video that the browser cannot play: the service decodes it, and its frames are images.
 
 import { openImages } from "./images.js";
-import { Problem } from "./js/bagtrack.js";
+import { Problem } from "./js/problem.js";
 
 /** The end of the JPEG file that bytes begin with; 0 where it has not all come.
  * @param {Uint8Array} bytes */

@@ -1,6 +1,7 @@
 // What follows an object: a session in this page, or one of the service. Frames go in, answers come out.
 
-import { LocalClient, Problem } from "./js/bagtrack.js";
+import { LocalClient } from "./js/local.js";
+import { Problem } from "./js/problem.js";
 
 /**
  * @typedef {import("./js/bagtrack.js").Box} Box

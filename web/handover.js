@@ -1,7 +1,7 @@
 // Handing over to the service what was tracked in the page, so that others can go on with it.
 
 import { scaled } from "./boxes.js";
-import { Problem } from "./js/bagtrack.js";
+import { Problem } from "./js/problem.js";
 
 /**
  * @typedef {import("./run.js").Run} Run

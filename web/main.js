@@ -68,9 +68,9 @@ get("sources").addEventListener("keydown", ({ key }) => {
   sources.open = false;
   sources.querySelector("summary")?.focus();
 });
-get("key-form").addEventListener("submit", (event) => {
+get("key-form").addEventListener("submit", async (event) => {
   event.preventDefault();
-  page.client.key = input("key").value;
+  (await page.service()).key = input("key").value;
   page.hasKey = true;
   get("key-form").hidden = true;
   page.say("");

@@ -1,6 +1,6 @@
 // The objects that are followed, each with its rows.
 
-import { Problem } from "./js/bagtrack.js";
+import { Problem } from "./js/problem.js";
 
 /**
  * @typedef {import("./follower.js").Follower} Follower

@@ -4,7 +4,8 @@ import { Beginning } from "./begin.js";
 import { shownIn } from "./boxes.js";
 import { button, canvas, get, input } from "./dom.js";
 import { DRAW, Editing, TAP, again } from "./editing.js";
-import { Client, LocalClient, Problem } from "./js/bagtrack.js";
+import { LocalClient } from "./js/local.js";
+import { Problem } from "./js/problem.js";
 import { FOLLOWING, Message } from "./message.js";
 import { Player } from "./player.js";
 import { UnplayableError, words } from "./problems.js";
@@ -28,9 +29,9 @@ import { Timeline } from "./timeline.js";
 
 export class Page {
   constructor() {
-    /** What fails for longer is said. */
-    this.client = new Client(new URL(".", location.href), { patience: 1500 });
     this.local = new LocalClient();
+    /** @type {Promise<import("./js/bagtrack.js").Client> | undefined} */
+    this.client = undefined;
     this.message = new Message(get("message"));
     this.stage = new Stage(canvas("picture"), canvas("overlay"));
     this.timeline = new Timeline(canvas("timeline"), (frame) => this.seek(frame));
@@ -65,6 +66,14 @@ export class Page {
     /** @type {State} */
     this.state = "start";
     this.enter("start");
+  }
+
+  /** The service. It is loaded once a source is there: what is tracked in the page needs none. */
+  service() {
+    // What fails for longer is said.
+    this.client ??= import("./js/client.js").then(({ Client }) => new Client(new URL(".", location.href), { patience: 1500 }));
+    this.client.catch(() => (this.client = undefined));
+    return this.client;
   }
 
   get hasRows() {
@@ -133,6 +142,8 @@ export class Page {
     try {
       const [source, { Run }] = await Promise.all([open(this.opening.signal), import("./run.js")]);
       const first = await source.first();
+      const isLocal = input("here").checked;
+      const client = isLocal ? this.local : await this.service();
       const mayLeave = own === this.choice && (await this.mayLeave());
       if (own !== this.choice || !mayLeave) {
         source.stop();
@@ -141,14 +152,14 @@ export class Page {
         return;
       }
       this.reset();
-      const isLocal = input("here").checked;
       if (isLocal) this.local.warm().catch(() => undefined);
-      this.run = new Run(isLocal ? this.local : this.client, source, first, this.told());
+      this.run = new Run(client, source, first, this.told());
       this.run.sees = this.seen.isOn;
       this.stage.draw(undefined);
       this.stage.show(first.image);
       prepareSaving();
       again().catch(() => undefined);
+      this.service().catch(() => undefined);
       this.seen.prepare().catch(() => undefined);
       if (await resume?.(this.run)) return;
       this.enter("first");

@@ -1,6 +1,6 @@
 // What is said to people when something fails.
 
-import { Problem } from "./js/bagtrack.js";
+import { Problem } from "./js/problem.js";
 
 /** @type {Record<string, string>} */
 const WORDS = {

@@ -3,7 +3,8 @@
 import { rowOf } from "./boxes.js";
 import { WINDOW, followerOf } from "./follower.js";
 import { Frames, Pace, close } from "./frames.js";
-import { LocalClient, Problem } from "./js/bagtrack.js";
+import { LocalClient } from "./js/local.js";
+import { Problem } from "./js/problem.js";
 import { FollowedObject } from "./objects.js";
 
 /**

@@ -73,7 +73,7 @@ async function giveAway(page) {
   page.again = () => giveAway(page);
   button("hand-over").disabled = true;
   try {
-    const handed = await (await modules())[2].handOver(run, page.client);
+    const handed = await (await modules())[2].handOver(run, await page.service());
     if (run !== page.run) return;
     const links = handed.map(({ name, id }) => {
       const link = document.createElement("a");

@@ -68,7 +68,8 @@ export function offerDecoding(page, file, resume) {
       const tell = (/** @type {number} */ count) => {
         if (!signal.aborted) page.say(`The service decodes ${file.name}: ${count} frames…`);
       };
-      return (await import("./decoded.js")).openDecoded(file, page.client.transport.key, tell, signal);
+      const { key } = (await page.service()).transport;
+      return (await import("./decoded.js")).openDecoded(file, key, tell, signal);
     };
     page.choose(open, resume);
   };
