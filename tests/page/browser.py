@@ -11,7 +11,8 @@ from playwright.sync_api import TimeoutError
 
 AXE = next(pathlib.Path(axe_playwright_python.__file__).parent.rglob("axe.min.js")).read_text()
 FRAMES_A_SECOND = 25
-TO_THE_END = 60_000
+TO_THE_END = 120_000
+"""Milliseconds that anything may take on a machine that is busy with other things."""
 DRAW = "Draw a box around what to follow"
 WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
 TELLS = """addEventListener("DOMContentLoaded", () => {
@@ -45,6 +46,7 @@ class Checks:
         """A new page of the service, watched for faults. `allowed` are texts of faults that a check provokes. `where` it
         tracks: `there` at the service, or `here` in the page."""
         context = (browser or self.browser).new_context(**{"viewport": {"width": 1000, "height": 1100}, **options})
+        context.set_default_timeout(TO_THE_END)
         context.add_init_script(TELLS)
         page = context.new_page()
         url = url or self.service.url

@@ -179,7 +179,7 @@ def phone_by_touch(checks):
             finger("touchMove", (x, y - 12 * step))
             page.wait_for_timeout(16)
         finger("touchEnd")
-        late = time.monotonic() + 10
+        late = time.monotonic() + TO_THE_END / 1000
         while (scrolled := page.evaluate("scrollY") - before) <= 50:
             assert time.monotonic() < late, scrolled
             page.wait_for_timeout(50)
@@ -310,7 +310,7 @@ def camera(checks):
         (left, top), (right, bottom) = corners(page, checks.clips["card"]["truth"][0])
         page.mouse.move(left, top)
         page.mouse.down()
-        late = time.monotonic() + 10
+        late = time.monotonic() + TO_THE_END / 1000
         still = ""
         while (now := page.evaluate(PICTURE)) != still:
             assert time.monotonic() < late, "the picture moves while the box is drawn"

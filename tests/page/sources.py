@@ -6,7 +6,7 @@ import json
 import time
 import zipfile
 
-from browser import DRAW, begin_at, distance, drag, rows, said, saved, to_the_end
+from browser import DRAW, TO_THE_END, begin_at, distance, drag, rows, said, saved, to_the_end
 from clips import BITS, BLOCK, FRAMES, H264, MPEG4, SIZE, VP8
 from files import check_distance, check_rows, check_video, choose_file, saved_video, sent_box, times_of
 
@@ -278,7 +278,7 @@ def steps_in_open_groups(checks):
     for button, numbers in (("forward", range(1, 46)), ("back", range(44, 0, -1))):
         for number in numbers:
             page.locator(f"#{button}").click()
-            late = time.monotonic() + 10
+            late = time.monotonic() + TO_THE_END / 1000
             while (looks := page.locator("#picture").evaluate(LOOKS, [BITS, BLOCK, SIZE[0]]))[0] != number:
                 assert time.monotonic() < late, (button, number, looks[0])
                 page.wait_for_timeout(20)

@@ -9,6 +9,7 @@ import zipfile
 
 from browser import (
     FRAMES_A_SECOND,
+    TO_THE_END,
     begin_at,
     choose,
     drag,
@@ -105,7 +106,7 @@ def mouse_tells_a_frame(page):
     drawn = lambda: timeline.evaluate("canvas => canvas.toDataURL('image/png')")
     before = drawn()
     timeline.hover(position={"x": 100, "y": 40})
-    late = time.monotonic() + 10
+    late = time.monotonic() + TO_THE_END / 1000
     while drawn() == before:
         assert time.monotonic() < late, "it tells nothing"
         page.wait_for_timeout(50)

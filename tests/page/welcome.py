@@ -7,6 +7,7 @@ writes what the tracker gives of it into web/welcome-rows.js.
 
 import pathlib
 import sys
+import time
 
 WEB = pathlib.Path(__file__).resolve().parents[2] / "web"
 BOX = {"x": 268, "y": 246, "width": 128, "height": 73}
@@ -37,6 +38,7 @@ RECORDED = """async (canvas) => {
     const { rowOf } = await import("/page/welcome.js");
     return Array.from({ length: 240 }, (_, frame) => rowOf(frame).box);
 }"""
+IS_BLANK = "canvas => canvas.toDataURL() === canvas.cloneNode().toDataURL()"
 SEED = 7
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 
@@ -104,8 +106,9 @@ def something_moves_at_once(checks):
         checks.no_axe_violations(page, f"first screen, {scheme}")
         page.context.close()
     page = checks.page(where="here", reduced_motion="reduce", viewport={"width": 390, "height": 844})
-    blank = "canvas => { const other = canvas.cloneNode(); return canvas.toDataURL('image/png') === other.toDataURL('image/png'); }"
-    while page.locator("#hero").evaluate(blank):
+    late = time.monotonic() + 60
+    while page.locator("#hero").evaluate(IS_BLANK):
+        assert time.monotonic() < late, "nothing is shown"
         page.wait_for_timeout(50)
     still = picture(page)
     page.wait_for_timeout(700)
