@@ -1,6 +1,6 @@
 //! Idle sessions expire.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_problem};
 use crate::helpers::raw::RawConnection;
 use crate::pictures;
 use reqwest::StatusCode;
@@ -37,20 +37,6 @@ async fn a_session_expires_when_it_is_not_used() {
 }
 
 #[tokio::test]
-async fn expired_sessions_make_room() {
-    let app = TestApplication::start_with(|config| {
-        config.session_idle = IDLE;
-        config.max_sessions = 1;
-    });
-    let app = app.await;
-    app.open().await;
-    let full = app.create(pictures::png(0), &[("box", BOX)]).await;
-    expect_problem(full, "too-many-sessions").await;
-    app.clock.advance(IDLE);
-    app.open().await;
-}
-
-#[tokio::test]
 async fn a_session_does_not_expire_while_a_frame_is_on_its_way() {
     let app = TestApplication::start_with(|config| config.session_idle = IDLE).await;
     let id = app.open().await;
@@ -62,14 +48,6 @@ async fn a_session_does_not_expire_while_a_frame_is_on_its_way() {
     let answer = slow.read_to_end().await;
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     assert_eq!(app.frames_of(&id).await, 2);
-}
-
-#[tokio::test]
-async fn a_session_that_was_deleted_has_not_expired() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
-    expect(app.delete_session(&id).await, StatusCode::NO_CONTENT).await;
-    expect_problem(app.get_session(&id).await, "session-not-found").await;
 }
 
 #[tokio::test]

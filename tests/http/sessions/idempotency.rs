@@ -3,7 +3,6 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::operation::metrics::{metrics, value};
 use crate::pictures;
-use bagtrack::http::Secret;
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use std::time::Duration;
@@ -88,30 +87,6 @@ async fn a_stored_answer_is_given_when_there_is_no_room_and_goes_with_its_sessio
     app.clock.advance(Duration::from_secs(60));
     let next = id_of(opening(&app, "key", 0).send().await.unwrap()).await;
     assert_ne!(next, id, "an answer that names a dead session is of no use");
-}
-
-#[tokio::test]
-async fn a_problem_is_not_stored() {
-    let app = TestApplication::start().await;
-    let damaged = app.request(Method::POST, "/sessions", &[("box", BOX)]);
-    let damaged = damaged.header("idempotency-key", "key").body("no image");
-    expect_problem(damaged.send().await.unwrap(), "unsupported-image").await;
-    id_of(opening(&app, "key", 0).send().await.unwrap()).await;
-}
-
-#[tokio::test]
-async fn clients_have_keys_of_their_own() {
-    let mut app = TestApplication::start_with(|config| {
-        config.access.api_keys = vec![
-            Secret::from("ann:0123456789abcdef"),
-            Secret::from("ben:fedcba9876543210"),
-        ];
-    })
-    .await;
-    let ann = id_of(opening(&app, "key", 0).send().await.unwrap()).await;
-    app.key = Some("fedcba9876543210".to_owned());
-    let ben = id_of(opening(&app, "key", 0).send().await.unwrap()).await;
-    assert_ne!(ann, ben);
 }
 
 #[tokio::test]

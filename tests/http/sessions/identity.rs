@@ -51,18 +51,6 @@ async fn another_request_for_the_same_id_is_refused() {
 }
 
 #[tokio::test]
-async fn requests_at_the_same_time_open_one_session() {
-    let app = TestApplication::start().await;
-    let requests = (0..12).map(|_| put(&app, ID, &[("box", BOX)]).send());
-    let mut bodies = Vec::new();
-    for response in futures_util::future::join_all(requests).await {
-        bodies.push(response.unwrap().text().await.unwrap());
-    }
-    bodies.dedup();
-    assert_eq!(bodies.len(), 1, "{bodies:?}");
-}
-
-#[tokio::test]
 async fn an_id_of_another_client_is_taken() {
     let mut app = TestApplication::start_with(|config| {
         config.access.api_keys = vec![

@@ -1,18 +1,9 @@
 //! Numbered frames.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_problem};
 use crate::pictures;
-use crate::requests::forms::form;
-use reqwest::{Method, Response, StatusCode};
+use reqwest::{Response, StatusCode};
 use serde_json::Value;
-
-async fn batch(app: &TestApplication, id: &str, number: u64, frames: &[u32]) -> Response {
-    let number = number.to_string();
-    let path = format!("/sessions/{id}/frames");
-    let request = app.request(Method::POST, &path, &[("frame", &number)]);
-    let frames = frames.iter().map(|t| pictures::png(*t));
-    request.multipart(form(frames)).send().await.unwrap()
-}
 
 async fn expect_answer(response: Response, replayed: bool) -> Value {
     let header = response.headers().get("replayed").cloned();
@@ -70,33 +61,4 @@ async fn the_first_frame_can_be_asked_for_again() {
     let answer = expect_answer(app.post_numbered(&id, 0, pictures::png(0)).await, true).await;
     assert_eq!(answer["frame"], 0);
     assert_eq!(answer["box"]["x"], 20.0);
-}
-
-#[tokio::test]
-async fn a_batch_sent_again_gets_its_stored_answers() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
-    let first = expect_answer(batch(&app, &id, 1, &[1, 2, 3]).await, false).await;
-    assert_eq!(first["answers"][2]["frame"], 3);
-    let again = expect_answer(batch(&app, &id, 1, &[1, 2, 3]).await, true).await;
-    assert_eq!(first, again);
-    let tail = expect_answer(app.post_numbered(&id, 3, pictures::png(3)).await, true).await;
-    assert_eq!(tail, first["answers"][2]);
-    expect_problem(batch(&app, &id, 1, &[1, 2, 4]).await, "frame-differs").await;
-    expect_problem(batch(&app, &id, 2, &[2, 3, 4]).await, "frame-out-of-order").await;
-    assert_eq!(app.frames_of(&id).await, 4);
-}
-
-#[tokio::test]
-async fn a_correction_sent_again_gets_the_stored_answer() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
-    let query = [("box", BOX), ("frame", "1")];
-    let first = expect_answer(app.put_target(&id, pictures::png(1), &query).await, false).await;
-    let again = expect_answer(app.put_target(&id, pictures::png(1), &query).await, true).await;
-    assert_eq!(first, again);
-    let moved = [("box", "21,15,16,12"), ("frame", "1")];
-    let response = app.put_target(&id, pictures::png(1), &moved).await;
-    expect_problem(response, "frame-differs").await;
-    assert_eq!(app.frames_of(&id).await, 2);
 }

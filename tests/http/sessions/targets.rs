@@ -173,19 +173,6 @@ async fn a_correction_says_which_target_and_the_others_are_tracked() {
 }
 
 #[tokio::test]
-async fn one_target_may_be_named_and_no_other() {
-    let app = TestApplication::start().await;
-    let id = app.open().await;
-    let put = async |target: &str| {
-        let query = [("box", BOX), ("target", target)];
-        app.put_target(&id, pictures::png(1), &query).await
-    };
-    expect_problem(put("1").await, "malformed-request").await;
-    let corrected = expect(put("0").await, StatusCode::OK).await;
-    assert_eq!(corrected["box"]["x"], 20.0);
-}
-
-#[tokio::test]
 async fn of_several_frames_all_targets_take_all_or_none() {
     let app = TestApplication::start().await;
     let (id, other) = (open_with(&app, BOXES).await, open_with(&app, BOXES).await);
