@@ -99,12 +99,6 @@ impl Comparison {
         self
     }
 
-    /// The table as markdown, and how the sequences were played where that is unusual.
-    pub fn markdown(&self) -> String {
-        let note = self.playback.map(|playback| format!("\n{playback}\n"));
-        self.table().markdown() + &note.unwrap_or_default()
-    }
-
     fn table(&self) -> Table {
         let mut table = Table::new(&HEADER);
         for row in &self.variants {

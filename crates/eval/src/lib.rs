@@ -22,7 +22,6 @@ mod report;
 pub mod results;
 mod run;
 mod sequence;
-mod sweep;
 mod table;
 mod variant;
 
@@ -33,5 +32,4 @@ pub use playback::Playback;
 pub use report::Report;
 pub use run::{EvalError, HIT_OVERLAP, Outcome, ScoredFrame, SeedRun, SequenceRuns, run};
 pub use sequence::Sequence;
-pub use sweep::{SweepError, parse_sweep};
 pub use variant::Variant;

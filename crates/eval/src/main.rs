@@ -4,13 +4,12 @@
 
 use bagtrack_cli::{ModelFlag, ParamFlags, frames, output, progress, read_boxes};
 use bagtrack_eval::{
-    Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation, parse_sweep, results,
+    Comparison, Playback, Report, Sequence, SequenceRuns, Variant, ablation, results,
 };
 use bagtrack_ingest::Limits;
 use bagtrack_tracker::Params;
 use clap::Parser;
 use std::error::Error;
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,22 +46,18 @@ struct Args {
     /// larger, another way with each of twelve seeds.
     #[arg(long, value_name = "SHARE", value_parser = first_box_error)]
     first_box_error: Option<f64>,
-    /// A table for people, JSON, or a table as markdown.
+    /// A table for people, or JSON.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
     /// What the tracker is without each of its extensions: the means over the sequences, a row each.
     #[arg(long)]
     ablate: bool,
-    /// The same for the variants in a text file, one a line: `label: name=value name=value`. A label alone is the
-    /// preset as it is; `preset=paper` before the others takes that preset; `#` begins a comment line.
-    #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
-    sweep: Option<PathBuf>,
     /// Writes the boxes into this folder as the toolkits of OTB and pysot read them: NAME.txt for each sequence, a box
     /// a line, 1-based; with several seeds in a folder for each. Over files of these names.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "sweep", "backwards", "start_at", "every", "first_box_error"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["ablate", "backwards", "start_at", "every", "first_box_error"])]
     results: Option<PathBuf>,
     /// Writes a line of JSON for each scored frame into this file: its figures, and what its score is made of.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["ablate", "sweep"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "ablate")]
     frames: Option<PathBuf>,
 }
 
@@ -70,7 +65,6 @@ struct Args {
 enum Format {
     Table,
     Json,
-    Markdown,
 }
 
 impl Args {
@@ -114,7 +108,7 @@ fn main() -> ExitCode {
 
 fn run(args: Args) -> Result<(), Box<dyn Error>> {
     let base = args.params.params()?;
-    let variants = variants(&args, &base)?;
+    let variants = variants(&args);
     let evaluated = evaluate(&args, &base, &variants)?;
     if let Some(dir) = &args.results {
         results::write(dir, &evaluated[0])?;
@@ -128,29 +122,23 @@ fn run(args: Args) -> Result<(), Box<dyn Error>> {
         let report = Report::new(preset, runs).ok_or("none of the paths is a folder")?;
         reports.push((variant, report.played(args.playback())));
     }
-    if !args.ablate && args.sweep.is_none() {
+    if !args.ablate {
         let (_, report) = &reports[0];
-        return print(args.format, report, Report::markdown);
+        return print(args.format, report);
     }
     let names = evaluated[0].iter().map(|runs| runs.name.clone());
     let comparison = Comparison::new(preset, args.seeds.get(), names.collect(), &reports);
     let comparison = comparison.played(args.playback());
-    print(args.format, &comparison, Comparison::markdown)
+    print(args.format, &comparison)
 }
 
 /// The preset alone, or what is to be set side by side; at least one.
-fn variants(args: &Args, base: &Params) -> Result<Vec<Variant>, Box<dyn Error>> {
-    let label = args.params.label();
-    if let Some(path) = &args.sweep {
-        let shown = path.display();
-        let text = fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
-        return Ok(parse_sweep(&text, base).map_err(|error| format!("{shown}: {error}"))?);
-    }
-    let mut variants = ablation::variants(&label);
+fn variants(args: &Args) -> Vec<Variant> {
+    let mut variants = ablation::variants(&args.params.label());
     if !args.ablate {
         variants.truncate(1);
     }
-    Ok(variants)
+    variants
 }
 
 /// Runs every variant on every sequence: for each variant the runs of the sequences. Variants with the same parameters
@@ -196,12 +184,10 @@ fn evaluate(
 fn print<R: serde::Serialize + std::fmt::Display>(
     format: Format,
     report: &R,
-    markdown: fn(&R) -> String,
 ) -> Result<(), Box<dyn Error>> {
     let text = match format {
         Format::Table => report.to_string(),
         Format::Json => serde_json::to_string_pretty(report)? + "\n",
-        Format::Markdown => markdown(report),
     };
     Ok(output::print(&text)?)
 }

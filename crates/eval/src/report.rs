@@ -75,12 +75,6 @@ impl Report {
         &self.score
     }
 
-    /// The table and the lines below it as markdown.
-    pub fn markdown(&self) -> String {
-        let lines = self.lines().replace('\n', "\n\n");
-        format!("{}\n{}\n", self.table().markdown(), lines.trim_end())
-    }
-
     fn table(&self) -> Table {
         let mut table = Table::new(&HEADER);
         let rows = self.sequences.iter().map(|s| (s.name.as_str(), &s.figures));

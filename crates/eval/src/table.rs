@@ -1,4 +1,4 @@
-//! Rows of text in columns, aligned for people or as markdown.
+//! Rows of text in aligned columns.
 
 use std::fmt::Write;
 
@@ -37,19 +37,6 @@ impl Table {
         }
         text
     }
-
-    /// A markdown table; lines end with a line break.
-    pub(super) fn markdown(&self) -> String {
-        let mut text = String::new();
-        for (index, row) in self.rows.iter().enumerate() {
-            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
-            let _ = writeln!(text, "| {} |", cells.join(" | "));
-            if index == 0 {
-                let _ = writeln!(text, "|---|{}", "---:|".repeat(row.len() - 1));
-            }
-        }
-        text
-    }
 }
 
 /// A figure with so many digits, or a dash where there is none.
@@ -61,26 +48,14 @@ pub(super) fn figure(value: Option<f64>, digits: usize) -> String {
 mod tests {
     use super::*;
 
-    fn table() -> Table {
-        let mut table = Table::new(&["what", "px"]);
-        table.push(vec!["a|b".to_owned(), figure(Some(12.34), 1)]);
-        table.push(vec!["without α".to_owned(), figure(None, 1)]);
-        table
-    }
-
     #[test]
     fn columns_are_aligned_by_characters() {
+        let mut table = Table::new(&["what", "px"]);
+        table.push(vec!["with".to_owned(), figure(Some(12.34), 1)]);
+        table.push(vec!["without α".to_owned(), figure(None, 1)]);
         assert_eq!(
-            table().text(),
-            "what         px\na|b        12.3\nwithout α     -\n"
-        );
-    }
-
-    #[test]
-    fn markdown_keeps_bars_in_their_cell() {
-        assert_eq!(
-            table().markdown(),
-            "| what | px |\n|---|---:|\n| a\\|b | 12.3 |\n| without α | - |\n"
+            table.text(),
+            "what         px\nwith       12.3\nwithout α     -\n"
         );
     }
 }

@@ -172,12 +172,9 @@ fn the_tables_tell_how_the_sequences_were_played() {
     let flags = ["--backwards", "--start-at", "0.333", "--preset", "paper"];
     let args = [&[text(&dir)], &flags[..]].concat();
     assert!(succeeds(&args).contains(line));
-    let sweep = parent.path().join("sweep.txt");
-    fs::write(&sweep, "as it is:\nbases: alpha=0\n").expect("the folder is writable");
-    let args = [&args[..], &["--sweep", text(&sweep)]].concat();
-    assert!(succeeds(&args).ends_with(line));
-    let markdown = succeeds(&[&args[..], &["--format", "markdown"]].concat());
-    assert!(markdown.ends_with(&format!("|\n\n{line}")), "{markdown}");
+    let table = succeeds(&[&args[..], &["--ablate"]].concat());
+    assert!(table.starts_with("variant ") && table.contains("\nα = 0.5 "));
+    assert!(table.ends_with(line), "{table}");
     assert!(!succeeds(&[text(&dir)]).contains("played"));
 }
 

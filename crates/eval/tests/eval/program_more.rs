@@ -1,6 +1,6 @@
-//! What `bagtrack-eval` tells beyond the means: seeds, the score, variants side by side, figures.
+//! What `bagtrack-eval` tells beyond the means: seeds, the score, variants side by side.
 
-use crate::command::{clip, eval, fails, folder, succeeds, text, tracked};
+use crate::command::{clip, folder, succeeds, text, tracked};
 use bagtrack_cli::{assign, parse_assignment};
 use bagtrack_testing::command::program;
 use bagtrack_tracker::{Preset, Rect};
@@ -172,58 +172,6 @@ fn the_ablation_has_the_preset_first_and_a_row_for_each_change() {
         assert_eq!(row["center_error"], json(&args)["mean"]["center_error"]);
         assert_ne!(row["center_error"], rows[0]["center_error"]);
     }
-}
-
-#[test]
-fn a_sweep_is_printed_as_a_table_and_as_markdown() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", 0, 12);
-    let sweep = parent.path().join("sweep.txt");
-    let lines =
-        "# what to try\nas it is:\n\nfew particles: particles=20\npaper: preset=paper sigma=0.02\n";
-    fs::write(&sweep, lines).expect("the folder is writable");
-    let args = [text(&dir), "--sweep", text(&sweep)];
-    let table = succeeds(&args);
-    let rows: Vec<&str> = table.lines().collect();
-    assert_eq!(rows.len(), 4, "{table}");
-    assert!(
-        rows.iter()
-            .all(|row| row.chars().count() == rows[0].chars().count()),
-        "{table}"
-    );
-    assert!(
-        rows[0].contains("worst seed") && rows[2].starts_with("few particles "),
-        "{table}"
-    );
-    let markdown = succeeds(&[&args[..], &["--format", "markdown"]].concat());
-    let rows: Vec<&str> = markdown.lines().collect();
-    assert_eq!(rows.len(), 5, "{markdown}");
-    assert!(rows[0].starts_with("| variant | centre error |") && rows[1].starts_with("|---|"));
-    assert!(rows[4].starts_with("| paper | "), "{markdown}");
-    let plain = succeeds(&[text(&dir), "--format", "markdown"]);
-    assert!(plain.starts_with("| sequence | frames |"), "{plain}");
-}
-
-#[test]
-fn a_wrong_sweep_is_told_by_its_line_before_anything_is_run() {
-    let parent = folder();
-    let dir = clip(parent.path(), "clip", 0, 12);
-    let sweep = parent.path().join("sweep.txt");
-    let refuse = |lines: &str| {
-        fs::write(&sweep, lines).expect("the folder is writable");
-        fails(&[text(&dir), "--sweep", text(&sweep)])
-    };
-    let line = refuse("fine: alpha=1\ntoo much: alpha=2\n");
-    assert!(
-        line.contains("sweep.txt: line 2: ") && line.contains("from 0 to 1"),
-        "{line}"
-    );
-    assert!(refuse("odd: alhpa=1").contains("there is no such parameter; there are"));
-    assert!(refuse("").contains("no variant"));
-    let line = fails(&[text(&dir), "--sweep", "nowhere.txt"]);
-    assert!(line.contains("nowhere.txt"), "{line}");
-    let both = eval(&[text(&dir), "--ablate", "--sweep", text(&sweep)]);
-    assert_eq!(both.status.code(), Some(2));
 }
 
 #[test]
