@@ -44,35 +44,6 @@ fn a_target_unlike_its_surroundings_is_followed() {
     }
 }
 
-#[test]
-fn a_replay_gives_the_same_bits_and_another_seed_does_not() {
-    let run = |seed| {
-        let mut tracker = start(seed);
-        let answers: Vec<_> = (1..25)
-            .map(|t| {
-                tracker
-                    .step(&frame(t))
-                    .expect("a frame of the session's size")
-            })
-            .collect();
-        (answers, tracker.snapshot())
-    };
-    assert_eq!(run(7), run(7));
-    assert_ne!(run(7), run(8));
-}
-
-#[test]
-fn a_frame_given_to_two_copies_of_one_state_gives_one_answer() {
-    let mut tracker = start(3);
-    for t in 1..12 {
-        let mut copy = tracker.clone();
-        // What the copy saw before does not matter, only its state.
-        let answer = copy.step(&frame(t)).expect("a frame of the session's size");
-        assert_eq!(tracker.step(&frame(t)), Ok(answer));
-        assert_eq!(tracker.snapshot(), copy.snapshot());
-    }
-}
-
 /// Candidates are diagonalised side by side: once those that another session had left beyond a stage's own changed
 /// bits.
 #[test]
