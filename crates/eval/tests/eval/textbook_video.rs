@@ -2,36 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use bagtrack_cli::{frames, read_boxes};
 use bagtrack_tracker::{AffineSubspace, Frame, Params, Preset, Rect, patch};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// The frames and boxes of a sequence in the OTB layout; boxes count pixels from 1, all zeros mean none.
-struct Sequence {
-    frames: Vec<PathBuf>,
-    boxes: Vec<Option<Rect>>,
-}
-
-fn sequence(folder: &Path) -> Sequence {
-    let listing = std::fs::read_dir(folder.join("img")).expect("a folder img of frames");
-    let mut frames: Vec<PathBuf> = listing.map(|file| file.expect("a file").path()).collect();
-    frames.sort();
-    let text =
-        std::fs::read_to_string(folder.join("groundtruth_rect.txt")).expect("a ground truth");
-    let boxes = text
-        .lines()
-        .map(|line| {
-            let fields = line
-                .split([',', '\t', ' '])
-                .filter(|field| !field.is_empty());
-            let v: Vec<f64> = fields
-                .map(|field| field.trim().parse().expect("a number"))
-                .collect();
-            (v[2] > 0.0).then(|| Rect::new(v[0] - 1.0, v[1] - 1.0, v[2], v[3]))
-        })
-        .collect();
-    Sequence { frames, boxes }
-}
 
 fn gray(path: &Path) -> Frame {
     let luma = image::open(path).expect("a frame that decodes").to_luma8();
@@ -52,19 +26,18 @@ fn frames_of_real_video_agree() {
     folders.sort();
     assert!(!folders.is_empty(), "no video in {root}");
     for folder in folders {
-        let sequence = sequence(&folder);
-        let known: Vec<(usize, Rect)> = sequence
-            .boxes
+        let paths = frames::list(&folder).expect("a folder img of frames");
+        let boxes = read_boxes(&folder).expect("a ground truth");
+        let known: Vec<(&PathBuf, Rect)> = paths
             .iter()
-            .zip(&sequence.frames)
-            .enumerate()
-            .filter_map(|(index, (target, _))| target.map(|target| (index, target)))
+            .zip(boxes)
+            .filter_map(|(path, target)| Some((path, target?)))
             .collect();
         // The looks of the target at every annotated frame, up to a bound: enough for a history and a bag.
         let looks: Vec<Vec<f32>> = known
             .iter()
             .take(90)
-            .map(|&(index, target)| patch(&gray(&sequence.frames[index]), &target, &params))
+            .map(|(path, target)| patch(&gray(path), target, &params))
             .collect();
         let slices: Vec<&[f32]> = looks.iter().map(Vec::as_slice).collect();
         let mut greatest = [0.0_f64; 3];
@@ -75,8 +48,8 @@ fn frames_of_real_video_agree() {
                 .map(|k| (at * k / 10).min(at - 6))
                 .map(|from| AffineSubspace::of(&slices[from..from + 6], 3))
                 .collect();
-            let (index, target) = known[at];
-            let frame = gray(&sequence.frames[index]);
+            let (path, target) = known[at];
+            let frame = gray(path);
             let candidates: Vec<Vec<f32>> = (0..params.particles)
                 .map(|_| {
                     let mut shift = |range: f64| (generator.random::<f64>() - 0.5) * range;
