@@ -87,6 +87,9 @@ fn parse(text: &str) -> Option<IpAddr> {
 mod tests {
     use super::*;
 
+    const F: &str = "forwarded";
+    const X: &str = "x-forwarded-for";
+
     fn client(peer: &str, headers: &[(&'static str, &str)]) -> String {
         let trusted = ["10.0.0.0/8".parse().unwrap(), "fd00::/8".parse().unwrap()];
         let mut map = HeaderMap::new();
@@ -101,9 +104,9 @@ mod tests {
         fn nothing_that_a_client_writes_before_what_the_proxy_adds_changes_whose_request_it_is(
             before in "[ -~]{0,60}", lines in 0..3_usize
         ) {
-            let mut headers = vec![("x-forwarded-for", before.as_str()); lines];
+            let mut headers = vec![(X, before.as_str()); lines];
             let added = format!("{before}, 198.51.100.9");
-            headers.push(("x-forwarded-for", &added));
+            headers.push((X, &added));
             proptest::prop_assert_eq!(client("10.0.0.1", &headers), "198.51.100.9");
             proptest::prop_assert_eq!(client("192.0.2.1", &headers), "192.0.2.1");
         }
@@ -112,67 +115,46 @@ mod tests {
     #[test]
     fn only_trusted_proxies_are_believed_and_only_what_they_added() {
         for (peer, headers, expected) in [
-            (
-                "192.0.2.1",
-                &[("x-forwarded-for", "198.51.100.9")][..],
-                "192.0.2.1",
-            ),
+            ("192.0.2.1", &[(X, "198.51.100.9")][..], "192.0.2.1"),
             ("10.0.0.1", &[], "10.0.0.1"),
+            ("10.0.0.1", &[(X, "198.51.100.9")], "198.51.100.9"),
             (
                 "10.0.0.1",
-                &[("x-forwarded-for", "198.51.100.9")],
+                &[(X, "1.1.1.1, 198.51.100.9, 10.0.0.2")],
                 "198.51.100.9",
             ),
             (
                 "10.0.0.1",
-                &[("x-forwarded-for", "1.1.1.1, 198.51.100.9, 10.0.0.2")],
+                &[(X, "1.1.1.1"), (X, "198.51.100.9")],
                 "198.51.100.9",
             ),
             (
                 "10.0.0.1",
-                &[
-                    ("x-forwarded-for", "1.1.1.1"),
-                    ("x-forwarded-for", "198.51.100.9"),
-                ],
-                "198.51.100.9",
-            ),
-            (
-                "10.0.0.1",
-                &[("x-forwarded-for", "1.1.1.1, nonsense, 10.0.0.2")],
+                &[(X, "1.1.1.1, nonsense, 10.0.0.2")],
                 "10.0.0.2",
             ),
             (
                 "::ffff:10.0.0.1",
-                &[("x-forwarded-for", "[2001:db8::1]:4711")],
+                &[(X, "[2001:db8::1]:4711")],
                 "2001:db8::1",
             ),
             (
                 "fd00::1",
-                &[(
-                    "forwarded",
-                    "for=1.1.1.1, for=\"[2001:db8::1]:80\";proto=https",
-                )],
+                &[(F, "for=1.1.1.1, for=\"[2001:db8::1]:80\";proto=https")],
                 "2001:db8::1",
             ),
             (
                 "10.0.0.1",
-                &[("forwarded", "proto=https;For=198.51.100.9:80")],
+                &[(F, "proto=https;For=198.51.100.9:80")],
                 "198.51.100.9",
             ),
-            ("10.0.0.1", &[("forwarded", "for=_hidden")], "10.0.0.1"),
+            ("10.0.0.1", &[(F, "for=_hidden")], "10.0.0.1"),
             (
                 "10.0.0.1",
-                &[
-                    ("forwarded", "for=1.1.1.1"),
-                    ("x-forwarded-for", "198.51.100.9"),
-                ],
+                &[(F, "for=1.1.1.1"), (X, "198.51.100.9")],
                 "10.0.0.1",
             ),
-            (
-                "10.0.0.1",
-                &[("forwarded", "for=1.1.1.1"), ("x-forwarded-for", "1.1.1.1")],
-                "1.1.1.1",
-            ),
+            ("10.0.0.1", &[(F, "for=1.1.1.1"), (X, "1.1.1.1")], "1.1.1.1"),
         ] {
             assert_eq!(client(peer, headers), expected, "{peer} {headers:?}");
         }
