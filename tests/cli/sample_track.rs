@@ -1,9 +1,10 @@
 //! `bagtrack sample` and `bagtrack track`, as a person types them.
 
-use crate::command::{bagtrack, boxes, clip, fails, folder, rows, succeeds, text};
+use crate::command::{bagtrack, boxes, clip, fails, folder, rows, succeeds, text, track};
 use bagtrack_tracker::Rect;
 use serde_json::Value;
 use std::fs;
+use std::path::Path;
 
 #[test]
 fn sample_writes_the_otb_layout_and_the_same_clip_for_the_same_seed() {
@@ -19,7 +20,7 @@ fn sample_writes_the_otb_layout_and_the_same_clip_for_the_same_seed() {
     );
     for index in 1..=12 {
         let name = format!("img/{index:04}.jpg");
-        let bytes = |dir: &std::path::Path| fs::read(dir.join(&name)).expect("it was written");
+        let bytes = |dir: &Path| fs::read(dir.join(&name)).expect("it was written");
         assert_eq!(bytes(&one), bytes(&same), "{name}");
         assert_ne!(bytes(&one), bytes(&other), "{name}");
     }
@@ -83,15 +84,8 @@ fn sample_says_which_setting_is_wrong() {
     );
     let line = fails(&["sample", "--out", text(&out), "--frames", "0"]);
     assert!(line.contains("frames is 0"), "{line}");
-    let line = fails(&[
-        "sample",
-        "--out",
-        text(&out),
-        "--scene",
-        "leaves",
-        "--frames",
-        "60",
-    ]);
+    let leaves = ["--scene", "leaves", "--frames", "60"];
+    let line = fails(&[&["sample", "--out", text(&out)], &leaves[..]].concat());
     assert!(
         line.contains("frames is 60; it must be 90 or more in this scene"),
         "{line}"
@@ -103,51 +97,18 @@ fn sample_says_which_setting_is_wrong() {
 fn track_starts_at_the_given_box_and_gives_one_line_a_frame() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);
-    let lines = succeeds(&[
-        "track",
-        "--format",
-        "csv",
-        text(&dir),
-        "--box",
-        "44.1,101.4,46.1,57.6",
-        "--seed",
-        "3",
-    ]);
+    let given = |frames: &Path, more: &str| {
+        let flags = format!("--format csv --box 44.1,101.4,46.1,57.6 {more}");
+        succeeds(&track(frames, &flags))
+    };
+    let lines = given(&dir, "--seed 3");
     let found = rows(&lines);
     assert_eq!(found.len(), 12);
     assert_eq!(found[0].area, [44.1, 101.4, 46.1, 57.6]);
-    let again = succeeds(&[
-        "track",
-        "--format",
-        "csv",
-        text(&dir),
-        "--box",
-        "44.1,101.4,46.1,57.6",
-        "--seed",
-        "3",
-    ]);
+    let again = given(&dir, "--seed 3");
     assert_eq!(lines, again, "the same seed gives the same boxes");
-    let other = succeeds(&[
-        "track",
-        "--format",
-        "csv",
-        text(&dir),
-        "--box",
-        "44.1,101.4,46.1,57.6",
-        "--seed",
-        "4",
-    ]);
-    assert_ne!(lines, other);
-    let pictures = succeeds(&[
-        "track",
-        "--format",
-        "csv",
-        text(&dir.join("img")),
-        "--box",
-        "44.1,101.4,46.1,57.6",
-        "--set",
-        "seed=3",
-    ]);
+    assert_ne!(lines, given(&dir, "--seed 4"));
+    let pictures = given(&dir.join("img"), "--set seed=3");
     assert_eq!(
         lines, pictures,
         "a folder of frames is as good, and so is --set"
@@ -210,14 +171,10 @@ fn track_draws_the_box_and_nothing_else() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);
     let out = parent.path().join("drawn");
-    succeeds(&[
-        "track",
-        text(&dir),
-        "--box",
-        "40,100,50,60",
-        "--draw",
-        text(&out),
-    ]);
+    succeeds(&track(
+        &dir,
+        &format!("--box 40,100,50,60 --draw {}", text(&out)),
+    ));
     assert_eq!(fs::read_dir(&out).expect("it was written").count(), 12);
     let open = |path: std::path::PathBuf| image::open(path).expect("it is a picture").into_rgb8();
     let (plain, drawn) = (open(dir.join("img/0001.jpg")), open(out.join("0001.jpg")));
@@ -243,11 +200,7 @@ fn track_draws_the_box_and_nothing_else() {
 #[test]
 fn track_warns_of_a_box_that_may_be_two_corners_and_goes_on() {
     let parent = folder();
-    let dir = clip(
-        parent.path(),
-        "clip",
-        &["--width", "320", "--height", "240"],
-    );
+    let dir = clip(parent.path(), "clip", &[]);
     let said = |given: &str| {
         let output = bagtrack(&["track", text(&dir), "--box", given]);
         assert!(output.status.success(), "{output:?}");
@@ -265,12 +218,7 @@ fn track_warns_of_a_box_that_may_be_two_corners_and_goes_on() {
 fn track_says_in_one_line_what_is_wrong() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);
-    let line = fails(&[
-        "track",
-        text(&parent.path().join("nowhere")),
-        "--box",
-        "1,2,3,4",
-    ]);
+    let line = fails(&track(&parent.path().join("nowhere"), "--box 1,2,3,4"));
     assert!(line.contains("nowhere"), "{line}");
     let line = fails(&["track", text(&dir.join("img"))]);
     assert!(line.contains("--box x,y,width,height is needed"), "{line}");

@@ -1,6 +1,6 @@
 //! How `bagtrack track` writes boxes: formats, several targets, files.
 
-use crate::command::{Row, boxes, clip, fails, folder, rows, succeeds, text};
+use crate::command::{Row, boxes, clip, fails, folder, rows, succeeds, text, track};
 use bagtrack_cli::parse_boxes;
 use serde_json::Value;
 use std::fs;
@@ -270,21 +270,13 @@ fn a_part_of_a_clip_ends_where_it_was_tracked_to() {
         .collect();
     assert_eq!(enabled, [true, true, true, true, true, false]);
     // To the last frame, or back from it, there is nothing after it.
-    for more in [&["--frames", "99"][..], &["--backwards"]] {
-        let flags = [
-            "track",
-            text(&dir),
-            ONE,
-            "--start",
-            "11",
-            "--format",
-            "cvat",
-        ];
-        let cvat = succeeds(&[&flags[..], more].concat());
+    let flags = format!("{ONE} --start 11 --format cvat");
+    for (more, first_frame) in [("--frames 99", "11"), ("--backwards", "0")] {
+        let cvat = succeeds(&track(&dir, &format!("{flags} {more}")));
         assert!(!cvat.contains("outside=\"1\""), "{cvat}");
         let first = cvat.lines().find(|it| it.starts_with("<box"));
         let frame = attribute(first.expect("there are boxes"), "frame");
-        assert_eq!(frame, if more.len() == 2 { "11" } else { "0" });
+        assert_eq!(frame, first_frame);
     }
 }
 
@@ -326,16 +318,8 @@ fn labels_of_yolo_go_to_a_new_folder() {
 fn targets_of_one_name_are_one_class() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", &[]);
-    let flags = [
-        "track",
-        text(&dir),
-        ONE,
-        OTHER,
-        "--name",
-        "a",
-        "--name",
-        "a",
-    ];
+    let flags = format!("{ONE} {OTHER} --name a --name a");
+    let flags = track(&dir, &flags);
     let out = parent.path().join("labels");
     succeeds(&[&flags[..], &["--format", "yolo", "-o", text(&out)]].concat());
     let about = fs::read_to_string(out.join("data.yaml")).expect("it was written");

@@ -1,6 +1,6 @@
 //! A box propagated from a key frame: so many frames, backwards, until it is lost, thinned to key frames.
 
-use crate::command::{Row, clip, fails, folder, rows, succeeds, text, video_of};
+use crate::command::{Row, clip, fails, folder, rows, succeeds, text, track, video_of};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -40,18 +40,13 @@ fn error(row: &Row, truth: &[[f64; 4]]) -> f64 {
 fn a_box_goes_so_many_frames_forwards_or_back_to_the_first() {
     let parent = folder();
     let (dir, target) = long_clip(parent.path(), 30);
-    let flags = [
-        "track",
-        text(&dir),
-        "--start",
-        "30",
-        &target,
-        "--format",
-        "csv",
-    ];
-    let forwards = rows(&succeeds(&[&flags[..], &["--frames", "5"]].concat()));
+    let tracked = |more: &str| {
+        let flags = format!("--start 30 {target} --format csv {more}");
+        rows(&succeeds(&track(&dir, &flags)))
+    };
+    let forwards = tracked("--frames 5");
     assert_eq!(frames(&forwards), [30, 31, 32, 33, 34, 35]);
-    let backwards = rows(&succeeds(&[&flags[..], &["--backwards"]].concat()));
+    let backwards = tracked("--backwards");
     assert_eq!(frames(&backwards), (0..=30).rev().collect::<Vec<u64>>());
     let truth = truth(&dir);
     for row in &backwards {
@@ -61,9 +56,7 @@ fn a_box_goes_so_many_frames_forwards_or_back_to_the_first() {
             truth[row.frame as usize]
         );
     }
-    let few = rows(&succeeds(
-        &[&flags[..], &["--backwards", "--frames", "0"]].concat(),
-    ));
+    let few = tracked("--backwards --frames 0");
     assert_eq!(frames(&few), [30]);
     let line = fails(&["track", text(&dir), &target, "--backwards"]);
     assert!(line.contains("give --start"), "{line}");
@@ -78,45 +71,21 @@ fn a_video_is_tracked_backwards_frame_by_frame_with_an_index_and_without() {
     for name in ["indexed.mp4", "plain.avi"] {
         let video = parent.path().join(name);
         video_of(&dir, &video, 1);
-        let flags = [
-            "track",
-            text(&video),
-            "--start",
-            "79",
-            &target,
-            "--backwards",
-            "--format",
-            "csv",
-        ];
-        let tracked = rows(&succeeds(&flags));
+        let flags = format!("--start 79 {target} --backwards --format csv");
+        let tracked = rows(&succeeds(&track(&video, &flags)));
         assert_eq!(
             frames(&tracked),
             (0..=79).rev().collect::<Vec<u64>>(),
             "{name}"
         );
         // A frame that is not the one that its number says would be off by several pixels.
-        let of_folder = [
-            "track",
-            text(&dir),
-            "--start",
-            "79",
-            &target,
-            "--backwards",
-            "--format",
-            "csv",
-        ];
-        for (a, b) in tracked.iter().zip(rows(&succeeds(&of_folder))) {
+        let of_folder = rows(&succeeds(&track(&dir, &flags)));
+        for (a, b) in tracked.iter().zip(of_folder) {
             let near = (a.area[0] - b.area[0]).hypot(a.area[1] - b.area[1]);
             assert!(near < 3.0, "{name}: {a:?} {b:?}");
         }
-        let line = fails(&[
-            "track",
-            text(&video),
-            "--start",
-            "80",
-            &target,
-            "--backwards",
-        ]);
+        let after = format!("--start 80 {target} --backwards");
+        let line = fails(&track(&video, &after));
         assert!(line.contains("--start is after its last frame"), "{line}");
     }
 }
@@ -163,14 +132,7 @@ fn key_frames_give_every_box_to_within_a_pixel_by_straight_lines() {
             }
         }
     }
-    let line = fails(&[
-        "track",
-        text(&dir),
-        &target,
-        "--keyframes",
-        "--format",
-        "otb",
-    ]);
+    let line = fails(&track(&dir, &format!("{target} --keyframes --format otb")));
     assert!(line.contains("--keyframes"), "{line}");
 }
 

@@ -57,6 +57,12 @@ pub fn fails(args: &[&str]) -> String {
     failure("bagtrack", bagtrack(args))
 }
 
+/// The arguments of `bagtrack track` for these frames, and flags with spaces between them.
+pub fn track<'a>(frames: &'a Path, flags: &'a str) -> Vec<&'a str> {
+    let begin = ["track", text(frames)];
+    begin.into_iter().chain(flags.split_whitespace()).collect()
+}
+
 /// A small sample clip under `parent`: 12 frames unless `extra` says otherwise.
 pub fn clip(parent: &Path, name: &str, extra: &[&str]) -> PathBuf {
     let dir = parent.join(name);

@@ -3,6 +3,7 @@
 use crate::command::{clip, fails, folder, succeeds, text};
 use serde_json::Value;
 use std::fs;
+use std::path::PathBuf;
 
 const FIELDS: [&str; 8] = [
     "frames",
@@ -15,15 +16,17 @@ const FIELDS: [&str; 8] = [
     "step_ms",
 ];
 
+/// The report of these sequences as JSON, with flags that have spaces between them.
+fn report(dirs: &[&PathBuf], flags: &str) -> Value {
+    let mut args: Vec<&str> = dirs.iter().map(|dir| text(dir)).collect();
+    args.extend(flags.split_whitespace());
+    args.extend(["--format", "json"]);
+    serde_json::from_str(&succeeds(&args)).expect("it is JSON")
+}
+
 fn names(value: &Value) -> Vec<&str> {
-    let mut names: Vec<&str> = value
-        .as_object()
-        .expect("an object")
-        .keys()
-        .map(String::as_str)
-        .collect();
-    names.sort_unstable();
-    names
+    let object = value.as_object().expect("an object");
+    sorted(&object.keys().map(String::as_str).collect::<Vec<&str>>())
 }
 
 fn sorted<'a>(names: &[&'a str]) -> Vec<&'a str> {
@@ -37,17 +40,7 @@ fn json_has_exactly_the_promised_fields_and_the_mean_is_the_mean() {
     let parent = folder();
     let one = clip(parent.path(), "one", 1, 12);
     let two = clip(parent.path(), "two", 2, 6);
-    let json = succeeds(&[
-        text(&one),
-        text(&two),
-        "--preset",
-        "paper",
-        "--seeds",
-        "3",
-        "--format",
-        "json",
-    ]);
-    let report: Value = serde_json::from_str(&json).expect("it is JSON");
+    let report = report(&[&one, &two], "--preset paper --seeds 3");
     assert_eq!(
         names(&report),
         sorted(&[
@@ -106,16 +99,7 @@ fn jobs_change_the_time_only() {
     let parent = folder();
     let dir = clip(parent.path(), "clip", 0, 12);
     let figures = |jobs: &str| {
-        let json = succeeds(&[
-            text(&dir),
-            "--seeds",
-            "4",
-            "--jobs",
-            jobs,
-            "--format",
-            "json",
-        ]);
-        let mut report: Value = serde_json::from_str(&json).expect("it is JSON");
+        let mut report = report(&[&dir], &format!("--seeds 4 --jobs {jobs}"));
         for part in ["/sequences/0", "/mean"] {
             report.pointer_mut(part).expect("it is there")["step_ms"] = Value::Null;
         }
@@ -133,22 +117,8 @@ fn a_tracker_that_cannot_move_is_measured_as_a_box_that_stays() {
     let mut truth = "51,61,40,40\n0,0,0,0\n54,65,40,40\n71,61,40,40\n61,71,20,20\n".to_owned();
     truth += &"0,0,0,0\n".repeat(7);
     fs::write(dir.join("groundtruth_rect.txt"), truth).expect("the folder is writable");
-    let json = succeeds(&[
-        text(&dir),
-        "--format",
-        "json",
-        "--seeds",
-        "2",
-        "--set",
-        "motion_std_x=0",
-        "--set",
-        "motion_std_y=0",
-        "--set",
-        "motion_std_scale=0",
-        "--preset",
-        "paper",
-    ]);
-    let report: Value = serde_json::from_str(&json).expect("it is JSON");
+    let still = "--set motion_std_x=0 --set motion_std_y=0 --set motion_std_scale=0";
+    let report = report(&[&dir], &format!("--seeds 2 {still} --preset paper"));
     let number = |field: &str| report["sequences"][0][field].as_f64().expect("a number");
     let close = |field: &str, expected: f64| {
         assert!(
