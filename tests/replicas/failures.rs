@@ -31,10 +31,7 @@ async fn after_the_end_of_a_replica_the_frames_after_the_checkpoint_are_asked_fo
     pair.replicas[0].kill();
     let refused = json(pair.post(1, 26).await, StatusCode::CONFLICT).await;
     assert_eq!(refused["expected_frame"], 21);
-    for number in 21..30 {
-        let answer = json(pair.post(1, number).await, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1], "frame {number}");
-    }
+    pair.follow(1, 21..30, &expected).await;
 }
 
 /// The same with the Rust client, which keeps those frames and sends them again.
@@ -82,23 +79,15 @@ async fn a_replica_that_is_asked_to_end_writes_what_it_has() {
 async fn a_replica_that_lost_a_session_to_another_goes_on_from_the_store() {
     let pair = Pair::open(&["--store-every", "4"], 20).await;
     let expected = pair.undisturbed().await;
-    for number in 1..=6 {
-        json(pair.post(0, number).await, StatusCode::OK).await;
-    }
+    pair.take(0, 1..7).await;
     // The second takes over at the checkpoint; the first still has frames 5 and 6 in memory.
     let early = json(pair.post(1, 7).await, StatusCode::CONFLICT).await;
     assert_eq!(early["expected_frame"], 5);
-    for number in 5..=6 {
-        let answer = json(pair.post(1, number).await, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1]);
-    }
+    pair.follow(1, 5..7, &expected).await;
     // The first's frame 6 is another's now.
     let stale = json(pair.post(0, 7).await, StatusCode::CONFLICT).await;
     assert_eq!(stale["expected_frame"], 5);
-    for number in 5..20 {
-        let answer = json(pair.post(0, number).await, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1], "frame {number}");
-    }
+    pair.follow(0, 5..20, &expected).await;
 }
 
 #[tokio::test]
@@ -108,9 +97,7 @@ async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
     // The second has the first frame.
     let early = json(pair.post(1, 19).await, StatusCode::CONFLICT).await;
     assert_eq!(early["expected_frame"], 1);
-    for number in 1..=14 {
-        json(pair.post(0, number).await, StatusCode::OK).await;
-    }
+    pair.take(0, 1..15).await;
     for number in [1, 2, 10] {
         let late = pair.post(1, number).await;
         assert_eq!(late.headers()["replayed"], "true", "frame {number}");
@@ -125,9 +112,7 @@ async fn a_frame_that_comes_late_to_another_replica_takes_nothing_back() {
 async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
     let mut pair = Pair::open(&["--store-timeout", "300ms"], 12).await;
     let expected = pair.undisturbed().await;
-    for number in 1..=5 {
-        json(pair.post(0, number).await, StatusCode::OK).await;
-    }
+    pair.take(0, 1..6).await;
     assert_eq!(pair.replicas[0].readiness().await, StatusCode::OK);
     pair.redis.stop();
     for _ in 0..3 {
@@ -139,8 +124,5 @@ async fn without_the_store_frames_are_refused_and_nothing_is_lost() {
     until_ready(&pair.replicas[0], StatusCode::SERVICE_UNAVAILABLE).await;
     pair.redis.start_again();
     until_ready(&pair.replicas[0], StatusCode::OK).await;
-    for number in 6..12 {
-        let answer = json(pair.post(0, number).await, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1], "frame {number}");
-    }
+    pair.follow(0, 6..12, &expected).await;
 }

@@ -35,9 +35,7 @@ async fn a_session_that_the_store_has_lost_is_gone_at_all_replicas() {
 async fn a_lost_session_goes_on_from_its_snapshot_under_the_same_id() {
     let pair = Pair::open(&["--snapshot-keys", "a-secret-of-both-replicas"], 6).await;
     let expected = pair.undisturbed().await;
-    for number in 1..4 {
-        json(pair.post(0, number).await, StatusCode::OK).await;
-    }
+    pair.take(0, 1..4).await;
     let snapshot = pair.client.get(pair.url(1, "/snapshot")).send().await;
     let snapshot = snapshot.unwrap().bytes().await.unwrap();
     pair.redis.ask(&["flushall"]);

@@ -7,6 +7,7 @@ use crate::tracking_client::{Answer, Track};
 use bagtrack_testing::command::program;
 use reqwest::{Client, Response, StatusCode};
 use serde_json::Value;
+use std::ops::Range;
 use std::path::Path;
 use uuid::Uuid;
 
@@ -71,6 +72,21 @@ impl Pair {
 
     pub async fn post(&self, replica: usize, number: usize) -> Response {
         self.post_as(replica, number, number).await
+    }
+
+    /// Posts these frames to a replica, which takes them.
+    pub async fn take(&self, replica: usize, numbers: Range<usize>) {
+        for number in numbers {
+            json(self.post(replica, number).await, StatusCode::OK).await;
+        }
+    }
+
+    /// Posts these frames to a replica, whose answers are those that are expected from frame 1 on.
+    pub async fn follow(&self, replica: usize, numbers: Range<usize>, expected: &[Answer]) {
+        for number in numbers {
+            let answer = json(self.post(replica, number).await, StatusCode::OK).await;
+            assert_eq!(answer, expected[number - 1], "frame {number}");
+        }
     }
 
     /// The frame `file` under this number.

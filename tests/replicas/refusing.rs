@@ -76,9 +76,7 @@ async fn a_session_can_be_ended_where_the_memory_is_used_up() {
 async fn a_store_that_gives_no_answer_is_waited_for_once() {
     let pair = Pair::open(&["--store-timeout", "500ms"], 8).await;
     let expected = pair.undisturbed().await;
-    for number in 1..4 {
-        json(pair.post(0, number).await, StatusCode::OK).await;
-    }
+    pair.take(0, 1..4).await;
     pair.redis.pause();
     let asked = Instant::now();
     must_come_again(pair.post(0, 4).await).await;
@@ -94,10 +92,7 @@ async fn a_store_that_gives_no_answer_is_waited_for_once() {
     assert!(others < Duration::from_millis(2000), "{others:?}");
     pair.redis.go_on();
     while pair.replicas[0].readiness().await != StatusCode::OK {}
-    for number in 4..8 {
-        let answer = json(pair.post(0, number).await, StatusCode::OK).await;
-        assert_eq!(answer, expected[number - 1], "frame {number}");
-    }
+    pair.follow(0, 4..8, &expected).await;
 }
 
 #[tokio::test]
