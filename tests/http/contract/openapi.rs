@@ -60,14 +60,9 @@ fn every_reference_in_the_document_leads_somewhere() {
     assert!(references > 10);
 }
 
-async fn served() -> Value {
-    let app = TestApplication::start().await;
-    app.get("/openapi.json").await.json().await.unwrap()
-}
-
-#[tokio::test]
-async fn the_schema_has_every_row_of_the_table_of_parameters() {
-    let document = served().await;
+#[test]
+fn the_schema_has_every_row_of_the_table_of_parameters() {
+    let document = generated();
     let schema = &document["components"]["schemas"]["Parameters"];
     let properties = schema["properties"].as_object().unwrap();
     let robust = serde_json::to_value(Preset::Robust.params()).unwrap();
@@ -96,9 +91,9 @@ async fn the_schema_has_every_row_of_the_table_of_parameters() {
     assert_eq!(properties.len(), 16);
 }
 
-#[tokio::test]
-async fn opening_a_session_tells_the_limits_that_validation_has() {
-    let document = served().await;
+#[test]
+fn opening_a_session_tells_the_limits_that_validation_has() {
+    let document = generated();
     let description = &document["paths"]["/sessions"]["post"]["description"];
     let description = description.as_str().unwrap();
     let gray = Preset::Paper.params();
@@ -149,10 +144,10 @@ fn objects(value: &Value, at: String, found: &mut Vec<(String, Value)>) {
 }
 
 /// Generated clients in typed languages make a 32-bit number of an integer without a format.
-#[tokio::test]
-async fn every_integer_has_a_format_and_a_maximum_that_it_can_reach() {
+#[test]
+fn every_integer_has_a_format_and_a_maximum_that_it_can_reach() {
     let mut found = Vec::new();
-    objects(&served().await, String::new(), &mut found);
+    objects(&generated(), String::new(), &mut found);
     let is_integer = |schema: &Value| {
         let kind = &schema["type"];
         let kinds = kind.as_array().cloned().unwrap_or(vec![kind.clone()]);
@@ -205,9 +200,9 @@ async fn the_greatest_seed_is_taken_and_sent_back_and_one_more_refused() {
     expect_problem(refused, "invalid-parameter").await;
 }
 
-#[tokio::test]
-async fn a_body_has_one_raw_form_beside_the_form_and_json_and_errors_share_an_answer() {
-    let document = served().await;
+#[test]
+fn a_body_has_one_raw_form_beside_the_form_and_json_and_errors_share_an_answer() {
+    let document = generated();
     let mut bodies = 0;
     for (path, methods) in document["paths"].as_object().unwrap() {
         for (method, operation) in methods.as_object().unwrap() {
@@ -240,9 +235,9 @@ async fn a_body_has_one_raw_form_beside_the_form_and_json_and_errors_share_an_an
 }
 
 /// Swagger UI offers a file for a parameter with a content type, and nobody can type into that.
-#[tokio::test]
-async fn the_parameters_of_the_tracker_can_be_typed_in_a_query() {
-    let document = served().await;
+#[test]
+fn the_parameters_of_the_tracker_can_be_typed_in_a_query() {
+    let document = generated();
     let parameters = &document["paths"]["/sessions"]["post"]["parameters"];
     let parameters = parameters.as_array().unwrap().iter();
     let mut named = parameters.filter(|parameter| parameter["name"] == "parameters");
