@@ -2,7 +2,7 @@
 
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::pictures;
-use bagtrack::http::Secret;
+use crate::security::access::{BEN, two_clients};
 use reqwest::{Method, RequestBuilder, StatusCode};
 use std::time::Duration;
 
@@ -52,22 +52,13 @@ async fn another_request_for_the_same_id_is_refused() {
 
 #[tokio::test]
 async fn an_id_of_another_client_is_taken() {
-    let mut app = TestApplication::start_with(|config| {
-        config.access.api_keys = vec![
-            Secret::from("ann:0123456789abcdef"),
-            Secret::from("ben:fedcba9876543210"),
-        ];
-    })
-    .await;
+    let mut app = two_clients().await;
     let query = [("box", BOX), ("seed", "7")];
     let opened = put(&app, ID, &query).send().await.unwrap();
     assert_eq!(opened.status(), StatusCode::CREATED);
-    app.key = Some("fedcba9876543210".to_owned());
-    expect_problem(
-        put(&app, ID, &query).send().await.unwrap(),
-        "session-exists",
-    )
-    .await;
+    app.key = Some(BEN.to_owned());
+    let taken = put(&app, ID, &query).send().await.unwrap();
+    expect_problem(taken, "session-exists").await;
     expect_problem(app.get_session(ID).await, "session-not-found").await;
 }
 
