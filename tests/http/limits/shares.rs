@@ -1,6 +1,6 @@
 //! What one client may hold, and that others get theirs beside it.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::helpers::heavy;
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::{metrics, value};
@@ -55,18 +55,9 @@ async fn one_client_with_costly_sessions_leaves_memory_for_those_of_others() {
         config.limits.max_session_bytes = Some(64 << 20);
     });
     let app = app.await;
-    let mut opened = 0;
-    let refused = loop {
-        let answer = open_dear(&app, GREEDY).await;
-        if answer.status() != StatusCode::CREATED {
-            break answer;
-        }
-        opened += 1;
-    };
+    let (opened, refused) = open_all(&app, GREEDY).await;
     // It once got all of them, and everybody else 503.
-    let problem = expect_problem(refused, "quota-exceeded").await;
-    let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains("bytes of sessions"), "{detail}");
+    expect_detail(refused, "quota-exceeded", &["bytes of sessions"]).await;
     assert!(opened >= 2, "{opened}");
     expect(open_dear(&app, MODEST).await, StatusCode::CREATED).await;
     let id = open(&app, MODEST).await;

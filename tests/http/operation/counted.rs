@@ -1,6 +1,6 @@
 //! What is counted beside plain answers: lines, messages, connections that no handler sees; and readiness.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_detail};
 use crate::helpers::raw::RawConnection;
 use crate::operation::metrics::{metrics, readiness, value};
 use crate::pictures;
@@ -99,8 +99,7 @@ async fn readiness_ends_when_the_memory_of_bodies_is_used_up() {
     expect(app.get("/readyz").await, StatusCode::OK).await;
     held.send([7; 98_000]).await;
     let full = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
-    let problem = expect_problem(full, "not-ready").await;
-    assert!(problem["detail"].as_str().unwrap().contains("bodies"));
+    expect_detail(full, "not-ready", &["bodies"]).await;
     drop(held);
     readiness(&app, StatusCode::OK).await;
 }

@@ -1,6 +1,6 @@
 //! `/metrics`, `traceparent`, and readiness.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_detail, expect_problem};
 use crate::helpers::heavy;
 use crate::pictures;
 use bagtrack::http::Secret;
@@ -245,8 +245,7 @@ async fn readiness_ends_when_the_queue_is_full_and_comes_back_when_it_is_free() 
     let busy = heavy::fill_queue(&app).await;
     // Between two of the long requests the place is free for a moment.
     let not_ready = readiness(&app, StatusCode::SERVICE_UNAVAILABLE).await;
-    let problem = expect_problem(not_ready, "not-ready").await;
-    assert!(problem["detail"].as_str().unwrap().contains("queue"));
+    expect_detail(not_ready, "not-ready", &["queue"]).await;
     drop(busy);
     readiness(&app, StatusCode::OK).await;
 }

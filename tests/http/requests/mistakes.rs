@@ -1,24 +1,12 @@
 //! Likely mistakes, and the cure that their problems name.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_detail};
 use crate::pictures;
 use crate::stream_client::StreamClient;
 use base64::prelude::{BASE64_STANDARD, Engine};
 use reqwest::multipart::{Form, Part};
-use reqwest::{Method, Response, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
-
-/// The detail of a response that must be this problem.
-async fn detail(response: Response, slug: &str) -> String {
-    let problem = expect_problem(response, slug).await;
-    problem["detail"].as_str().unwrap().to_owned()
-}
-
-fn says(detail: &str, texts: &[&str]) {
-    for text in texts {
-        assert!(detail.contains(text), "{text}: {detail}");
-    }
-}
 
 #[tokio::test]
 async fn a_file_under_another_name_is_told_to_be_called_frame() {
@@ -29,14 +17,16 @@ async fn a_file_under_another_name_is_told_to_be_called_frame() {
             let part = Part::bytes(pictures::png(0)).file_name("first.png");
             let form = Form::new().part(name, part);
             let request = app.request(Method::POST, &path, &[]).multipart(form);
-            let detail = detail(request.send().await.unwrap(), "missing-frame").await;
-            says(&detail, &[&format!("`{name}`"), "`frame`", "-F frame=@"]);
+            let refused = request.send().await.unwrap();
+            let texts = [&format!("`{name}`"), "`frame`", "-F frame=@"];
+            expect_detail(refused, "missing-frame", &texts).await;
         }
         for name in ["image", "file", "images[]", "data"] {
             let body = json!({ name: BASE64_STANDARD.encode(pictures::png(0)) });
             let request = app.request(Method::POST, &path, &[]).json(&body);
-            let detail = detail(request.send().await.unwrap(), "missing-frame").await;
-            says(&detail, &[&format!("`{name}`"), "`frame`"]);
+            let refused = request.send().await.unwrap();
+            let texts = [&format!("`{name}`"), "`frame`"];
+            expect_detail(refused, "missing-frame", &texts).await;
         }
     }
     // A file may hold a setting.
@@ -63,16 +53,16 @@ async fn heic_and_avif_are_named_with_the_cure_at_the_opening_and_as_a_frame() {
         (AVIF, ["AVIF", "not read", "JPEG"]),
     ] {
         let opening = app.create(file.to_vec(), &[("box", BOX)]).await;
-        says(&detail(opening, "unsupported-image").await, &texts);
+        expect_detail(opening, "unsupported-image", &texts).await;
         let frame = app.post_frame(&id, file.to_vec()).await;
-        says(&detail(frame, "unsupported-image").await, &texts);
+        expect_detail(frame, "unsupported-image", &texts).await;
         let form = Form::new().part(
             "frame",
             Part::bytes(file.to_vec()).file_name("IMG_0001.HEIC"),
         );
         let request = app.request(Method::POST, "/track", &[("box", BOX)]);
         let track = request.multipart(form).send().await.unwrap();
-        says(&detail(track, "unsupported-image").await, &texts);
+        expect_detail(track, "unsupported-image", &texts).await;
     }
     assert_eq!(app.frames_of(&id).await, 1);
 }
@@ -90,19 +80,18 @@ async fn a_box_in_other_units_is_refused_with_the_box_that_is_meant() {
         ("30,30,10,-12", ["negative height", "top left"]),
     ] {
         let opening = app.create(pictures::png(0), &[("box", given)]).await;
-        says(&detail(opening, "invalid-box").await, &texts);
+        expect_detail(opening, "invalid-box", &texts).await;
         let correction = app
             .put_target(&id, pictures::png(1), &[("box", given)])
             .await;
-        says(&detail(correction, "invalid-box").await, &texts);
+        expect_detail(correction, "invalid-box", &texts).await;
         let request = app.request(Method::POST, "/track", &[("box", given)]);
         let track = request.body(pictures::png(0)).send().await.unwrap();
-        says(&detail(track, "invalid-box").await, &texts);
+        expect_detail(track, "invalid-box", &texts).await;
         let boxes = format!("{BOX};{given}");
         let several = app.create(pictures::png(0), &[("boxes", &boxes)]).await;
-        let detail = detail(several, "invalid-box").await;
-        says(&detail, &["Target 1 of 2"]);
-        says(&detail, &texts);
+        let texts = [texts[0], texts[1], "Target 1 of 2"];
+        expect_detail(several, "invalid-box", &texts).await;
     }
     assert_eq!(app.frames_of(&id).await, 1);
 }
@@ -113,7 +102,10 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
     let far = [("box", "90,20,20,12"), ("seed", "7")];
     let has_warning = |answer: &Value| {
         let warning = answer["warnings"][0].as_str().unwrap_or_default();
-        says(warning, &["70 % of the box", "outside"]);
+        assert!(
+            warning.contains("70 % of the box lies outside"),
+            "{warning}"
+        );
     };
     let created = app.create(pictures::png(0), &far).await;
     let created = expect(created, StatusCode::CREATED).await;
@@ -139,10 +131,8 @@ async fn a_box_that_reaches_far_outside_is_tracked_with_a_warning() {
     let doubtful = [("box", "40,30,58,44")];
     let created = app.create(pictures::png(0), &doubtful).await;
     let created = expect(created, StatusCode::CREATED).await;
-    says(
-        created["warnings"][0].as_str().unwrap(),
-        &["`box=40,30,18,14`"],
-    );
+    let warning = created["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("`box=40,30,18,14`"), "{warning}");
 }
 
 #[tokio::test]
@@ -155,8 +145,9 @@ async fn a_url_in_place_of_base64_is_named() {
     ] {
         let body = json!({"frame": url, "box": BOX});
         let request = app.request(Method::POST, "/sessions", &[]).json(&body);
-        let detail = detail(request.send().await.unwrap(), "malformed-request").await;
-        says(&detail, &["URL", "not fetched", "base64"]);
+        let refused = request.send().await.unwrap();
+        let texts = ["URL", "not fetched", "base64"];
+        expect_detail(refused, "malformed-request", &texts).await;
     }
 }
 
@@ -165,27 +156,18 @@ async fn a_parameter_of_the_tracker_is_told_its_place() {
     let app = TestApplication::start().await;
     let query = [("box", BOX), ("particles", "300")];
     let opening = app.create(pictures::png(0), &query).await;
-    let opening = detail(opening, "malformed-request").await;
-    says(
-        &opening,
-        &[
-            "`particles`",
-            "`parameters`",
-            r#"parameters={"particles":300}"#,
-        ],
-    );
+    let cure = r#"parameters={"particles":300}"#;
+    let texts = ["`particles`", "`parameters`", cure];
+    let opening = expect_detail(opening, "malformed-request", &texts).await;
     let body =
         json!({"frame": BASE64_STANDARD.encode(pictures::png(0)), "box": BOX, "particles": 300});
     let request = app.request(Method::POST, "/sessions", &[]).json(&body);
-    let by_json = detail(request.send().await.unwrap(), "malformed-request").await;
-    assert_eq!(by_json, opening);
+    let by_json = request.send().await.unwrap();
+    expect_detail(by_json, "malformed-request", &[&opening]).await;
     let id = app.open().await;
     let request = app.request(Method::POST, &format!("/sessions/{id}/frames"), &query[1..]);
     let frame = request.body(pictures::png(1)).send().await.unwrap();
-    says(
-        &detail(frame, "malformed-request").await,
-        &["when the session is opened"],
-    );
+    expect_detail(frame, "malformed-request", &["when the session is opened"]).await;
 }
 
 #[tokio::test]
@@ -193,12 +175,6 @@ async fn a_slash_at_the_end_of_a_path_is_named() {
     let app = TestApplication::start().await;
     let request = app.request(Method::POST, "/sessions/", &[("box", BOX)]);
     let refused = request.body(pictures::png(0)).send().await.unwrap();
-    says(
-        &detail(refused, "route-not-found").await,
-        &["slash", "`/sessions`"],
-    );
-    says(
-        &detail(app.get("/nothing").await, "route-not-found").await,
-        &["/docs"],
-    );
+    expect_detail(refused, "route-not-found", &["slash", "`/sessions`"]).await;
+    expect_detail(app.get("/nothing").await, "route-not-found", &["/docs"]).await;
 }

@@ -1,6 +1,6 @@
 //! Clients with tokens of an identity provider, beside those with API keys.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
 use crate::program::Program;
 use crate::stream_client::StreamClient;
@@ -93,9 +93,7 @@ async fn a_token_that_has_ended_is_told_so_and_ends_its_stream() {
     let refused = app.get_session(&id).await;
     let challenge = "Bearer realm=\"bagtrack\", error=\"invalid_token\"";
     assert_eq!(refused.headers()["www-authenticate"], challenge);
-    let problem = expect_problem(refused, "unauthorized").await;
-    let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains("has expired"), "{detail}");
+    expect_detail(refused, "unauthorized", &["has expired"]).await;
     stream.send(pictures::png(3)).await;
     assert_eq!(problem_slug(&stream.message().await), "unauthorized");
     assert_eq!(stream.close_code().await, 4401);

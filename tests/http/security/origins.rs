@@ -1,6 +1,6 @@
 //! Pages of other origins, other hosts, and what browsers are told.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
 use reqwest::{Method, StatusCode};
 
@@ -146,9 +146,8 @@ async fn a_service_for_this_machine_alone_is_not_served_under_a_rebound_name() {
         assert_eq!(open(&host).await.status(), StatusCode::CREATED, "{host}");
     }
     let rebound = format!("rebound.example:{port}");
-    let problem = expect_problem(open(&rebound).await, "host-not-allowed").await;
-    let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains("--allowed-hosts"), "{detail}");
+    let refused = open(&rebound).await;
+    expect_detail(refused, "host-not-allowed", &["--allowed-hosts"]).await;
     // With keys, a page that rebinds its name cannot call; a proxy may name any host.
     let keys = TestApplication::start_with(|config| {
         config.access.api_keys = vec![bagtrack::http::Secret::from("me:0123456789abcdef")];

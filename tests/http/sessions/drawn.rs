@@ -1,6 +1,6 @@
 //! Answers as pictures.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
 use crate::requests::forms::form;
 use crate::sessions::targets::{BOXES, open_with};
@@ -111,11 +111,7 @@ async fn what_cannot_be_drawn_is_not_tracked() {
     let request = app.request(Method::POST, &path, &[("draw", "true")]);
     let several = form([1, 2].map(pictures::png));
     let several = request.multipart(several).send().await.unwrap();
-    let problem = expect_problem(several, "malformed-request").await;
-    assert!(
-        problem["detail"].as_str().unwrap().contains("one frame"),
-        "{problem}"
-    );
+    expect_detail(several, "malformed-request", &["one frame"]).await;
     let request = app.request(Method::POST, &path, &[("draw", "true")]);
     let bad = request.body("no image").send().await.unwrap();
     expect_problem(bad, "unsupported-image").await;

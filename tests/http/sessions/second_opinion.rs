@@ -1,6 +1,6 @@
 //! A service with a network that gives a second opinion of each frame.
 
-use crate::application::{TestApplication, expect, expect_problem};
+use crate::application::{TestApplication, expect, expect_detail};
 use crate::pictures;
 use bagtrack_testing::tiny_network;
 use reqwest::StatusCode;
@@ -55,17 +55,9 @@ async fn a_session_has_the_second_opinion_and_goes_on_where_the_same_is_loaded()
         answers(&app, &id, 12..20).await
     );
 
-    let refused = expect_problem(
-        plain.create(snapshot.clone(), &[]).await,
-        "invalid-snapshot",
-    )
-    .await;
-    assert!(
-        refused["detail"].as_str().unwrap().contains("--model"),
-        "{refused}"
-    );
+    let refused = plain.create(snapshot.clone(), &[]).await;
+    expect_detail(refused, "invalid-snapshot", &["--model"]).await;
     let in_doubt = with_network(folder.path(), true).await;
-    let refused = expect_problem(in_doubt.create(snapshot, &[]).await, "invalid-snapshot").await;
-    let detail = refused["detail"].as_str().unwrap();
-    assert!(detail.contains("--model-in-doubt"), "{detail}");
+    let refused = in_doubt.create(snapshot, &[]).await;
+    expect_detail(refused, "invalid-snapshot", &["--model-in-doubt"]).await;
 }

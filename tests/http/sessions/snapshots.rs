@@ -1,6 +1,6 @@
 //! A session carried to another instance.
 
-use crate::application::{BOX, TestApplication, expect, expect_problem};
+use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::helpers::forged;
 use crate::pictures;
 use crate::requests::forms::form;
@@ -126,9 +126,12 @@ async fn a_snapshot_is_taken_from_services_with_the_same_secret_only() {
         (&open, &none),
         (&old, &open),
     ] {
-        let problem = expect_problem(restored(from, to).await, "invalid-snapshot").await;
-        let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.contains("BAGTRACK_SNAPSHOT_KEYS"), "{detail}");
+        expect_detail(
+            restored(from, to).await,
+            "invalid-snapshot",
+            &["BAGTRACK_SNAPSHOT_KEYS"],
+        )
+        .await;
     }
 }
 

@@ -167,6 +167,16 @@ pub async fn expect(response: Response, status: StatusCode) -> Value {
     serde_json::from_str(&text).unwrap_or(Value::Null)
 }
 
+/// The detail of a response that must be this problem and say these texts.
+pub async fn expect_detail(response: Response, slug: &str, says: &[&str]) -> String {
+    let problem = expect_problem(response, slug).await;
+    let detail = problem["detail"].as_str().unwrap().to_owned();
+    for text in says {
+        assert!(detail.contains(text), "{text}: {detail}");
+    }
+    detail
+}
+
 /// The JSON of a response that must be this problem.
 pub async fn expect_problem(response: Response, slug: &str) -> Value {
     let headers = response.headers().clone();
