@@ -1,8 +1,9 @@
 //! `POST /track` from a frame of a video on, or back: the same answers as `bagtrack track` with the same options. All
 //! need ffmpeg.
 
-use crate::application::{TestApplication, expect_problem};
+use crate::application::{TestApplication, expect_detail, expect_problem};
 use crate::requests::lines::lines;
+use bagtrack_testing::command;
 use reqwest::{Method, Response};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -17,10 +18,7 @@ const BOXES: [&str; 2] = ["55,72,46,58", "200,30,40,40"];
 /// The sample clip as an MP4 with B-frames, so that the order of decoding is not that of showing; from frame 45 on it is
 /// an empty scene.
 fn clip(folder: &Path) -> PathBuf {
-    let frames = folder.join("clip");
-    let mut sample = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
-    sample.args(["sample", "--frames", "60", "--out"]);
-    assert!(sample.arg(&frames).status().unwrap().success());
+    let frames = command::clip(folder, "clip", &["--frames", "60"]);
     let empty = image::GrayImage::from_pixel(320, 240, image::Luma([128]));
     for index in 46..=FRAMES {
         empty
@@ -29,30 +27,34 @@ fn clip(folder: &Path) -> PathBuf {
     }
     let video = folder.join("clip.mp4");
     let mut ffmpeg = Command::new("ffmpeg");
-    ffmpeg.args([
-        "-v",
-        "error",
-        "-framerate",
-        "30",
-        "-start_number",
-        "1",
-        "-i",
-    ]);
+    ffmpeg.args(["-v", "error", "-framerate", "30", "-i"]);
     ffmpeg.arg(frames.join("img/%04d.jpg"));
     ffmpeg.args(["-pix_fmt", "yuv420p", "-bf", "2"]);
     assert!(ffmpeg.arg(&video).status().unwrap().success());
     video
 }
 
+/// The settings of the service that say the same as these flags of the command.
+fn settings(flags: &str) -> Vec<(&str, &str)> {
+    let flags = flags.split("--").skip(1).map(str::trim);
+    let settings = flags.map(|flag| match flag.split_once(' ') {
+        Some(("frames", count)) => ("count", count),
+        Some(setting) => setting,
+        None if flag == "until-lost" => ("until_lost", "true"),
+        None => (flag, "true"),
+    });
+    settings.collect()
+}
+
 /// The rows that the command writes.
-fn rows(video: &Path, boxes: &[&str], flags: &[&str]) -> Vec<Value> {
+fn rows(video: &Path, boxes: &[&str], flags: &str) -> Vec<Value> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagtrack"));
     command.arg("track").arg(video);
     command.args(["--format", "json", "--seed", "7"]);
     for given in boxes {
         command.args(["--box", given]);
     }
-    let output = command.args(flags).output().unwrap();
+    let output = command.args(flags.split(' ')).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines()
@@ -86,53 +88,17 @@ async fn a_box_goes_through_a_video_as_with_the_command() {
     let folder = tempfile::tempdir().unwrap();
     let video = clip(folder.path());
     let app = TestApplication::start().await;
-    for (query, flags, least) in [
-        (&[("start", "30")][..], &["--start", "30"][..], 30),
-        (
-            &[("start", "30"), ("count", "5")],
-            &["--start", "30", "--frames", "5"],
-            6,
-        ),
-        (
-            &[("start", "30"), ("backwards", "true")],
-            &["--start", "30", "--backwards"],
-            31,
-        ),
-        (
-            &[("start", "30"), ("backwards", "true"), ("count", "4")],
-            &["--start", "30", "--backwards", "--frames", "4"],
-            5,
-        ),
-        (
-            &[("start", "30"), ("until_lost", "true")],
-            &["--start", "30", "--until-lost"],
-            16,
-        ),
-        (
-            &[("start", "30"), ("keyframes", "true")],
-            &["--start", "30", "--keyframes"],
-            4,
-        ),
-        (
-            &[
-                ("start", "30"),
-                ("backwards", "true"),
-                ("keyframes", "true"),
-            ],
-            &["--start", "30", "--backwards", "--keyframes"],
-            3,
-        ),
-        (
-            &[
-                ("start", "30"),
-                ("until_lost", "true"),
-                ("keyframes", "true"),
-            ],
-            &["--start", "30", "--until-lost", "--keyframes"],
-            3,
-        ),
+    for (flags, least) in [
+        ("--start 30", 30),
+        ("--start 30 --frames 5", 6),
+        ("--start 30 --backwards", 31),
+        ("--start 30 --backwards --frames 4", 5),
+        ("--start 30 --until-lost", 16),
+        ("--start 30 --keyframes", 4),
+        ("--start 30 --backwards --keyframes", 3),
+        ("--start 30 --until-lost --keyframes", 3),
     ] {
-        let query = [&[("box", BOXES[0]), ("seed", "7")], query].concat();
+        let query = [&[("box", BOXES[0]), ("seed", "7")], &settings(flags)[..]].concat();
         let answers = lines(track(&app, &video, &query).await).await;
         let rows = rows(&video, &BOXES[..1], flags);
         let numbers = |values: &[Value]| values.iter().map(frame_of).collect::<Vec<u64>>();
@@ -159,8 +125,7 @@ async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
         ("keyframes", "true"),
     ];
     let answers = lines(track(&app, &video, &query).await).await;
-    let flags = ["--start", "30", "--frames", "10", "--keyframes"];
-    let rows = rows(&video, &BOXES, &flags);
+    let rows = rows(&video, &BOXES, "--start 30 --frames 10 --keyframes");
     let frames: Vec<u64> = answers.iter().map(frame_of).collect();
     let expected: BTreeSet<u64> = rows.iter().map(frame_of).collect();
     assert_eq!(frames, Vec::from_iter(expected));
@@ -171,12 +136,6 @@ async fn the_lines_of_several_targets_are_the_key_frames_of_each() {
         check_same(&answer.unwrap()["targets"][target], row);
     }
 }
-
-/// A part of the clip: settings of the service, and flags of the command that say the same.
-type Part = (
-    &'static [(&'static str, &'static str)],
-    &'static [&'static str],
-);
 
 /// The file that the command writes of the first box and others.
 fn file(video: &Path, format: &str, flags: &[&str]) -> String {
@@ -200,17 +159,6 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
     let app = TestApplication::start().await;
     let both = BOXES.join(";");
     let named = ["--box", BOXES[1], "--name", "a <van>", "--name", "ground"];
-    let parts: [Part; 3] = [
-        (&[("start", "30")], &["--start", "30"]),
-        (
-            &[("start", "30"), ("count", "9")],
-            &["--start", "30", "--frames", "9"],
-        ),
-        (
-            &[("start", "30"), ("backwards", "true")],
-            &["--start", "30", "--backwards"],
-        ),
-    ];
     for (format, media_type) in [
         ("text", "text/plain; charset=utf-8"),
         ("json", "application/x-ndjson"),
@@ -220,7 +168,11 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
         ("cvat", "application/xml"),
         ("label-studio", "application/json"),
     ] {
-        for (query, flags) in parts {
+        for flags in [
+            "--start 30",
+            "--start 30 --frames 9",
+            "--start 30 --backwards",
+        ] {
             let given = [
                 ("boxes", both.as_str()),
                 ("names", "a <van>, ground"),
@@ -228,10 +180,12 @@ async fn a_video_is_answered_by_the_file_that_the_command_writes() {
                 ("seed", "7"),
                 ("format", format),
             ];
-            let answer = track(&app, &video, &[&given, query].concat()).await;
+            let query = [&given[..], &settings(flags)].concat();
+            let answer = track(&app, &video, &query).await;
             assert_eq!(answer.status(), 200, "{format}: {answer:?}");
             assert_eq!(answer.headers()["content-type"], media_type);
-            let expected = file(&video, format, &[flags, &named].concat());
+            let flags: Vec<&str> = flags.split(' ').chain(named).collect();
+            let expected = file(&video, format, &flags);
             assert!(expected.len() > 500, "{format}: {expected}");
             assert!(
                 answer.text().await.unwrap() == expected,
@@ -325,14 +279,11 @@ async fn a_file_that_cannot_be_written_is_refused_before_the_video_is_tracked() 
         (&[one, ("names", "van")], "give its `format`"),
     ] {
         let refused = track(&app, &video, query).await;
-        let problem = expect_problem(refused, "malformed-request").await;
-        let detail = problem["detail"].as_str().unwrap();
-        assert!(detail.contains(word), "{query:?}: {detail}");
+        expect_detail(refused, "malformed-request", &[word]).await;
     }
     let jpeg = folder.path().join("clip/img/0001.jpg");
     let refused = track(&app, &jpeg, &[one, ("format", "csv")]).await;
-    let problem = expect_problem(refused, "malformed-request").await;
-    assert!(problem["detail"].as_str().unwrap().contains("for a video"));
+    expect_detail(refused, "malformed-request", &["for a video"]).await;
 }
 
 #[tokio::test]
@@ -372,11 +323,7 @@ async fn a_frame_that_is_not_there_and_frames_in_place_of_a_video_are_refused() 
         (("start", "-1"), "-1"),
     ] {
         let refused = track(&app, &video, &[("box", BOXES[0]), query]).await;
-        let problem = expect_problem(refused, "malformed-request").await;
-        assert!(
-            problem["detail"].as_str().unwrap().contains(word),
-            "{problem}"
-        );
+        expect_detail(refused, "malformed-request", &[word]).await;
     }
     let jpeg = folder.path().join("clip/img/0001.jpg");
     for query in [
@@ -385,10 +332,6 @@ async fn a_frame_that_is_not_there_and_frames_in_place_of_a_video_are_refused() 
         ("keyframes", "true"),
     ] {
         let refused = track(&app, &jpeg, &[("box", BOXES[0]), query]).await;
-        let problem = expect_problem(refused, "malformed-request").await;
-        assert!(
-            problem["detail"].as_str().unwrap().contains("for a video"),
-            "{problem}"
-        );
+        expect_detail(refused, "malformed-request", &["for a video"]).await;
     }
 }
