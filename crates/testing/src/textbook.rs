@@ -202,8 +202,15 @@ pub fn shipped(
     shipped
 }
 
-/// The greatest differences between both: of distances, of likelihoods, of weights.
-pub fn differences(shipped: &Shipped, textbook: &Answer) -> [f64; 3] {
+/// The greatest differences between the shipped evaluation and the textbook's: of distances, of likelihoods, of weights.
+pub fn differences(
+    candidates: &[Vec<f32>],
+    history: &[&[f32]],
+    bag: &[AffineSubspace],
+    params: &Params,
+) -> [f64; 3] {
+    let textbook = evaluate(candidates, history, bag, params);
+    let shipped = shipped(candidates, history, bag, params);
     let mut greatest = [0.0_f64; 3];
     let mut note = |which: usize, a: f64, b: f64| {
         assert!(a.is_finite() && b.is_finite(), "{a} against {b}");

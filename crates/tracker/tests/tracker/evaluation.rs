@@ -1,5 +1,6 @@
 //! The shipped evaluation against the textbook version: every distance, every likelihood, to 1e-4.
 
+use bagtrack_testing::textbook;
 use bagtrack_tracker::{AffineSubspace, Params, Preset};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -114,9 +115,7 @@ proptest! {
             })
             .collect();
         let candidates = source.vectors(params.particles as usize);
-        let textbook = bagtrack_testing::textbook::evaluate(&candidates, &history, &bag, &params);
-        let shipped = bagtrack_testing::textbook::shipped(&candidates, &history, &bag, &params);
-        let [distance, likelihood, weight] = bagtrack_testing::textbook::differences(&shipped, &textbook);
+        let [distance, likelihood, weight] = textbook::differences(&candidates, &history, &bag, &params);
         prop_assert!(distance < TOLERANCE, "distances differ by {distance}");
         prop_assert!(likelihood < TOLERANCE, "likelihoods differ by {likelihood}");
         prop_assert!(weight < TOLERANCE, "weights differ by {weight}");
@@ -132,10 +131,10 @@ proptest! {
         let mut source = Source::new(seed, 80, likeness);
         let patches = source.vectors(count);
         let shipped = AffineSubspace::of(&as_slices(&patches), basis_dim);
-        let textbook = bagtrack_testing::textbook::Subspace::of(&as_slices(&patches), basis_dim);
-        let stored = bagtrack_testing::textbook::Subspace::stored(&shipped);
-        prop_assert_eq!(shipped.dim(), textbook.basis.ncols());
-        let distance = bagtrack_testing::textbook::distance(&stored, &textbook, 0.5);
+        let printed = textbook::Subspace::of(&as_slices(&patches), basis_dim);
+        let stored = textbook::Subspace::stored(&shipped);
+        prop_assert_eq!(shipped.dim(), printed.basis.ncols());
+        let distance = textbook::distance(&stored, &printed, 0.5);
         prop_assert!(distance < 1e-6, "{}", distance);
     }
 }
@@ -159,9 +158,7 @@ fn the_paper_setting_agrees_closely() {
             .map(|_| AffineSubspace::of(&as_slices(&source.vectors(6)), 3))
             .collect();
         let candidates = source.vectors(100);
-        let textbook = bagtrack_testing::textbook::evaluate(&candidates, &history, &bag, &params);
-        let shipped = bagtrack_testing::textbook::shipped(&candidates, &history, &bag, &params);
-        let greatest = bagtrack_testing::textbook::differences(&shipped, &textbook);
+        let greatest = textbook::differences(&candidates, &history, &bag, &params);
         println!("{likeness:?}: distances, likelihoods, weights differ by {greatest:?}");
         assert!(greatest.iter().all(|&difference| difference < 1e-5));
     }
@@ -199,9 +196,7 @@ fn candidates_nearly_in_the_span_of_the_history_agree() {
                     .collect()
             })
             .collect();
-        let textbook = bagtrack_testing::textbook::evaluate(&candidates, &history, &bag, &params);
-        let shipped = bagtrack_testing::textbook::shipped(&candidates, &history, &bag, &params);
-        let greatest = bagtrack_testing::textbook::differences(&shipped, &textbook);
+        let greatest = textbook::differences(&candidates, &history, &bag, &params);
         println!("{rest}: distances, likelihoods, weights differ by {greatest:?}");
         assert!(greatest.iter().all(|&difference| difference < 1e-5));
     }
