@@ -7,8 +7,6 @@ use reqwest::multipart::{Form, Part};
 use std::time::Instant;
 use tokio::task::JoinSet;
 
-pub const SETTINGS: &[&str] = &[];
-
 /// The query that opens such a session.
 pub const QUERY: &str = "&preset=paper&parameters=%7B%22particles%22%3A260%2C%22patch_width%22%3A64%2C\
     %22patch_height%22%3A64%2C%22bag_size%22%3A32%2C%22update_every%22%3A1%2C%22history%22%3A10%2C%22basis_dim%22%3A6%7D";

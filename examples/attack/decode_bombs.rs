@@ -9,8 +9,6 @@ use std::io::Cursor;
 use std::time::Instant;
 use tokio::task::JoinSet;
 
-pub const SETTINGS: &[&str] = &[];
-
 /// A lossless WebP of equal pixels.
 pub fn bomb() -> Outcome<Vec<u8>> {
     let picture = RgbImage::from_pixel(8192, 4094, image::Rgb([77; 3]));

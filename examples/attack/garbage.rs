@@ -7,8 +7,6 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Instant;
 
-pub const SETTINGS: &[&str] = &[];
-
 pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     let frames = frames()?;
     let good = GoodClients::start(target, 4).await?;

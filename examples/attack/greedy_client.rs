@@ -6,8 +6,6 @@ use crate::{Options, Outcome, Verdict};
 use std::time::Instant;
 use tokio::task::JoinSet;
 
-pub const SETTINGS: &[&str] = &[];
-
 pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     let frames = frames()?;
     let mut urls = Vec::new();

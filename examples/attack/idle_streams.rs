@@ -11,8 +11,6 @@ use tokio_tungstenite::client_async;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 
-pub const SETTINGS: &[&str] = &[];
-
 const ADDRESSES: usize = 12;
 const STREAMS: usize = 60;
 

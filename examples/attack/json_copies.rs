@@ -5,8 +5,6 @@ use crate::{Options, Outcome, Verdict};
 use reqwest::StatusCode;
 use tokio::task::JoinSet;
 
-pub const SETTINGS: &[&str] = &[];
-
 pub async fn attack(target: &Target, options: &Options) -> Outcome<Verdict> {
     // Line breaks make a copy necessary.
     let line = "A".repeat(76) + "\\n";

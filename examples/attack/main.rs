@@ -100,7 +100,11 @@ async fn main() -> ExitCode {
             };
             if wanted {
                 let begun = Instant::now();
-                let verdict = match Target::start(&options, $name::SETTINGS).await {
+                let settings = match name {
+                    "random_clients" => random_clients::SETTINGS,
+                    _ => &[],
+                };
+                let verdict = match Target::start(&options, settings).await {
                     Ok(target) => $name::attack(&target, &options).await,
                     Err(error) => Err(error),
                 };
