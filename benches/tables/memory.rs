@@ -1,15 +1,13 @@
 //! Resident memory of live trackers.
 
+use bagtrack_testing::memory;
 use bagtrack_tracker::{Preset, Tracker};
 
 use crate::{scene, warm};
 
 /// Resident bytes of this process.
 fn resident() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
-    kib.unwrap_or(0) * 1024
+    memory::of_process(std::process::id(), "VmRSS:").unwrap_or(0)
 }
 
 /// Prints the resident memory of up to `count` trackers with full bags, all of one preset. Memory

@@ -1,5 +1,6 @@
 //! Frames of a session: which are taken, which are refused, and what is answered.
 
+use crate::common::png;
 use crate::world::{
     FIRST, PIXELS, SECOND, SIZE, at_first, open, parts, picture, pictures, place, post,
     post_numbered, request, service, small_picture,
@@ -361,17 +362,11 @@ async fn each_answer_of_each_target_is_counted() {
     let opened = service.open(request(&service, None, 0, start)).await;
     let session = opened.unwrap().session;
     // The targets are seen, then nothing is, and then they are there again.
-    let nothing = || {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        let scene = image::GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-            image::Luma([(x * 131 + y * 17) as u8 ^ (x * y) as u8])
-        });
-        let scene = image::DynamicImage::ImageLuma8(scene);
-        scene.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
-        bytes::Bytes::from(bytes.into_inner())
-    };
+    let nothing = image::GrayImage::from_fn(SIZE.0, SIZE.1, |x, y| {
+        image::Luma([(x * 131 + y * 17) as u8 ^ (x * y) as u8])
+    });
     let mut files = pictures(1..4);
-    files.extend((0..20).map(|_| nothing()));
+    files.extend(vec![bytes::Bytes::from(png(nothing)); 20]);
     files.extend(pictures(4..10));
     let mut statuses: Vec<Vec<Status>> = vec![vec![Status::Tracking; 2]];
     // Requests of one frame, and of several.
