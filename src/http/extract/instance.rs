@@ -49,13 +49,18 @@ impl Instance {
 
     /// The document of a problem with the request, which is counted, and written to the log with its cause.
     pub fn report(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
-        state.metrics.problem(problem.kind());
         let (kind, cause) = (problem.kind().slug(), problem.cause());
         let cause = cause.as_deref().unwrap_or("none");
         match problem.kind() {
             Kind::Internal => tracing::error!(kind, cause, "problem"),
             _ => tracing::info!(kind, cause, "problem"),
         }
+        self.count(state, problem)
+    }
+
+    /// The document of a problem, which is counted.
+    pub fn count(&self, state: &AppState, problem: &Problem) -> ProblemDocument {
+        state.metrics.problem(problem.kind());
         let (path, id) = (self.path.clone(), self.request_id.clone());
         problem.document(state.config.base_path.as_str(), path, id)
     }

@@ -48,7 +48,7 @@ pub async fn count_request(
 }
 
 /// Clients may send any word as the method.
-fn method_label(method: &Method) -> &'static str {
+pub(super) fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",
         Method::HEAD => "HEAD",

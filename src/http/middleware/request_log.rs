@@ -1,11 +1,12 @@
 //! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
-//! the method, and the path: never bytes or boxes, no more of the
-//! path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
+//! the method, and the path: never bytes or boxes, no method
+//! that no call has, no more of the path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
 //! only where `debug` is asked for.
 
 use super::client_identity::note_address;
+use super::count_requests::method_label;
 use super::trace_context::{TRACEPARENT, TraceContext};
 use crate::http::extract::instance::Instance;
 use crate::http::state::AppState;
@@ -46,7 +47,7 @@ pub async fn log_request(
     response.headers_mut().insert(TRACEPARENT, context.header());
     let (status, ms) = (
         response.status().as_u16(),
-        started.elapsed().as_secs_f64() * 1e3,
+        (started.elapsed().as_secs_f64() * 1e6).round() / 1e3,
     );
     #[cfg(feature = "otel")]
     super::exported_span::answered(&span, status);
@@ -59,7 +60,7 @@ pub async fn log_request(
 
 fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
     let id = Instance::of(request).request_id;
-    let (method, path) = (request.method(), logged(request.uri().path()));
+    let (method, path) = (method_label(request.method()), logged(request.uri().path()));
     match is_probe {
         true => {
             tracing::span!(Level::DEBUG, "request", id, trace = Empty, %client, key = Empty, %method, path)
@@ -72,7 +73,7 @@ fn span(request: &Request, is_probe: bool, client: IpAddr) -> Span {
 
 /// The path as it is logged.
 fn logged(path: &str) -> String {
-    let path = path.get(..MAX_LOGGED_PATH).unwrap_or(path);
+    let path = &path[..path.floor_char_boundary(MAX_LOGGED_PATH)];
     let mut before = "";
     let shown = path.split('/').map(|segment| {
         let follows = std::mem::replace(&mut before, segment) == "sessions";
@@ -112,5 +113,8 @@ mod tests {
         }
         assert_eq!(logged("/sessions/short/frames"), "/sessions/short/frames");
         assert_eq!(logged("/healthz"), "/healthz");
+        // Byte 200 is in the middle of a character.
+        let long = format!("/{}", "é".repeat(30_000));
+        assert_eq!(logged(&long).len(), 199);
     }
 }

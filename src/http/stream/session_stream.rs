@@ -226,7 +226,12 @@ impl SessionStream {
             Err(problem) if ends_stream(problem.kind()) => return Ok(Some(End::Problem(problem))),
             Err(problem) => {
                 counts.refused += 1;
-                self.send_problem(socket, &problem).await?;
+                // A client sends thousands a second. The end of the stream tells how many there were.
+                let document = match counts.refused {
+                    1 => self.instance.report(&self.work.state, &problem),
+                    _ => self.instance.count(&self.work.state, &problem),
+                };
+                self.send(socket, &document).await?;
             }
         }
         Ok(None)

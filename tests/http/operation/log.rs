@@ -4,7 +4,7 @@ use crate::application::BOX;
 use crate::pictures;
 use crate::program::Program;
 use image::ImageFormat;
-use reqwest::Client;
+use reqwest::{Client, Method};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -38,6 +38,10 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
         for path in ["/healthz", "/readyz", "/metrics"] {
             client.get(service.url(path)).send().await.unwrap();
         }
+        // Lines of 60 kB filled disks, 56 MB a second.
+        let odd = Method::from_bytes(&[b'A'; 6000]).unwrap();
+        let odd = client.request(odd, service.url("/sessions"));
+        assert_eq!(odd.send().await.unwrap().status(), 405);
         let deleted = client.delete(service.url(&format!("/sessions/{id}")));
         deleted.send().await.unwrap();
         service.signal(Signal::TERM);
@@ -49,6 +53,7 @@ async fn a_line_has_the_ids_once_no_full_session_id_and_probes_have_none() {
             "{text}"
         );
         assert!(text.contains(&id[..8]), "{text}");
+        assert!(log.iter().all(|line| line.len() < 1000), "{text}");
         for probe in ["/healthz", "/readyz", "/metrics"] {
             assert!(!text.contains(probe), "{text}");
         }
