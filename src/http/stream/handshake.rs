@@ -138,18 +138,17 @@ fn max_message_bytes(state: &AppState, session: &Session) -> usize {
     usual.min(state.config.max_frame_bytes)
 }
 
-/// Takes the session's place for a stream, and finds where the session stands. The stream before this one tracks no further
-/// frame, nor does one at another replica. Waits for the frame at work, of that stream too.
+/// Finds where the session stands, and takes its place for a stream. The stream before this one tracks no further frame,
+/// nor does one at another replica. Waits for the frame at work, of that stream too. A stream that cannot begin leaves
+/// the one before it alone.
 async fn begin(
     state: &AppState,
     session: &Arc<Session>,
     flow: Flow,
     from: Option<u64>,
 ) -> Result<(Arc<StreamPlace>, Stand), Problem> {
-    let place = Arc::new(state.service.streams.take(session.id()));
     let fenced = state.service.fence(session.read_permit()?, flow);
     let mut locked = fenced.await?;
-    place.begin(session);
     let next = locked.state().latest_frame() + 1;
     let from = from.unwrap_or(next);
     let stored = locked.state().answers_from(from);
@@ -157,6 +156,8 @@ async fn begin(
         got: from,
         expected: next,
     })?;
+    let place = Arc::new(state.service.streams.take(session.id()));
+    place.begin(session);
     let stand = Stand {
         next,
         stored,

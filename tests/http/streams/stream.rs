@@ -148,7 +148,7 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
     assert_eq!(answers, expected);
     assert_eq!(app.frames_of(&id).await, 13);
 
-    // What is asked for must be known.
+    // What is asked for must be known. The stream that is there goes on.
     for (query, next) in [("?from=14", 13), ("?from=99", 13)] {
         let refused = StreamClient::try_open(app.address, &id, query, &[]).await;
         let response = refused.err().expect("a refusal");
@@ -156,6 +156,8 @@ async fn after_a_broken_line_nothing_is_lost_and_nothing_tracked_twice() {
         let problem: Value = serde_json::from_slice(response.body().as_ref().unwrap()).unwrap();
         assert_eq!(problem["expected_frame"], next);
     }
+    stream.send(pictures::png(13)).await;
+    assert_eq!(stream.message().await["frame"], 13);
 }
 
 #[tokio::test]
