@@ -14,7 +14,9 @@ use bagtrack::http::{Application, BasePath, Config, MemoryBound};
 use bagtrack_config::OFF;
 use bagtrack_ingest::video::Launcher;
 use std::error::Error;
+use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// Flags of `serve`.
@@ -117,7 +119,7 @@ fn check_ffmpeg(program: &str) {
 /// Has ffmpeg started by this program, which gives up its rights before.
 fn confine_decoders(config: &mut Config) {
     let hides_files = confined::works();
-    match std::env::current_exe() {
+    match own_program() {
         Ok(program) => {
             let words = vec![program.into(), confined::NAME.into()];
             config.limits.ffmpeg_launcher = Launcher { words, hides_files };
@@ -128,6 +130,15 @@ fn confine_decoders(config: &mut Config) {
         tracing::warn!(
             "Landlock or seccomp is not to be had here: ffmpeg has more rights than it needs"
         );
+    }
+}
+
+/// This program, also where another one has taken its place on the disk meanwhile, as after an upgrade.
+fn own_program() -> io::Result<PathBuf> {
+    let running = PathBuf::from("/proc/self/exe");
+    match running.exists() {
+        true => Ok(running),
+        false => std::env::current_exe(),
     }
 }
 

@@ -143,7 +143,18 @@ fn no_decoder() -> Problem {
 impl From<VideoError> for Problem {
     fn from(error: VideoError) -> Self {
         match error {
-            VideoError::NoProgram { .. } => no_decoder().caused_by(Arc::new(error)),
+            VideoError::NoProgram { ref source, .. } => {
+                use std::io::ErrorKind::{NotFound, PermissionDenied};
+                let problem = match source.kind() {
+                    NotFound | PermissionDenied => no_decoder(),
+                    // Such as too many processes or open files.
+                    _ => {
+                        let detail = "The service cannot start ffmpeg at the moment.";
+                        Self::new(Kind::QueueFull, detail)
+                    }
+                };
+                problem.caused_by(Arc::new(error))
+            }
             VideoError::NoPictures => {
                 let detail = "The file has no pictures, but sound or other data.";
                 Self::new(Kind::FrameDamaged, detail)

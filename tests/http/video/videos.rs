@@ -3,7 +3,7 @@
 use crate::application::{BOX, TestApplication, expect, expect_problem};
 use crate::helpers::heavy;
 use crate::pictures;
-use crate::program::Program;
+use crate::program::{Program, serve};
 use crate::requests::lines::lines;
 use bagtrack_sessions::KEPT_ANSWERS;
 use bagtrack_testing::within::within;
@@ -333,6 +333,12 @@ async fn why_a_video_is_not_read_is_told_with_its_cure() {
             "frame-too-large",
             "scale=",
         ),
+        // 1,047,552 pixels. It was too large, since ffmpeg rounds its width up.
+        (
+            made("wide.mp4", "testsrc2=size=1364x768 -frames:v 2"),
+            "frame-size-mismatch",
+            "1364",
+        ),
         (
             whole[..whole.len() / 2].to_vec(),
             "frame-damaged",
@@ -587,6 +593,21 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
     let (_, said) = run(&["bash", "-c", "exec 3<>/dev/tcp/127.0.0.1/9"]);
     assert!(said.contains("Operation not permitted"), "{said}");
     assert_eq!(run(&["/nowhere/ffmpeg"]).0, Some(127));
+}
+
+/// After an upgrade another file has its name. A video was refused, or what had the name was started.
+#[tokio::test]
+#[ignore = "needs ffmpeg"]
+async fn a_program_whose_file_was_removed_decodes_videos() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("bagtrack");
+    std::fs::copy(bagtrack_testing::command::program("bagtrack"), &own).unwrap();
+    let (service, client) = (Program::spawn(&mut serve(&own)).unwrap(), Client::new());
+    std::fs::remove_file(&own).unwrap();
+    let url = service.url(&format!("/track?box={BOX}"));
+    let answer = client.post(url).body(video("mp4")).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    assert_eq!(lines(answer).await.len(), FRAMES as usize);
 }
 
 #[tokio::test]

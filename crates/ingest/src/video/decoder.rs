@@ -20,6 +20,9 @@ const FORMATS: &str = "mov,matroska,gif,mjpeg";
 const CODECS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,h263,mjpeg,gif";
 /// The file without a name that is the program's input, which it can go back in.
 const NAMELESS: &str = "file:/proc/self/fd/0";
+/// The program counts the pixels of a picture with a width that is rounded up to 64. So many more are let through here, as
+/// for a height of 8192; whoever decodes the picture compares its own size with the limit.
+const PADDING: u64 = 63 * 8192;
 /// More pictures than any video has.
 const MAX_PICTURES: usize = 1 << 30;
 /// The system's signals for a process that has had its processor time: SIGKILL, SIGXCPU.
@@ -351,7 +354,7 @@ impl Source {
 
 /// The program's arguments for this input.
 fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec<String> {
-    let pixels = limits.max_pixels.to_string();
+    let pixels = limits.max_pixels.saturating_add(PADDING).to_string();
     let count = (limits.max_pictures.min(MAX_PICTURES) + 1).to_string();
     let before = ["-hide_banner", "-nostdin", "-v", "error", "-threads", "1"];
     let detection = match strictness {
