@@ -545,6 +545,87 @@ fn a_drawn_video_has_pixels_of_the_shape_of_the_source() {
     }
 }
 
+/// Those of HD videos were taken for the ones of a JPEG file: 7 of 255 off on average.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_video_has_the_same_colors_whatever_matrix_they_are_stored_with() {
+    let parent = folder();
+    let drawn = ["bt601", "bt709"].map(|matrix| {
+        let stored = match matrix {
+            "bt601" => "smpte170m",
+            other => other,
+        };
+        let (video, drawn) = (format!("{matrix}.mp4"), parent.path().join(matrix));
+        let coded =
+            format!("-vf scale=out_color_matrix={matrix},format=yuv420p -colorspace {stored}");
+        let coded = format!("{coded} -frames:v 3 -c:v libx264 -crf 10 {video}");
+        ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded}"));
+        let video = parent.path().join(video);
+        let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
+        succeeds(&[&["track", text(&video)], &flags[..]].concat());
+        let picture = image::open(drawn.join("000000.jpg"));
+        picture.expect("it was drawn").into_rgb8()
+    });
+    let values = drawn[0].iter().zip(drawn[1].iter());
+    let differences = values.map(|(a, b)| f64::from(a.abs_diff(*b)));
+    let mean = differences.sum::<f64>() / drawn[0].len() as f64;
+    assert!(mean < 4.5, "{mean}");
+}
+
+/// It is made from pictures before, of which ffmpeg gave none: the file had "no pictures in it".
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_trimmed_video_is_followed_from_its_last_frame_on() {
+    let parent = folder();
+    let coded = "-c:v libx264 -x264-params open-gop=1:b-pyramid=normal:keyint=20 -frames:v 90";
+    ffmpeg_in(parent.path(), &format!("{TEST_PICTURES} {coded} whole.mp4"));
+    ffmpeg_in(
+        parent.path(),
+        "-ss 0.9 -t 1.1 -i whole.mp4 -c copy trimmed.mp4",
+    );
+    let video = parent.path().join("trimmed.mp4");
+    let (all, end) = times_and_end(&video, "0");
+    assert!(all.len() > 25 && end.is_empty(), "{all:?} {end}");
+    for start in all.len() - 4..all.len() {
+        let (later, end) = times_and_end(&video, &start.to_string());
+        assert_eq!(
+            (later.as_slice(), end.as_str()),
+            (&all[start..], ""),
+            "{start}"
+        );
+    }
+}
+
+/// Players show a picture for a tenth of a second where it has less than two hundredths.
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_gif_of_a_fast_video_lasts_as_long_as_the_video() {
+    let parent = folder();
+    let source = TEST_PICTURES.replace("rate=30", "rate=60");
+    ffmpeg_in(parent.path(), &format!("{source} -frames:v 30 fast.mp4"));
+    let (video, drawn) = (
+        parent.path().join("fast.mp4"),
+        parent.path().join("fast.gif"),
+    );
+    let flags = ["--box=50,40,30,30", "--draw", text(&drawn)];
+    succeeds(&[&["track", text(&video)], &flags[..]].concat());
+    let times = shown_at(&drawn);
+    assert_eq!(times.len(), 15, "{times:?}");
+    assert!((times[14] - 28.0 / 60.0).abs() < 0.02, "{times:?}");
+}
+
+#[test]
+fn images_that_are_not_read_are_told() {
+    let parent = folder();
+    let (dir, target) = small_clip(parent.path(), "clip", ["160", "120"]);
+    let frame = dir.join("img/0003.jpg");
+    fs::rename(&frame, dir.join("img/0003.TIF")).expect("it is there");
+    let output = bagtrack(&["track", text(&dir), &target]);
+    let told = String::from_utf8(output.stderr).expect("text");
+    assert!(told.contains("0003.TIF is passed over"), "{told}");
+    assert!(output.status.success());
+}
+
 /// A browser's recording of a screen is like this: frames come when something changes.
 #[test]
 #[ignore = "needs ffmpeg"]

@@ -21,6 +21,29 @@ fn folder(dir: &Path) -> PathBuf {
 /// # Errors
 /// The folder cannot be read, or holds no frames.
 pub fn list(dir: &Path) -> Result<Vec<PathBuf>, SequenceError> {
+    let frames = files(dir, &["jpg", "jpeg", "png", "webp"])?;
+    if frames.is_empty() {
+        return Err(SequenceError::new(
+            dir,
+            "there are no JPEG, PNG or WebP frames in it, nor in img/ under it",
+        ));
+    }
+    Ok(frames)
+}
+
+/// Images of other kinds beside the frames of [`list`], which are not read.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn unread(dir: &Path) -> Result<Vec<PathBuf>, SequenceError> {
+    let endings = [
+        "tif", "tiff", "bmp", "heic", "heif", "avif", "gif", "dng", "jp2", "jxl", "ppm", "pgm",
+    ];
+    files(dir, &endings)
+}
+
+/// The files with these endings, by name.
+fn files(dir: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, SequenceError> {
     let pictures = folder(dir);
     let unreadable = |error: std::io::Error| SequenceError::new(dir, error.to_string());
     let mut frames = Vec::new();
@@ -32,18 +55,11 @@ pub fn list(dir: &Path) -> Result<Vec<PathBuf>, SequenceError> {
         }
         let path = entry.path();
         let extension = path.extension().and_then(|extension| extension.to_str());
-        let is_frame = extension.is_some_and(|extension| {
-            ["jpg", "jpeg", "png", "webp"].contains(&extension.to_ascii_lowercase().as_str())
-        });
+        let is_frame = extension
+            .is_some_and(|extension| endings.contains(&extension.to_ascii_lowercase().as_str()));
         if is_frame && path.is_file() {
             frames.push(path);
         }
-    }
-    if frames.is_empty() {
-        return Err(SequenceError::new(
-            dir,
-            "there are no JPEG, PNG or WebP frames in it, nor in img/ under it",
-        ));
     }
     frames.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok(frames)

@@ -80,6 +80,12 @@ impl Frames {
             return Err(format!("{shown}: {text}").into());
         };
         let mut paths = frames::list(path)?;
+        if let Some(unread) = frames::unread(path)?.first() {
+            eprintln!(
+                "bagtrack: {} is passed over, as are other images that are no JPEG, PNG or WebP files",
+                unread.display()
+            );
+        }
         let count = paths.len();
         let index = usize::try_from(first).unwrap_or(usize::MAX);
         if index >= count {
@@ -105,7 +111,9 @@ impl Frames {
     fn of_video(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
         let shown = path.display().to_string();
         check_is_video(path)?;
-        let path = path.canonicalize()?;
+        let path = path
+            .canonicalize()
+            .map_err(|error| format!("{shown}: {error}"))?;
         let info = VideoInfo::read(&path);
         let first = match start {
             Start::Frame(index) => index,
@@ -268,7 +276,9 @@ fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
 /// Tells photos, archives and texts, of which ffmpeg would say that they are damaged videos.
 fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
     let mut start = Vec::new();
-    fs::File::open(path)?.take(4096).read_to_end(&mut start)?;
+    let file = fs::File::open(path);
+    let read = file.and_then(|file| file.take(4096).read_to_end(&mut start));
+    read.map_err(|error| format!("{}: {error}", path.display()))?;
     let told = match unread_type(&start) {
         Some(name @ ("HEIC" | "HEIF" | "AVIF")) => format!("is a photo ({name}), not a video"),
         Some(name @ ("gzip" | "ZIP")) => format!("is packed ({name}): unpack it first"),

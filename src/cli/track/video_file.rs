@@ -18,6 +18,9 @@ const PALETTE: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]pale
 /// Ticks of a frame's own time, a second: those of MPEG, of which usual frames take a whole number.
 const TICKS: u32 = 90_000;
 
+/// Players show a picture of a GIF for longer where it has less than two hundredths of a second: ticks.
+const LEAST_OF_GIF: u64 = TICKS as u64 / 50;
+
 /// When the pictures of a video are shown.
 #[derive(Debug, Clone, Copy)]
 pub enum Timing {
@@ -137,8 +140,12 @@ impl VideoFile {
             Timing::Own => (seconds * f64::from(TICKS)).round() as u64,
             Timing::Equal(_) => self.next,
         };
+        let is_gif = matches!(self.timing, Timing::Own) && ending(&self.path) == "gif";
+        if is_gif && ticks < self.next {
+            return Ok(());
+        }
         let ticks = ticks.max(self.next);
-        self.next = ticks + 1;
+        self.next = ticks + if is_gif { LEAST_OF_GIF } else { 1 };
         let length = u32::try_from(picture.len()).expect("a JPEG file of a frame is below 4 GiB");
         self.write(&length.to_le_bytes())?;
         self.write(&ticks.to_le_bytes())?;

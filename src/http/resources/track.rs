@@ -170,7 +170,8 @@ fn check_no_range(settings: &TrackSettings) -> Result<(), Problem> {
     let is_file = TrackFile::asked(settings)?.is_some();
     match is_given || is_file || switches.contains(&Switch(true)) {
         true => Err(Problem::malformed(
-            "`start`, `count`, `backwards`, `until_lost`, `keyframes` and `format` are for a video.",
+            "`start`, `count`, `backwards`, `until_lost`, `keyframes` and `format` are for a video, and the body is none \
+             that is read: an MP4, WebM or GIF, or Motion JPEG as `video/x-motion-jpeg`.",
         )),
         false => Ok(()),
     }

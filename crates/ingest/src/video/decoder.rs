@@ -228,6 +228,8 @@ impl VideoDecoder {
             (Source::File(_, Some(range)), Ok(Some(picture))) => {
                 picture.time >= range.end - range.start
             }
+            // Where the last picture is made from ones before, which may be all that is left.
+            (Source::File(_, Some(_)), Ok(None)) => true,
             (_, Ok(_)) => false,
             (_, Err(_)) => {
                 let is_strict = self.strictness == Strictness::All;
@@ -369,8 +371,8 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
         "-frames:v",
         &count,
     ];
-    // The encoder refuses two pictures in the time of one.
-    let increasing = "setpts='if(isnan(PREV_OUTPTS),PTS,max(PTS,PREV_OUTPTS+1))'";
+    // The encoder refuses two pictures in the time of one. The colours of a JPEG file are those of BT.601 in full range.
+    let filters = "setpts='if(isnan(PREV_OUTPTS),PTS,max(PTS,PREV_OUTPTS+1))',scale=out_color_matrix=bt601:out_range=full";
     let coded = [
         "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p", "-threads", "1",
     ];
@@ -380,7 +382,7 @@ fn arguments(input: &[&str], limits: VideoLimits, strictness: Strictness) -> Vec
         &["-max_pixels", &pixels],
         input,
         &chosen,
-        &["-vf", increasing],
+        &["-vf", filters],
         // By default the encoder counts frames of a constant rate.
         &output::TIME_BASE,
         &coded,
