@@ -8,7 +8,7 @@ const OTHERS: usize = 64;
 /// Raises the soft limit of open files as far as `config` needs and the hard limit allows. Where that is not enough,
 /// lowers the number of connections, and says so: without it, new connections would wait unanswered.
 pub fn fit(config: &mut Config) {
-    let needed = config.max_connections + OTHERS;
+    let needed = config.max_connections.saturating_add(OTHERS);
     let have = raise(needed);
     if have < needed {
         let connections = have.saturating_sub(OTHERS).max(1);

@@ -96,6 +96,8 @@ impl ApiKeys {
                 path: path.clone(),
                 source,
             })?;
+            // Some editors begin a text with a mark that is not seen.
+            let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
             let lines = text.lines().map(str::trim);
             let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
             let read = parse(lines, &path.display().to_string())?;

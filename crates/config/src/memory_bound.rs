@@ -48,20 +48,19 @@ impl MemoryBound {
     pub fn of(config: &Config) -> Self {
         let count = |n: usize| n as u64;
         let workers = count(config.worker_count());
-        let threads = workers + count(threads_of(config.worker_count()));
+        let threads = workers.saturating_add(count(threads_of(config.worker_count())));
         // A body is copied once on its way, from the connection's buffer or out of base64.
-        let worker = config
-            .max_frame_memory
-            .max(2 * count(config.max_body_bytes))
-            + WORKER;
+        let frame = config.max_frame_memory;
+        let frame = frame.max(count(config.max_body_bytes).saturating_mul(2));
+        let thread = WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES);
         Self {
             uploads: count(config.max_upload_bytes),
             // There are quick and slow workers. Of the work on several frames some more may wait between two of them, with
             // what its thread keeps. Each has a frame and a copy of its session's targets.
-            work: 2 * workers * (worker - WORKER)
-                + threads * (WORKER + WORKING_IMAGE + count(MAX_LIST_BYTES)),
+            work: (workers.saturating_mul(2).saturating_mul(frame))
+                .saturating_add(threads.saturating_mul(thread)),
             sessions: count(config.session_bytes()),
-            connections: count(config.max_connections) * connection(config),
+            connections: count(config.max_connections).saturating_mul(connection(config)),
             store: if config.store.is_in_folder() {
                 FILE_STORE
             } else {
@@ -71,8 +70,8 @@ impl MemoryBound {
                 OFF => 0,
                 // Each has its video as a file in memory.
                 _ => {
-                    count(config.video_places())
-                        * (MAX_DECODER_MEMORY + count(config.max_body_bytes))
+                    let video = MAX_DECODER_MEMORY.saturating_add(count(config.max_body_bytes));
+                    count(config.video_places()).saturating_mul(video)
                 }
             },
         }
@@ -80,13 +79,15 @@ impl MemoryBound {
 
     /// All parts together, with the program itself.
     pub fn total(&self) -> u64 {
-        PROGRAM
-            + self.uploads
-            + self.work
-            + self.sessions
-            + self.connections
-            + self.videos
-            + self.store
+        let beside = [
+            self.uploads,
+            self.work,
+            self.sessions,
+            self.connections,
+            self.videos,
+            self.store,
+        ];
+        beside.into_iter().fold(PROGRAM, u64::saturating_add)
     }
 }
 

@@ -40,7 +40,7 @@ settings! {
 
         # "Sessions"
         /// Most sessions alive.
-        max_sessions: usize = 1024, positive;
+        max_sessions: usize = 1024, permits;
         /// A session expires when no frame comes for this long.
         session_idle: Duration = Duration::from_secs(600), moment;
         /// A new session expires when its first frame does not come for this long.

@@ -206,10 +206,10 @@ pub(super) fn positive_share(value: &Option<usize>) -> Result<(), &'static str> 
     value.as_ref().map_or(Ok(()), positive)
 }
 
-/// As many as a semaphore has.
+/// As many as a semaphore has at most.
 pub(super) fn permits(value: &usize) -> Result<(), &'static str> {
     let most = tokio::sync::Semaphore::MAX_PERMITS;
-    in_range((1..=most).contains(value), "at least 1")
+    in_range((1..=most).contains(value), "from 1 to 2^61 - 1")
 }
 
 const YEAR: Duration = Duration::from_secs(365 * 24 * 3600);

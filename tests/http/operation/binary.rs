@@ -148,8 +148,18 @@ fn a_setting_out_of_its_range_is_named_in_one_line() {
     let line = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
         line,
-        "bagtrack: --queue (BAGTRACK_QUEUE) must be at least 1\n"
+        "bagtrack: --queue (BAGTRACK_QUEUE) must be from 1 to 2^61 - 1\n"
     );
+    // These were a panic and a backtrace.
+    for flag in ["--queue", "--max-sessions"] {
+        let mut command = bagtrack();
+        let output = command.args(["serve", flag, "18446744073709551615"]);
+        let output = output.output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{flag}");
+        let lines = String::from_utf8(output.stderr).unwrap();
+        let line = lines.lines().next_back().unwrap_or_default();
+        assert!(line.starts_with(&format!("bagtrack: {flag} (")), "{lines}");
+    }
 }
 
 #[test]

@@ -9,7 +9,12 @@ use crate::{
 };
 use bagtrack_tracker::Expert;
 use std::sync::Arc;
+use std::time::Duration;
 use uuid::Uuid;
+
+/// How long the store tells at most that a session was ended: much longer than any request takes. Later it tells that there
+/// is none. Nobody's quota counts these marks.
+const TOMBSTONE: Duration = Duration::from_secs(600);
 
 /// What the states of records are read with.
 struct StateReader {
@@ -179,7 +184,7 @@ impl SessionService {
     /// False where it had ended before: another one may have its id.
     async fn end_one(&self, session: &Arc<Session>) -> Result<bool, StoreUnavailable> {
         if let Some(store) = &self.store {
-            let ttl = self.registry.idle_lease();
+            let ttl = self.registry.idle_lease().min(TOMBSTONE);
             if !store.end(session.name(), ttl).await? {
                 self.registry.forget(session);
                 return Ok(false);
