@@ -157,8 +157,10 @@ export class Session {
     this.lastAcknowledged = this.frame;
   }
 
-  /** Ends the session. */
+  /** Ends the session, and its stream. */
   async end() {
+    // The service tells a stream only with its next frame, and without one its line would stay.
+    this.open?.close();
     this.kept = new Kept();
     this.isEnded = true;
     // What is still read would be missed after the end, and a page's console would say so.

@@ -129,14 +129,25 @@ test("live frames are answered or skipped, each once and in order", async () => 
 });
 
 test("the end of the session ends the stream", async () => {
-  const session = await open();
+  const client = new Client(service.url, { snapshotEvery: 0 });
+  const session = await client.open(clip.frames[0], clip.box, { seed: SEED });
   const stream = session.stream();
   await stream.track(clip.frames[1]);
-  await session.end();
+  // By somebody else: the next frame tells.
+  await (await client.attach(session.id)).end();
   const late = stream.track(clip.frames[2]);
   await assert.rejects(late, (error) => error instanceof Problem && error.slug === "session-not-found");
   const problem = await stream.ended;
   assert.ok(problem instanceof Problem && problem.slug === "session-not-found", String(problem));
+});
+
+test("a session that is ended ends its stream, without another frame", async () => {
+  const session = await open();
+  const stream = session.stream();
+  await stream.track(clip.frames[1]);
+  await session.end();
+  assert.equal(await stream.ended, undefined);
+  await assert.rejects(stream.track(clip.frames[2]), /has ended/);
 });
 
 test("a newer stream takes the place of an older one", async () => {

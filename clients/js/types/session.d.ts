@@ -113,7 +113,7 @@ export declare class Session {
     stream(options?: import("./stream.js").StreamOptions): FrameStream;
     /** @param {FrameStream | undefined} stream What sends this session's frames now. */
     hold(stream: FrameStream | undefined): void;
-    /** Ends the session. */
+    /** Ends the session, and its stream. */
     end(): Promise<void>;
     /**
      * @param {string} method
