@@ -295,7 +295,8 @@ export class FrameStream {
     // A page is not told why a stream cannot be opened; this call tells.
     const { transport } = this.session.client;
     const url = transport.at(`sessions/${this.session.id}`);
-    const seen = await transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames")).catch((error) => error);
+    const asked = transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames"));
+    const seen = await asked.catch((error) => error);
     if (this.isEnded) return;
     if (seen instanceof Error) {
       const isTemporary = seen instanceof Problem && seen.isTemporary;

@@ -82,6 +82,22 @@ function keyOf(key) {
   throw new TypeError("The key has characters that no header takes: it is one line of printable ASCII.");
 }
 
+/** No answer came. Node.js tells why; browsers do not.
+ * @param {any} error */
+function unreachable(error) {
+  const { message } = error?.cause ?? {};
+  const problem = new Problem(message ? { detail: `The service cannot be reached: ${message.trim()}.` } : {});
+  problem.cause = error;
+  return problem;
+}
+
+/** Whether it is the service's certificate, which another try would not mend.
+ * @param {Problem} problem */
+function isCertificateRefused({ cause }) {
+  const { code } = /** @type {any} */ (cause)?.cause ?? {};
+  return /CERT|^UNABLE_TO_(GET|VERIFY)/.test(code ?? "");
+}
+
 export class Transport {
   /**
    * @param {string | URL} url Where the service is.
@@ -126,7 +142,7 @@ export class Transport {
       try {
         return await this.attempt(method, this.at(path, request.query), request);
       } catch (error) {
-        if (!(error instanceof Problem) || !error.isTemporary) throw error;
+        if (!(error instanceof Problem) || !error.isTemporary || isCertificateRefused(error)) throw error;
         if (error.status === 0 && !hasBroken) {
           hasBroken = true;
           continue;
@@ -169,7 +185,7 @@ export class Transport {
       throw new Problem({ ...problem, status: response.status }, Number.isFinite(seconds) ? seconds : undefined);
     } catch (error) {
       signal?.throwIfAborted();
-      throw error instanceof Problem ? error : new Problem({});
+      throw error instanceof Problem ? error : unreachable(error);
     } finally {
       clearTimeout(timer);
       signal?.removeEventListener("abort", abort);

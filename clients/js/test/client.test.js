@@ -1,7 +1,11 @@
 // The client against the program: the boxes must be those of the library.
 
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
 import { createServer, request as forward } from "node:http";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { Client, Problem } from "../bagtrack.js";
 import { SEED, openLine, rounded, sampleClip, startService } from "./service.js";
@@ -12,6 +16,24 @@ const options = { seed: SEED };
 let service;
 before(async () => (service = await startService()));
 after(() => service.stop());
+
+test("why a service cannot be reached is told, and a certificate that nobody signed at once", async (context) => {
+  const [frame] = clip.frames;
+  const ended = await startService();
+  await ended.stop();
+  const away = new Client(ended.url, { patience: 200 }).open(frame, clip.box);
+  await assert.rejects(away, (error) => error instanceof Problem && /reached: .*ECONNREFUSED/.test(error.message));
+  const folder = mkdtempSync(join(tmpdir(), "bagtrack-tls-"));
+  const [certificate, key] = ["cert.pem", "key.pem"].map((name) => join(folder, name));
+  const flags = "req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=bagtrack -addext subjectAltName=IP:127.0.0.1";
+  if (spawnSync("openssl", [...flags.split(" "), "-keyout", key, "-out", certificate]).status !== 0)
+    return context.skip("there is no openssl");
+  const secure = await startService(["--tls-cert", certificate, "--tls-key", key]);
+  const refused = new Client(secure.url, { patience: 600_000 }).open(frame, clip.box);
+  await assert.rejects(refused, (error) => error instanceof Problem && /self-signed certificate/.test(error.message));
+  await secure.stop();
+  rmSync(folder, { recursive: true });
+});
 
 test("an address or a key that no request takes is told at once, and a key is not shown", async () => {
   for (const address of ["localhost:8080", "ftp://localhost/", "ws://localhost:8080"])

@@ -20,7 +20,7 @@ export async function startService(flags = [], environment = {}) {
     let text = "";
     child.stderr.on("data", (data) => {
       text += data;
-      const found = /http:\/\/127\.0\.0\.1:\d+/.exec(text);
+      const found = /https?:\/\/127\.0\.0\.1:\d+/.exec(text);
       if (found) resolve(found[0]);
     });
     child.on("exit", () => reject(new Error(text)));
