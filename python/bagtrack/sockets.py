@@ -7,9 +7,12 @@ import ssl
 from contextlib import ExitStack, suppress
 from typing import Any, Optional, Union
 
-import websockets.asyncio.client
-import websockets.sync.client
-from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+try:
+    import websockets.asyncio.client
+    import websockets.sync.client
+    from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+except ModuleNotFoundError as missing:
+    raise ImportError(f"track needs {missing.name}: pip install 'bagtrack[stream]'") from missing
 
 from bagtrack import transport
 from bagtrack.steps import ConnectionLost

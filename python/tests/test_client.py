@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import Callable
 
 import httpx
@@ -345,6 +346,20 @@ def test_a_client_that_is_used_otherwise_within_a_stream_says_so(start_server: S
         assert answers == [1]
         client.init(bodies[0], clip.box)
         assert [answer.box for answer in client.track(bodies[1:10])] == clip.answered()[1:10]
+
+
+def test_a_stream_without_its_package_names_it(
+    start_server: StartServer, clip: Clip, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = clip.files[0].read_bytes()
+    with bagtrack.Client(start_server().url) as client:
+        client.init(body, clip.box)
+        monkeypatch.setitem(sys.modules, "websockets", None)
+        for name in [name for name in sys.modules if name == "bagtrack.sockets" or name.startswith("websockets.")]:
+            monkeypatch.delitem(sys.modules, name)
+        with pytest.raises(ImportError, match=r"track needs websockets.*: pip install 'bagtrack\[stream\]'"):
+            next(client.track([body]))
+        assert client.frame == 0
 
 
 def test_frames_on_their_way_count_when_a_stream_is_left(start_server: StartServer, clip: Clip) -> None:
