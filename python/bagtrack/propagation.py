@@ -37,9 +37,9 @@ def propagate(
 ) -> Iterator[TargetAnswer]:
     """The answers for each frame and target, from `boxes` in frame `start` on.
 
-    `frames` is a video file, a folder of JPEG, PNG or WebP files in the order of their names (for both OpenCV must be
-    installed), a sequence of arrays, or anything that gives arrays one after the other. `boxes` is one box or several;
-    the trackers are those of `bagtrack track` with the same seed.
+    `frames` is a video file, an address from which OpenCV reads one, a folder of JPEG, PNG or WebP files in the order
+    of their names (for all of these OpenCV must be installed), a sequence of arrays, or anything that gives arrays one
+    after the other. `boxes` is one box or several; the trackers are those of `bagtrack track` with the same seed.
 
     At most `count` frames are tracked after the first one; `backwards` goes to frame 0, through a file, a folder or a
     sequence. With `until_lost` a target's last answer is the one in which it is lost, and the frames end with the last
@@ -93,8 +93,10 @@ def _thinned(answers: Iterator[TargetAnswer], targets: int, tolerance: float) ->
 def _ordered(frames: Frames, start: int, count: Optional[int], backwards: bool) -> Iterator[tuple[int, Frame]]:
     """Numbers and pixels in the order in which they are tracked. There is a first one."""
     if isinstance(frames, (str, PathLike)):
-        path = Path(fspath(frames))
-        numbered = _of_folder(path, start, backwards) if path.is_dir() else _of_video(path, start, backwards)
+        # A `Path` makes one slash of the two in an address, such as that of a camera.
+        video = fspath(frames)
+        path = Path(video)
+        numbered = _of_folder(path, start, backwards) if path.is_dir() else _of_video(video, start, backwards)
     elif isinstance(frames, (Sequence, np.ndarray)):
         listed = cast("Sequence[Frame]", frames)
         numbers = range(start, -1, -1) if backwards else range(start, len(listed))
@@ -123,7 +125,7 @@ def _of_folder(folder: Path, start: int, backwards: bool) -> Iterator[tuple[int,
         yield number, frame
 
 
-def _of_video(video: Path, start: int, backwards: bool) -> Iterator[tuple[int, Frame]]:
+def _of_video(video: str, start: int, backwards: bool) -> Iterator[tuple[int, Frame]]:
     if not backwards:
         yield from read_video(video, start, None)
         return
@@ -139,7 +141,7 @@ def _of_video(video: Path, start: int, backwards: bool) -> Iterator[tuple[int, F
         size, end = run[0][1].nbytes, begin
 
 
-def read_video(video: Path, begin: int, end: Optional[int]) -> Iterator[tuple[int, Frame]]:
+def read_video(video: Union[str, Path], begin: int, end: Optional[int]) -> Iterator[tuple[int, Frame]]:
     """The frames of a video from `begin` on, up to the one before `end`."""
     cv2 = _opencv()
     capture = cv2.VideoCapture(str(video))

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
 import subprocess
 import sys
+import threading
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +46,19 @@ def test_it_gives_the_boxes_of_the_command(clip: Clip) -> None:
     keys = command(clip, *flags, "--keyframes")
     assert len(keys) < len(expected) / 2
     assert rows(bagtrack.propagate(clip.frames(), boxes, count=40, seed=SEED, keyframes=True)) == keys
+
+
+def test_a_video_may_have_an_address(clip: Clip, tmp_path: Path) -> None:
+    video = as_video(clip.frames()[:20], tmp_path / "clip.avi")
+    handler = functools.partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}"
+        given = rows(bagtrack.propagate(f"{address}/clip.avi", clip.box, seed=SEED))
+        with pytest.raises(ValueError, match=f"^{address}/nothing.avi cannot be read as a video"):
+            next(bagtrack.propagate(f"{address}/nothing.avi", clip.box))
+        server.shutdown()
+    assert given == rows(bagtrack.propagate(video, clip.box, seed=SEED)) and len(given) == 20
 
 
 def test_it_goes_backwards_through_folders_sequences_and_videos(clip: Clip, tmp_path: Path) -> None:
