@@ -177,7 +177,6 @@ export class Editing {
     button("undo").disabled = this.undoing.steps.length === 0;
   }
 
-  /** Lets go of what was there. */
   reset() {
     this.cancel();
     this.undoing = new Undoing();

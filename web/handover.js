@@ -1,5 +1,6 @@
 // Handing over to the service what was tracked in the page, so that others can go on with it.
 
+import { catchUp } from "./again.js";
 import { scaled } from "./boxes.js";
 import { Problem } from "./js/problem.js";
 
@@ -20,7 +21,7 @@ import { Problem } from "./js/problem.js";
 export async function handOver(run, client) {
   const handed = [];
   for (const object of run.objects) {
-    const whole = await restored(object, client);
+    const whole = await restored(run, object, client);
     const session = whole ?? (await openedAnew(run, object, client));
     if (session) handed.push({ name: object.name, id: session.id, isWhole: whole !== undefined });
   }
@@ -28,11 +29,15 @@ export async function handOver(run, client) {
 }
 
 /** A session with the tracker's state; nothing where the service does not take it, or where there is none.
+ * @param {Run} run
  * @param {import("./objects.js").FollowedObject} object
  * @param {import("./js/bagtrack.js").Client} client */
-async function restored(object, client) {
-  const state = await Promise.resolve()
-    .then(() => object.follower.save())
+async function restored(run, object, client) {
+  const save = async () => object.follower.save();
+  // Loaded anew, the page has no session yet, but its state of some frames before.
+  const opened = async () => object.saves[0] && !run.source.isAbsent && run.alone(() => catchUp(run, object));
+  const state = await save()
+    .catch(() => opened().then(save))
     .catch(() => undefined);
   if (!state) return undefined;
   try {

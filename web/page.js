@@ -176,7 +176,6 @@ export class Page {
     }
   }
 
-  /** Lets go of what was there. */
   reset() {
     this.run?.stop();
     this.run = undefined;

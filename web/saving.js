@@ -36,7 +36,6 @@ export function prepareSaving() {
   modules().catch(() => undefined);
 }
 
-/** Lets the video be saved. */
 function restore() {
   button("save-video").disabled = false;
   button("save-video").textContent = typeof VideoEncoder === "undefined" ? "Video (Matroska)" : "Video (WebM)";

@@ -48,7 +48,6 @@ export class Seen {
     this.fit();
   }
 
-  /** Shows or hides what there is. */
   fit() {
     get("seen-now").hidden = !this.isOn || !this.hasShown;
     get("seen-later").hidden = !this.isOn || this.hasShown;
