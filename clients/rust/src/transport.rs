@@ -5,10 +5,12 @@ use crate::error::ClientError;
 use crate::network::Carrier;
 use bagtrack_api::ProblemDocument as Problem;
 use bagtrack_api::headers::{CHECKPOINT, DRAINING};
+use bagtrack_api::media_types::SNAPSHOT;
 use bytes::Bytes;
 use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, RETRY_AFTER};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode, Url};
+use serde::de::Error;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -68,6 +70,18 @@ impl Reply {
         match self.status.is_success() {
             true => Ok(self),
             false => Err(Box::new(self.problem())),
+        }
+    }
+
+    /// The snapshot.
+    ///
+    /// # Errors
+    /// It is something else, such as a page of a proxy.
+    pub fn snapshot(self) -> Result<Bytes, ClientError> {
+        let came = self.headers.get(CONTENT_TYPE);
+        match came.is_some_and(|came| came == SNAPSHOT) {
+            true => Ok(self.body),
+            false => Err(serde_json::Error::custom(format!("{came:?} is no snapshot")).into()),
         }
     }
 

@@ -66,17 +66,19 @@ impl Remote {
 
     /// Takes a snapshot; without it the older one and more frames are kept.
     async fn renew_origin(&mut self) -> bool {
-        match self.transport.attempt(&self.request_snapshot()).await {
-            Ok(reply) if reply.status.is_success() => {
-                self.kept.renew(Origin {
-                    frame: self.answered,
-                    query: Query::new(),
-                    media_type: SNAPSHOT,
-                    body: reply.body,
-                });
-                true
-            }
-            _ => false,
+        let snapshot = match self.transport.attempt(&self.request_snapshot()).await {
+            Ok(reply) if reply.status.is_success() => reply.snapshot().ok(),
+            _ => None,
+        };
+        let is_taken = snapshot.is_some();
+        if let Some(body) = snapshot {
+            self.kept.renew(Origin {
+                frame: self.answered,
+                query: Query::new(),
+                media_type: SNAPSHOT,
+                body,
+            });
         }
+        is_taken
     }
 }

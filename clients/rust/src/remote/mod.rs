@@ -126,6 +126,8 @@ impl Remote {
             let reply = self.transport.call(&upload.request(self.id, next)).await?;
             let problem = match reply.checked() {
                 Ok(reply) => {
+                    // What is no answer, such as a page of a proxy, acknowledges nothing.
+                    let answers: FrameAnswers = serde_json::from_slice(&reply.body)?;
                     let last = upload.last(next);
                     self.last_acknowledged = self.last_acknowledged.max(last);
                     self.resent += (next..=last.min(self.answered)).count() as u64;
@@ -133,7 +135,6 @@ impl Remote {
                         continue;
                     }
                     self.standing = reply.standing();
-                    let answers: FrameAnswers = serde_json::from_slice(&reply.body)?;
                     return Ok(answers.into_all());
                 }
                 Err(problem) => problem,
@@ -198,7 +199,7 @@ impl Remote {
             }
             let reply = self.transport.call(&self.request_snapshot()).await?;
             let problem = match reply.checked() {
-                Ok(reply) => return Ok(reply.body),
+                Ok(reply) => return reply.snapshot(),
                 Err(problem) if is_gone(&problem) => problem,
                 Err(problem) => return Err(problem.into()),
             };

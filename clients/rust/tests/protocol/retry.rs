@@ -54,6 +54,21 @@ async fn what_fails_for_a_moment_is_sent_again_with_its_number() {
     }
 }
 
+/// A proxy's login page counted as the answer to a frame that was sent again, and was kept as a snapshot.
+#[tokio::test]
+async fn a_page_of_a_proxy_is_no_answer() {
+    let page = || Reply::new(200, "<html>Log in</html>").with("Content-Type: text/html");
+    let replies = [created(0), page(), answer(1), answer(2), page()];
+    let script = Script::start(replies).await;
+    let mut session = open(client(&script)).await;
+    let failed = session.track("second").await;
+    assert!(matches!(failed, Err(ClientError::Answer(_))), "{failed:?}");
+    // The frame is kept.
+    assert_eq!(session.track("third").await.unwrap().frame, 2);
+    let failed = session.snapshot().await;
+    assert!(matches!(failed, Err(ClientError::Answer(_))), "{failed:?}");
+}
+
 #[tokio::test]
 async fn the_service_says_how_long_to_wait() {
     let busy = Reply::new(429, "").with("Retry-After: 1");

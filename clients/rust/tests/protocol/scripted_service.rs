@@ -190,7 +190,11 @@ impl Script {
             }
             content = answer.to_string();
         }
-        whole(told.status, &told.headers, &content)
+        let mut headers = told.headers.clone();
+        if told.snapshot.is_some() {
+            headers.insert("Content-Type".to_owned(), SNAPSHOT.to_owned());
+        }
+        whole(told.status, &headers, &content)
     }
 }
 
