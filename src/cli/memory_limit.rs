@@ -10,14 +10,18 @@ const GROUPS: &str = "/sys/fs/cgroup";
 /// all sessions would be lost.
 pub fn check(bound: u64) {
     for (name, limit) in [
-        ("address space (ulimit -v)", address_space()),
-        ("the control group", control_group()),
+        (
+            "the limit of the address space (ulimit -v)",
+            address_space(),
+        ),
+        ("the limit of the control group", control_group()),
+        ("the machine's memory", machine()),
     ] {
         if let Some(limit) = limit.filter(|limit| *limit < bound) {
             tracing::warn!(
                 limit = limit >> 20,
                 bound = bound >> 20,
-                "the limit of {name} is below what the service may take, in MiB: it may be ended, with all sessions; \
+                "{name} is below what the service may take, in MiB: it may be ended, with all sessions; \
                  lower --max-upload-bytes, --max-sessions, --max-frame-memory or --workers"
             );
         }
@@ -33,6 +37,16 @@ fn address_space() -> Option<u64> {
 #[cfg(not(unix))]
 fn address_space() -> Option<u64> {
     None
+}
+
+/// Bytes of memory of the machine.
+fn machine() -> Option<u64> {
+    let memory = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = memory
+        .lines()
+        .find_map(|line| line.strip_prefix("MemTotal:"));
+    let kib = line?.trim().strip_suffix(" kB")?.parse::<u64>().ok()?;
+    Some(kib << 10)
 }
 
 /// The least limit of the process's control groups and of those above them.

@@ -201,4 +201,6 @@ fn a_limit_of_memory_below_the_bound_is_told_at_the_start() {
     let mut command = program::serve_after("ulimit -v 1500000");
     let mut service = Program::spawn(&mut command).unwrap();
     service.logs("address space (ulimit -v) is below what the service may take");
+    let mut service = Program::start(&["--max-sessions", "1000000000"], &[]);
+    service.logs("the machine's memory is below what the service may take");
 }
