@@ -33,6 +33,15 @@ def is_off(table):
     return all(abs(one - other) <= 1 for one, other in zip(numbers(table[-1])[:2], OFF))
 
 
+def paused_clip(page, truth, count=40):
+    """The rows of the sample clip, which is paused after so many frames."""
+    choose(page, "card")
+    drag(page, truth[0])
+    frames(page, count)
+    page.locator("#pause").click()
+    return kept_rows(page)
+
+
 def tracked_clip(checks, where="here"):
     page = checks.page(where=where)
     choose(page, "card")
@@ -106,11 +115,7 @@ def undone_while_it_is_followed(checks):
     for where in ("here", "there"):
         page = checks.page(where=where)
         truth = checks.clips["card"]["truth"]
-        choose(page, "card")
-        drag(page, truth[0])
-        frames(page, 40)
-        page.locator("#pause").click()
-        before = kept_rows(page)
+        before = paused_clip(page, truth)
         drag(page, OFF)
         said(page, "The box is corrected")
         rows_when(page, is_off)
@@ -131,11 +136,7 @@ def undone_after_more_frames(checks):
     for where, begun, stops in (("here", 40, False), ("there", 40, True), ("here", 10, True)):
         page = checks.page(where=where)
         truth = checks.clips["card"]["truth"]
-        choose(page, "card")
-        drag(page, truth[0])
-        frames(page, begun)
-        page.locator("#pause").click()
-        before = kept_rows(page)
+        before = paused_clip(page, truth, begun)
         drag(page, OFF)
         rows_when(page, is_off)
         page.locator("#pause").click()
@@ -159,11 +160,7 @@ def deletion_undone(checks):
     for where in ("here", "there"):
         page = checks.page(where=where)
         truth = checks.clips["card"]["truth"]
-        choose(page, "card")
-        drag(page, truth[0])
-        frames(page, 40)
-        page.locator("#pause").click()
-        before = kept_rows(page)
+        before = paused_clip(page, truth)
         page.locator("#add").click()
         drag(page, OFF)
         page.locator("#list li:nth-child(2)").wait_for()
@@ -188,11 +185,7 @@ def undone_without_the_service(checks):
     """What cannot be undone while the service is away stays as it is, and is undone when it is back."""
     service = Service(checks.program, **SECRET)
     page = checks.page(url=service.url, allowed=("WebSocket", "ERR_CONNECTION", "Failed to load"))
-    choose(page, "card")
-    drag(page, checks.clips["card"]["truth"][0])
-    frames(page, 40)
-    page.locator("#pause").click()
-    before = kept_rows(page)
+    before = paused_clip(page, checks.clips["card"]["truth"])
     drag(page, OFF)
     wrong = rows_when(page, is_off)
     service.process.kill()

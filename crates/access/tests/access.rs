@@ -188,7 +188,8 @@ fn keys_of_settings_and_file_are_read_and_read_again() {
     assert_eq!(owner(OTHER), Some(Owner::named("you")));
     assert_eq!((count("me"), count("you"), count("they")), (1, 1, 0));
 
-    let again = format!("they:{OTHER}\nme:0000000000000000\n");
+    // With the mark that some editors begin a text with.
+    let again = format!("\u{feff}they:{OTHER}\nme:0000000000000000\n");
     fs::write(&file, again).unwrap();
     assert_eq!(keys.reload().unwrap(), 3);
     assert_eq!(owner(OTHER), Some(Owner::named("they")));

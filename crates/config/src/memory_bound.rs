@@ -128,4 +128,16 @@ mod tests {
         #[cfg(feature = "tls")]
         assert!(with(&|c| c.tls.tls_cert = Some("cert.pem".into())) > before);
     }
+
+    /// It was a panic at the start.
+    #[test]
+    fn the_bound_of_the_largest_settings_is_a_number() {
+        let config = Config {
+            max_frame_memory: u64::MAX,
+            max_upload_bytes: usize::MAX,
+            max_body_bytes: usize::MAX,
+            ..Config::default()
+        };
+        assert_eq!(MemoryBound::of(&config).total(), u64::MAX);
+    }
 }

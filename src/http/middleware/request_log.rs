@@ -1,9 +1,8 @@
 //! One line in the log for each request, a span around what is logged on its behalf, and the trace that it belongs to.
 //!
 //! The span has the ids of the request and of its trace, the client's address, the name of its API key (never the key),
-//! the method, and the path: never bytes or boxes, no method
-//! that no call has, no more of the path than any route has, and of a session's id only its beginning. Probes come every few seconds, so they are logged
-//! only where `debug` is asked for.
+//! the method, where some call has it, and the path: never bytes or boxes, no more of the path than any route has, and of a
+//! session's id only its beginning. Probes come every few seconds, so they are logged only where `debug` is asked for.
 
 use super::client_identity::note_address;
 use super::count_requests::method_label;
