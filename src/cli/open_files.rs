@@ -2,8 +2,8 @@
 
 use bagtrack::http::Config;
 
-/// Files that are open beside connections: the log, the listener, the runtime's own.
-const OTHERS: usize = 64;
+/// Files that are open beside connections: the log, the listener, the runtime's own, connections for probes alone.
+const OTHERS: usize = 96;
 
 /// Raises the soft limit of open files as far as `config` needs and the hard limit allows. Where that is not enough,
 /// lowers the number of connections, and says so: without it, new connections would wait unanswered.

@@ -107,6 +107,19 @@ impl Connections {
             open.shed(|_| true).ok_or(NoRoom::All)?;
             self.shed.increment(1);
         }
+        Ok(self.admit(&mut open, client))
+    }
+
+    /// Takes a place for a connection from `address` where one is free, and closes none for it.
+    pub fn enter_free(self: &Arc<Self>, address: IpAddr) -> Option<ConnectionPermit> {
+        let client = customer_address(address);
+        let mut open = self.open();
+        let free = self.max.saturating_sub(open.connections.len());
+        let is_free = free > 0 && self.leaves_room(&open, client, free);
+        is_free.then(|| self.admit(&mut open, client))
+    }
+
+    fn admit(self: &Arc<Self>, open: &mut Open, client: IpAddr) -> ConnectionPermit {
         let number = open.next;
         open.next += 1;
         let activity = Activity::new(self.freed.clone());
@@ -114,11 +127,11 @@ impl Connections {
             *open.counts.entry(holder).or_default() += 1;
         }
         open.connections.insert(number, (client, activity.clone()));
-        Ok(ConnectionPermit {
+        ConnectionPermit {
             connections: self.clone(),
             number,
             activity,
-        })
+        }
     }
 
     /// Whether a client may have one more where so many are free.

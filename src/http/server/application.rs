@@ -38,6 +38,11 @@ use tokio::sync::watch;
 const MAX_UNSENT: u32 = 64 << 10;
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);
+/// Connections beside the others on which addresses that have no more of those are asked for their health, and refused the
+/// rest.
+const PROBE_CONNECTIONS: usize = 32;
+/// Most of these of one address.
+const PROBE_CONNECTIONS_OF_ADDRESS: usize = 8;
 
 /// How a service ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,8 +177,11 @@ impl Application {
         });
         {
             let routes = service.routes(extra);
-            let served = ConnectionService::new(state.clone(), security, routes);
-            let accepting = accept(&listener, &state, served, &ending, cut_off);
+            let services = [
+                ConnectionService::new(state.clone(), security.clone(), routes),
+                ConnectionService::for_probes(state.clone(), security),
+            ];
+            let accepting = accept(&listener, &state, services, &ending, cut_off);
             let mut accepting = pin!(accepting);
             tokio::select! {
                 () = &mut accepting => {}
@@ -225,23 +233,22 @@ fn security(tls: &TlsConfig, now: SystemTime) -> Result<Security, CertificateErr
     Ok(certificate.map_or(Security::Plain, Security::Tls))
 }
 
-/// Accepts connections for ever. They end when `cut_off` loses its sender.
+/// Accepts connections for ever. The first service has them, and the second one those over the share of their address.
+/// They end when `cut_off` loses its sender.
 async fn accept(
     listener: &TcpListener,
     state: &AppState,
-    service: ConnectionService,
+    services: [ConnectionService; 2],
     ending: &watch::Sender<bool>,
     cut_off: watch::Receiver<()>,
 ) {
     let (config, limits) = (&state.config, &state.config.limits);
     let of_address = limits.client_connections;
     let of_address = of_address.unwrap_or(config.max_connections.div_ceil(4));
-    let connections = Connections::new(
-        config.max_connections,
-        of_address,
-        state.metrics.shed_connections.clone(),
-    );
-    let service = Arc::new(service);
+    let shed = state.metrics.shed_connections.clone();
+    let connections = Connections::new(config.max_connections, of_address, shed.clone());
+    let probes = Connections::new(PROBE_CONNECTIONS, PROBE_CONNECTIONS_OF_ADDRESS, shed);
+    let [service, probe_service] = services.map(Arc::new);
     loop {
         let (stream, peer) = match listener.accept().await {
             Ok(accepted) => accepted,
@@ -261,12 +268,17 @@ async fn accept(
                 other => break other,
             }
         };
-        let Ok(permit) = permit else {
-            refuse(stream, peer, state, service.has_tls());
-            continue;
+        let (permit, service) = match permit {
+            Ok(permit) => (permit, service.clone()),
+            Err(_) => match probes.enter_free(peer.ip()) {
+                Some(permit) => (permit, probe_service.clone()),
+                None => {
+                    refuse(stream, peer, state, service.has_tls());
+                    continue;
+                }
+            },
         };
         let hold = ConnectionHold::new(permit, ending.subscribe(), cut_off.clone());
-        let service = service.clone();
         tokio::spawn(async move { service.serve(stream, peer, hold).await });
     }
 }

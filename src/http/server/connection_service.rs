@@ -2,6 +2,7 @@
 
 #[cfg(feature = "tls")]
 use crate::http::server::router::https_only;
+use crate::http::server::router::probes_only;
 use crate::http::state::AppState;
 use axum::body::Body;
 use axum::{Extension, Router};
@@ -22,6 +23,9 @@ use std::time::Duration;
 use tokio::net::TcpStream;
 use tokio::task::yield_now;
 
+/// How long a connection that is for probes alone may take to begin: others wait for its place.
+const PROBE_TIMEOUT: Duration = Duration::from_secs(1);
+
 /// How all connections of a service are served.
 #[derive(Debug)]
 pub struct ConnectionService {
@@ -38,7 +42,23 @@ pub struct ConnectionService {
 impl ConnectionService {
     /// Of a service with these routes.
     pub fn new(state: AppState, security: Security, routes: Router) -> Self {
-        let handshake_timeout = state.config.header_timeout;
+        let begins_within = state.config.header_timeout;
+        Self::beginning_within(begins_within, state, security, routes)
+    }
+
+    /// For connections over the share of their address.
+    pub fn for_probes(state: AppState, security: Security) -> Self {
+        let begins_within = state.config.header_timeout.min(PROBE_TIMEOUT);
+        let routes = probes_only(&state);
+        Self::beginning_within(begins_within, state, security, routes)
+    }
+
+    fn beginning_within(
+        handshake_timeout: Duration,
+        state: AppState,
+        security: Security,
+        routes: Router,
+    ) -> Self {
         let mut http = http1::Builder::new();
         http.timer(TokioTimer::new())
             .max_buf_size(MAX_BUFFER_BYTES)

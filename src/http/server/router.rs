@@ -24,7 +24,7 @@ use axum::Router;
 use axum::extract::DefaultBodyLimit;
 #[cfg(feature = "tls")]
 use axum::extract::Request;
-use axum::http::header::CACHE_CONTROL;
+use axum::http::header::{CACHE_CONTROL, CONNECTION};
 use axum::http::{HeaderMap, HeaderValue};
 #[cfg(feature = "tls")]
 use axum::http::{Method, header::HOST};
@@ -46,6 +46,15 @@ pub fn router(state: AppState, extra: Router) -> Router {
         .fallback(async |instance: Instance| Problem::no_route(&instance.path))
         .method_not_allowed_fallback(async || Problem::method_not_allowed());
     mount(&state.config.base_path, with_layers(routes, &state))
+}
+
+/// What is served to an address that has no connection left: probes, since a supervisor ends a service that does not answer
+/// them. Whoever asks for something else is told why, and loses the connection.
+pub fn probes_only(state: &AppState) -> Router {
+    let (probes, _) = routes::probes().split_for_parts();
+    let refuse = async || ([(CONNECTION, "close")], Problem::too_many_connections());
+    let routes = probes.with_state(state.clone()).fallback(refuse);
+    mount(&state.config.base_path, with_layers(routes, state))
 }
 
 /// What is served where TLS is expected, and is not spoken.

@@ -186,7 +186,7 @@ fn too_few_open_files_are_said_at_the_start_and_the_service_answers() {
         .map_while(|_| std::net::TcpStream::connect(service.address).ok())
         .collect();
     let healthy = health(&service.url(""));
-    assert_eq!(warned, Some((128.into(), 64.into())));
+    assert_eq!(warned, Some((128.into(), 32.into())));
     assert!(bound.starts_with("resident memory stays below "), "{bound}");
     assert_eq!(silent.len(), 300);
     assert!(healthy.status.success(), "{healthy:?}");

@@ -41,8 +41,8 @@ pub enum Cost {
     /// The address space of its process.
     #[error("{} MiB of memory", MAX_MEMORY >> 20)]
     Memory,
-    /// Processor time.
-    #[error("{MAX_CPU} s of processor time")]
+    /// Processor time, or memory: the system ends the process for either in the same way.
+    #[error("{MAX_CPU} s of processor time, or than the memory that the machine has left")]
     Time,
     /// Pixels of a picture.
     #[error("{0} pixels in a picture")]

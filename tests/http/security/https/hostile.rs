@@ -84,7 +84,7 @@ async fn handshakes_count_as_connections_and_make_room_for_others() {
 }
 
 #[tokio::test]
-async fn a_connection_over_its_share_is_closed_without_a_word() {
+async fn a_connection_over_its_share_is_for_probes_alone() {
     let (authority, files) = issued();
     let service = Service::start(Some(&files), |config| {
         config.limits.client_connections = Some(1);
@@ -97,8 +97,10 @@ async fn a_connection_over_its_share_is_closed_without_a_word() {
     let mut asked = [0; 25];
     busy.0.read_exact(&mut asked).await.unwrap();
     assert!(asked.starts_with(b"HTTP/1.1 100"));
-    let mut second = Client(TcpStream::connect(service.address).await.unwrap());
-    assert_eq!(second.ends().await, b"");
+    for (path, status) in [("/healthz", "200"), ("/metrics", "429")] {
+        let mut second = Client::open(&connector, service.address).await;
+        assert_eq!(second.call("GET", path, b"").await.status(), status);
+    }
     drop(busy);
     assert!(service.end().await);
 }
