@@ -63,39 +63,38 @@ pub fn https_only(state: &AppState) -> Router {
     with_layers(Router::new().fallback(to_https), state)
 }
 
-/// The layers that every request passes through.
+/// The layers that every request passes through. Each call of `layer` puts every route in a box, which each request copies.
 fn with_layers(routes: Router, state: &AppState) -> Router {
     let config = &state.config;
-    routes
-        // The last layer is the first to see a request.
-        .layer(DefaultBodyLimit::max(config.max_body_bytes))
-        .layer(middleware::from_fn_with_state(state.clone(), drain_refused))
-        .layer(RequestBodyDeadlineLayer::new(config.body_timeout))
-        .layer(cors(&config.cors_origins))
-        .layer(middleware::from_fn(one_host))
-        .layer(CatchPanicLayer::custom(panic_response))
-        .layer(middleware::from_fn_with_state(state.clone(), bound_rate))
-        .layer(middleware::from_fn_with_state(
-            state.clone(),
-            answer_problems,
-        ))
-        .layer(SetResponseHeaderLayer::if_not_present(
-            CACHE_CONTROL,
-            HeaderValue::from_static("no-store"),
-        ))
-        .layer(middleware::from_fn(secure))
-        .layer(middleware::from_fn_with_state(state.clone(), mark_draining))
-        .layer(middleware::from_fn_with_state(state.clone(), log_request))
-        .layer(middleware::from_fn_with_state(state.clone(), count_request))
-        .layer(PropagateRequestIdLayer::new(REQUEST_ID))
-        .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
-        .layer(middleware::map_request(remove_unusable_id))
+    let with_state = || state.clone();
+    // The first layer is the first to see a request.
+    let of_requests = (
+        middleware::map_request(remove_unusable_id),
+        SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
+        PropagateRequestIdLayer::new(REQUEST_ID),
+        middleware::from_fn_with_state(with_state(), count_request),
+        middleware::from_fn_with_state(with_state(), log_request),
+        middleware::from_fn_with_state(with_state(), mark_draining),
+        middleware::from_fn(secure),
+        SetResponseHeaderLayer::if_not_present(CACHE_CONTROL, HeaderValue::from_static("no-store")),
+        middleware::from_fn_with_state(with_state(), answer_problems),
+        middleware::from_fn_with_state(with_state(), bound_rate),
+        CatchPanicLayer::custom(panic_response),
+        middleware::from_fn(one_host),
+        cors(&config.cors_origins),
+        RequestBodyDeadlineLayer::new(config.body_timeout),
+    );
+    let of_bodies = (
+        middleware::from_fn_with_state(with_state(), drain_refused),
+        DefaultBodyLimit::max(config.max_body_bytes),
+    );
+    routes.layer(of_bodies).layer(of_requests)
 }
 
 /// The routes of the service, each behind the checks of who may use it. Probes come from the machine's own address and
 /// with no key.
 fn routes(state: &AppState) -> Router<AppState> {
-    let with_key = || middleware::from_fn_with_state(state.clone(), authenticate);
+    let with_key = middleware::from_fn_with_state(state.clone(), authenticate);
     let with_metrics_key = middleware::from_fn_with_state(state.clone(), authenticate_metrics);
     let of_client = middleware::from_fn_with_state(state.clone(), identify);
     let from_origin = middleware::from_fn_with_state(state.clone(), check_origin);
@@ -123,7 +122,7 @@ fn routes(state: &AppState) -> Router<AppState> {
         .route("/docs", get(docs::redirect))
         .route("/docs/", get(docs::index))
         .route("/docs/{*path}", get(docs::asset))
-        .merge(sessions.route_layer(of_client).route_layer(with_key()))
+        .merge(sessions.route_layer((with_key, of_client)))
         .route_layer(from_origin)
         .merge(metrics.route_layer(with_metrics_key))
         .merge(probes)
