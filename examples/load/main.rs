@@ -9,7 +9,8 @@
 //! - the processor time of the server process for a frame against that of decoding and tracking. The speed of a
 //!   shared machine varies, so a measurement has parts, and the two are measured in turns.
 //!
-//! With `--overload TIMES` more frames come than get done, and it prints what becomes of them.
+//! With `--overload TIMES` more frames come than get done, and it prints what becomes of them. The server has a lower
+//! priority then, as clients would have machines of their own.
 //!
 //! With `--churn SECONDS` sessions come and go, and it compares the server's memory at the end with that before. With
 //! `--memory` it opens the sessions, fills their bags, and prints what memory the server has come to.
@@ -120,6 +121,7 @@ fn main() -> Outcome<()> {
         return runtime.block_on(memory::print(&driver, &server, preset, options.sessions));
     }
     if !options.overload.is_empty() {
+        server.lower_priority()?;
         let length = Duration::from_secs(options.seconds);
         let load = (options.sessions, options.frames, length);
         return runtime.block_on(overload::run(&driver, load, &options.overload));

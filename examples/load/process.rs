@@ -1,11 +1,13 @@
 //! The server as a process of its own.
 
+use std::fs;
 use std::path::PathBuf;
 
 use crate::Outcome;
 use bagtrack_testing::command::program;
 use bagtrack_testing::service::program::{Program, serve};
 use bagtrack_testing::{cpu_time, memory};
+use rustix::process::{Pid, getpriority_process, setpriority_process};
 
 /// A server that ends with this value.
 pub struct Server(Program);
@@ -28,6 +30,16 @@ impl Server {
             .map_err(|error| format!("{}: {error} (cargo build --release)", binary.display()))?;
         program.ignore_log();
         Ok(Self(program))
+    }
+
+    /// Gives it a lower priority than that of this process, whose work would be that of other machines.
+    pub fn lower_priority(&self) -> Outcome<()> {
+        for task in fs::read_dir(format!("/proc/{}/task", self.0.process_id()))? {
+            let task = task?.file_name().to_string_lossy().parse()?;
+            let task = Pid::from_raw(task);
+            setpriority_process(task, getpriority_process(task)? + 8)?;
+        }
+        Ok(())
     }
 
     /// Where it listens.
