@@ -47,6 +47,9 @@ INSTALLATIONS = {
         "nodeSelector": {"kubernetes.io/arch": "arm64"},
         "tolerations": [{"key": "batch", "operator": "Exists"}],
         "podAnnotations": {"example.org/team": "video"},
+        "settings": {"SSL_CERT_FILE": "/roots/ca.crt"},
+        "extraVolumes": [{"name": "roots", "configMap": {"name": "roots"}}],
+        "extraVolumeMounts": [{"name": "roots", "mountPath": "/roots", "readOnly": True}],
     },
 }
 # What the service takes (crates/sessions/src/store/redis/address.rs), as far as pods can reach it.
@@ -102,7 +105,7 @@ def fits(objects: list[dict], own_secret: bool) -> None:
 
     # ffmpeg writes there.
     mounts = {it["mountPath"]: it["name"] for it in container["volumeMounts"]}
-    assert mounts["/tmp"] in {it["name"] for it in pod["spec"]["volumes"]}
+    assert "/tmp" in mounts and set(mounts.values()) == {it["name"] for it in pod["spec"]["volumes"]}
 
     variables = [it["name"] for it in container["env"]]
     assert len(variables) == len(set(variables)), variables

@@ -54,6 +54,7 @@ pub fn run(args: Args) -> Result<(), Box<dyn Error>> {
 async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     open_files::fit(&mut config);
     confine_decoders(&mut config);
+    signals::outlive_file_limit()?;
     let bound = MemoryBound::of(&config);
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let (base_path, ffmpeg) = (config.base_path.clone(), config.limits.ffmpeg.clone());
@@ -107,12 +108,17 @@ fn check_ffmpeg(program: &str) {
         return;
     }
     let mut version = Command::new(program);
-    let version = version
-        .arg("-version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
-    if let Err(error) = version.stdin(Stdio::null()).status() {
-        tracing::warn!(%error, "videos are refused, for want of {program} (--ffmpeg)");
+    let version = version.arg("-version").stdin(Stdio::null()).output();
+    match version {
+        Err(error) => {
+            tracing::warn!(%error, "videos are refused, for want of {program} (--ffmpeg)")
+        }
+        Ok(said) if !said.stdout.starts_with(b"ffmpeg ") => {
+            tracing::warn!(
+                "videos are refused: {program} (--ffmpeg) is no ffmpeg, by what it says of its version"
+            );
+        }
+        Ok(_) => {}
     }
 }
 

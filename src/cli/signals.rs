@@ -6,7 +6,7 @@ use bagtrack::http::CertificateError;
 use bagtrack::http::JwtError;
 use bagtrack::http::{ApiKeys, Application, Shutdown};
 use std::io;
-#[cfg(all(unix, any(feature = "jwt", feature = "tls")))]
+#[cfg(unix)]
 use std::sync::Arc;
 use tokio::sync::watch;
 
@@ -109,6 +109,22 @@ impl Hangups {
         use tokio::signal::unix::{SignalKind, signal};
         signal(SignalKind::hangup()).map(Self)
     }
+}
+
+/// Has a write above the limit of a file's size (`ulimit -f`) fail, in place of ending the process.
+///
+/// # Errors
+/// What the system says.
+#[cfg(unix)]
+pub fn outlive_file_limit() -> io::Result<()> {
+    let seen = Arc::default();
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, seen).map(drop)
+}
+
+/// There is no such limit here.
+#[cfg(not(unix))]
+pub fn outlive_file_limit() -> io::Result<()> {
+    Ok(())
 }
 
 /// Reads keys and certificate again on every SIGHUP.

@@ -269,6 +269,18 @@ fn the_start_is_exactly_the_frame_that_is_named_in_each_kind_of_file() {
             "golden.webm",
             ["-c:v", "libvpx-vp9", "-cpu-used", "8", "-g", "20"],
         ),
+        // Each third frame has the time of the one before, as in a recording that notes when frames came.
+        (
+            "burst.mkv",
+            [
+                "-c:v",
+                "mjpeg",
+                "-pix_fmt",
+                "yuvj420p",
+                "-bsf:v",
+                "setts=ts='if(eq(mod(N,3),1),N-1,N)/30/TB'",
+            ],
+        ),
         ("stream.ts", ["-c:v", "libx264", "-bf", "3", "-g", "20"]),
         ("old.avi", ["-c:v", "mpeg4", "-bf", "2", "-g", "20"]),
     ] {

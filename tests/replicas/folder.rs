@@ -6,7 +6,7 @@ use crate::replica::Replica;
 use crate::tracking_client::Track;
 use crate::tracks::{SECRET, Tracks, undisturbed};
 use bagtrack_testing::command::program;
-use bagtrack_testing::service::program::{Program, serve_after};
+use bagtrack_testing::service::program::{Program, serve};
 use reqwest::{Client, StatusCode};
 use rustix::fs::statvfs;
 use rustix::process::{Pid, Resource, Rlimit, prlimit};
@@ -108,8 +108,7 @@ struct Limited(Program);
 
 impl Limited {
     fn start(store: &str) -> Self {
-        // A signal that is ignored stays so, and the write returns an error.
-        let mut command = serve_after("trap '' XFSZ");
+        let mut command = serve(&program("bagtrack"));
         command.args(["--workers", "2", "--store", store]);
         Self(Program::spawn(command.args(SECRET)).expect("there is a shell"))
     }

@@ -82,7 +82,9 @@ pub enum ReplayError {
         expected: u64,
     },
     /// The number of the last frame, with other bytes (or another box).
-    #[error("frame {got} was answered for other bytes; the next frame is {expected}")]
+    #[error(
+        "frame {got} was answered for other bytes or another box; the next frame is {expected}"
+    )]
     Differs {
         /// The number sent.
         got: u64,

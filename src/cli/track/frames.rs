@@ -130,8 +130,8 @@ impl Frames {
         };
         let (pictures, next) = match direction {
             Direction::Forwards => {
-                let from = info.seek_to(first);
-                let next = from.as_ref().map_or(0, |_| first);
+                let (next, from) = info.seek_to(first).unzip();
+                let next = next.unwrap_or(0);
                 let decoder = VideoDecoder::of_file(FFMPEG, &path, from, limits)
                     .map_err(|error| format!("{error}; install ffmpeg"))?;
                 (Pictures::Forwards(Box::new(decoder)), next)

@@ -40,8 +40,8 @@ impl Reversed {
     /// Decodes the run before `end`: in a file without an index, from the file's beginning.
     fn decode_run(&mut self, info: &VideoInfo) -> Result<(), Box<dyn Error>> {
         let begin = self.end.saturating_sub(RUN);
-        let from = info.seek_to(begin);
-        let passed_over = from.as_ref().map_or(begin, |_| 0);
+        let (first, from) = info.seek_to(begin).unzip();
+        let passed_over = begin - first.unwrap_or(0);
         let decoder = VideoDecoder::of_file(FFMPEG, &self.path, from, self.limits)
             .map_err(|error| format!("{error}; install ffmpeg"))?;
         self.run = pictures(decoder, passed_over, self.end - begin)?;

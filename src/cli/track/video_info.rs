@@ -11,6 +11,8 @@ pub const FFMPEG: &str = "ffmpeg";
 const FFPROBE: &str = "ffprobe";
 /// The first names of formats whose files have an index.
 const INDEXED: [&str; 2] = ["mov", "matroska"];
+/// Frames whose times are not further apart, in seconds, are shown at once, as in a recording that notes when they came.
+const AT_ONCE: f64 = 1e-4;
 /// Encoders of MPEG-4 take no larger parts of a fraction.
 const MAX_PART: u32 = 65535;
 
@@ -132,16 +134,22 @@ impl VideoInfo {
         (info, told_times)
     }
 
-    /// Within which seconds after its start time the file is to be decoded so that frame `index` is the first: between
-    /// the frames beside it, and nearer to itself, since ffmpeg rounds to what the file counts in. None where it has to be
-    /// decoded from its beginning.
-    pub fn seek_to(&self, index: u64) -> Option<Range<f64>> {
-        let index = usize::try_from(index).ok()?;
-        let own = self.times.get(index)?;
-        let before = self.times.get(index.checked_sub(1)?)?;
-        let after = self.times.get(index + 1).unwrap_or(&f64::INFINITY);
+    /// From which frame on the file is to be decoded for frame `index`, and within which seconds after its start time that
+    /// one is found: between the frames beside it, and nearer to itself, since ffmpeg rounds to what the file counts in.
+    /// It is the first of those that are shown at once with `index`: ffmpeg tells frames apart by their times. None where
+    /// the file has to be decoded from its beginning.
+    pub fn seek_to(&self, index: u64) -> Option<(u64, Range<f64>)> {
+        let of_index = self.times.get(usize::try_from(index).ok()?)?;
+        let first = self
+            .times
+            .partition_point(|time| *time < of_index - AT_ONCE);
+        let before = self.times.get(first.checked_sub(1)?)?;
+        let own = self.times[first];
+        let after = self.times.partition_point(|time| *time < own + AT_ONCE);
+        let after = self.times.get(after).unwrap_or(&f64::INFINITY);
         let start = self.indexed_from?;
-        Some((before + 3.0 * own) / 4.0 - start..(own + after) / 2.0 - start)
+        let range = (before + 3.0 * own) / 4.0 - start..(own + after) / 2.0 - start;
+        Some((first as u64, range))
     }
 
     /// How many frames there are, where that is known.
@@ -212,25 +220,22 @@ mod tests {
 
     #[test]
     fn a_frame_of_an_indexed_file_is_found_by_a_time_between_it_and_the_one_before() {
-        let packets = "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\nstream,h264,10/1\n";
+        let packets =
+            "packet,1.0,K__\npacket,1.1,___\npacket,1.4,___\npacket,1.4,___\nstream,h264,10/1\n";
         let seek_to = |format: &str| {
             let (info, _) = VideoInfo::parse(&format!("{packets}{format}\n"));
             let round = |time: f64| (time * 1e6).round() / 1e6;
-            [0, 1, 2, 3].map(|index| {
-                let range = info.seek_to(index);
-                range.map(|range| (round(range.start), round(range.end)))
+            [0, 1, 2, 3, 4].map(|index| {
+                let found = info.seek_to(index);
+                found.map(|(first, range)| (first, round(range.start), round(range.end)))
             })
         };
-        let expected = [
-            None,
-            Some((0.075, 0.25)),
-            Some((0.325, f64::INFINITY)),
-            None,
-        ];
+        let at_once = Some((2, 0.325, f64::INFINITY));
+        let expected = [None, Some((1, 0.075, 0.25)), at_once, at_once, None];
         assert_eq!(seek_to("format,\"mov,mp4,m4a\",1.000000"), expected);
         assert_eq!(seek_to("format,\"matroska,webm\",1.000000"), expected);
-        assert_eq!(seek_to("format,avi,1.000000"), [None; 4]);
-        assert_eq!(seek_to("format,\"matroska,webm\",N/A"), [None; 4]);
+        assert_eq!(seek_to("format,avi,1.000000"), [None; 5]);
+        assert_eq!(seek_to("format,\"matroska,webm\",N/A"), [None; 5]);
     }
 
     #[test]

@@ -22,7 +22,7 @@ impl From<ReplayError> for Problem {
             }
             ReplayError::Differs { got, expected } => {
                 let detail = format!(
-                    "Frame {got} was answered for other bytes; a new frame has the number {expected}."
+                    "Frame {got} was answered for other bytes or another box; a new frame has the number {expected}."
                 );
                 Self::new(Kind::FrameDiffers, detail).expecting_frame(expected)
             }

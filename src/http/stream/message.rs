@@ -14,6 +14,16 @@ pub fn correction(header: &FrameHeader) -> Option<GivenBox> {
     Some(GivenBox { target, to })
 }
 
+/// What `later` says of a frame, and what `earlier` said beside it.
+pub fn merged(earlier: FrameHeader, later: FrameHeader) -> FrameHeader {
+    FrameHeader {
+        frame: later.frame.or(earlier.frame),
+        rect: later.rect.or(earlier.rect),
+        target: later.target.or(earlier.target),
+        see: later.see || earlier.see,
+    }
+}
+
 /// Reads a text message.
 ///
 /// # Errors

@@ -185,7 +185,9 @@ impl SessionStream {
             Some(Ok(Message::Close(_))) => return Some(End::Closed),
             Some(Ok(Message::Text(text))) => {
                 drop(socket.get_mut().take_charge());
-                *header = message::parse(&text);
+                let earlier = std::mem::replace(header, Ok(FrameHeader::default()));
+                let merged = |earlier| Ok(message::merged(earlier, message::parse(&text)?));
+                *header = earlier.and_then(merged);
             }
             Some(Ok(Message::Binary(file))) => {
                 let header = std::mem::replace(header, Ok(FrameHeader::default()));

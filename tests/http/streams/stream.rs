@@ -44,6 +44,7 @@ async fn a_box_before_a_frame_corrects_the_target() {
     let id = app.open().await;
     let mut stream = StreamClient::open(app.address, &id, "").await;
     stream.say(r#"{"box": [22, 16, 16, 12]}"#).await;
+    stream.say(r#"{"frame": 1}"#).await;
     stream.send(pictures::png(1)).await;
     stream.send(pictures::png(2)).await;
     let corrected = stream.message().await;
@@ -53,6 +54,11 @@ async fn a_box_before_a_frame_corrects_the_target() {
         (Some(1), Some(1.0))
     );
     assert_eq!(stream.message().await["frame"], 2);
+    // What cannot be read is told, whatever comes after it.
+    stream.say(r#"{"box": 1}"#).await;
+    stream.say(r#"{"see": true}"#).await;
+    stream.send(pictures::png(3)).await;
+    assert_eq!(problem_slug(&stream.message().await), "malformed-request");
 }
 
 #[tokio::test]
