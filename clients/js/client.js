@@ -1,6 +1,6 @@
 // A service: it opens sessions.
 
-import { boxText, frameOf } from "./given.js";
+import { boxText, bytesOf, frameOf } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
 import { Session } from "./session.js";
 import { Transport, documentOf } from "./transport.js";
@@ -57,7 +57,7 @@ export class Client {
     // The same boxes come again only with the same seed.
     const drawn = seed ?? crypto.getRandomValues(new Uint32Array(1))[0];
     const query = { box: boxText(box), preset, seed: drawn, parameters: json };
-    return this.create({ query, body: frameOf(frame), type: "application/octet-stream", signal });
+    return this.create({ query, body: await bytesOf(frameOf(frame)), type: "application/octet-stream", signal });
   }
 
   /**
@@ -68,7 +68,7 @@ export class Client {
    * @returns {Promise<Session>}
    */
   async restore(snapshot, signal, patience) {
-    return this.create({ ...restoring(frameOf(snapshot)), signal, patience });
+    return this.create({ ...restoring(await bytesOf(frameOf(snapshot))), signal, patience });
   }
 
   /**

@@ -25,6 +25,20 @@ export function frameOf(frame) {
   throw unsupported("A frame is a Blob, an ArrayBuffer or a Uint8Array with a JPEG, PNG or WebP file.");
 }
 
+/** The bytes of a frame. A file is read, since it may be changed or removed before it is sent, or sent again.
+ * @param {Blob | Uint8Array<ArrayBuffer>} frame
+ * @returns {Promise<Uint8Array<ArrayBuffer>>} */
+export async function bytesOf(frame) {
+  if (ArrayBuffer.isView(frame)) return frame;
+  try {
+    return new Uint8Array(await frame.arrayBuffer());
+  } catch (error) {
+    const problem = unsupported("The frame cannot be read: its file was changed or removed since it was chosen.");
+    problem.cause = error;
+    throw problem;
+  }
+}
+
 /** @param {number} window Frames on their way at a time. */
 export function checkWindow(window) {
   if (Number.isInteger(window) && window >= 1 && window <= 32) return window;

@@ -7,7 +7,7 @@
  *
  * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
- * @property {Blob | Uint8Array<ArrayBuffer>} frame
+ * @property {Uint8Array<ArrayBuffer>} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
  */
 
@@ -16,7 +16,7 @@ export const MOST_KEPT = 256;
 export const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 
 /** The request that goes on where a snapshot was taken.
- * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot
+ * @param {Uint8Array<ArrayBuffer>} snapshot
  * @returns {import("./transport.js").Request} */
 export function restoring(snapshot) {
   return { body: snapshot, type: SNAPSHOT };

@@ -1,7 +1,7 @@
 // A session: frames go in, boxes come back.
 
 import { Backoff } from "./backoff.js";
-import { boxOf, boxText, frameOf } from "./given.js";
+import { boxOf, boxText, bytesOf, frameOf } from "./given.js";
 import { Kept, restoring } from "./kept.js";
 import { Problem } from "./problem.js";
 import { FrameStream } from "./stream.js";
@@ -33,7 +33,7 @@ import { documentOf, pause, snapshotOf } from "./transport.js";
  * @typedef {object} Sent A request with the next frames.
  * @property {(Blob | Uint8Array<ArrayBuffer>)[]} frames
  * @property {Box} [box] Where the user corrects it.
- * @property {(number: number) => Promise<Response>} make
+ * @property {(number: number, frames: Uint8Array<ArrayBuffer>[]) => Promise<Response>} make
  * @property {AbortSignal} [signal]
  */
 
@@ -84,9 +84,9 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   async track(frame, signal) {
-    const own = frameOf(frame);
-    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, own, signal);
-    return this.next({ frames: [own], make, signal });
+    /** @type {Sent["make"]} */
+    const make = (number, [own]) => this.post("POST", "frames", { frame: number }, own, signal);
+    return this.next({ frames: [frameOf(frame)], make, signal });
   }
 
   /**
@@ -98,9 +98,12 @@ export class Session {
   async trackAll(frames, signal) {
     const own = [...frames].map(frameOf);
     if (own.length === 0) return [];
-    const body = new FormData();
-    for (const frame of own) body.append("frame", frame instanceof Blob ? frame : new Blob([frame]), "frame");
-    const make = (/** @type {number} */ number) => this.post("POST", "frames", { frame: number }, body, signal);
+    /** @type {Sent["make"]} */
+    const make = (number, parts) => {
+      const body = new FormData();
+      for (const part of parts) body.append("frame", new Blob([part]), "frame");
+      return this.post("POST", "frames", { frame: number }, body, signal);
+    };
     const answer = await this.next({ frames: own, make, signal });
     return answer.answers ?? [answer];
   }
@@ -113,9 +116,10 @@ export class Session {
    * @returns {Promise<Answer>}
    */
   async correct(frame, box, signal) {
-    const [own, ownBox] = [frameOf(frame), boxOf(box)];
-    const make = (/** @type {number} */ number) => this.put(number, own, ownBox, signal);
-    return this.next({ frames: [own], box: ownBox, make, signal });
+    const ownBox = boxOf(box);
+    /** @type {Sent["make"]} */
+    const make = (number, [own]) => this.put(number, own, ownBox, signal);
+    return this.next({ frames: [frameOf(frame)], box: ownBox, make, signal });
   }
 
   /** The session's state; the service does not count this as a frame.
@@ -205,7 +209,7 @@ export class Session {
 
   /**
    * @param {number} number
-   * @param {Blob | Uint8Array<ArrayBuffer>} frame
+   * @param {Uint8Array<ArrayBuffer>} frame
    * @param {Box} box
    * @param {AbortSignal} [signal]
    */
@@ -225,13 +229,15 @@ export class Session {
   }
 
   /** @param {Sent} sent */
-  async send({ frames, box, make, signal }) {
+  async send({ frames: given, box, make, signal }) {
+    // Only now, since many may wait, and are files.
+    const frames = await Promise.all(given.map(bytesOf));
     signal?.throwIfAborted();
     const number = (this.kept.last ?? this.frame) + 1;
     // From here on they count: without an answer they are sent again before the next ones.
     frames.forEach((frame, index) => this.kept.put({ number: number + index, frame, box }));
     try {
-      const response = await this.deliver(number, make, signal);
+      const response = await this.deliver(number, (at) => make(at, frames), signal);
       const answer = await documentOf(response, ...ANSWER);
       this.frame = answer.frame;
       this.box = answer.box;

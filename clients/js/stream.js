@@ -1,7 +1,7 @@
 // A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice. A session
 // that the service has lost is opened again.
 
-import { boxOf, checkWindow, frameOf } from "./given.js";
+import { boxOf, bytesOf, checkWindow, frameOf } from "./given.js";
 import { Problem } from "./problem.js";
 import { documentOf, pause } from "./transport.js";
 
@@ -33,6 +33,10 @@ const UNAUTHORIZED = 401;
 /** As browsers call a line that broke. */
 const ABNORMAL = 1006;
 
+/** The frame of what was sent, which was read before.
+ * @param {Waiting} sent */
+const sentFrame = ({ frame }) => /** @type {Uint8Array<ArrayBuffer>} */ (frame);
+
 export class FrameStream {
   /**
    * @param {import("./session.js").Session} session
@@ -48,6 +52,8 @@ export class FrameStream {
     this.waiting = [];
     /** How many of those that wait are on their way. */
     this.sent = 0;
+    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
+    this.reading = undefined;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
     this.outOfOrder = 0;
     /** @type {WebSocket | undefined} */
@@ -88,12 +94,18 @@ export class FrameStream {
     return new Promise((resolve, reject) => {
       const own = frameOf(frame);
       const header = { box: box == null ? undefined : boxOf(box), see };
-      // Of live frames that cannot be sent yet, the newest is kept.
-      if (this.live) this.waiting.splice(this.sent).forEach((older) => older.resolve(undefined));
+      if (this.live) this.skip();
       this.waiting.push({ frame: own, header, resolve, reject });
       if (this.lost) this.reopen(this.lost);
       else this.transmit();
     });
+  }
+
+  /** Of live frames that cannot be sent yet, the newest is kept. */
+  skip() {
+    // One that is being read is as good as sent: where reading takes longer than the next frame, none would be.
+    const unsent = Math.max(this.sent, this.waiting.findIndex((other) => other === this.reading) + 1);
+    this.waiting.splice(unsent).forEach((older) => older.resolve(undefined));
   }
 
   /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
@@ -103,12 +115,29 @@ export class FrameStream {
 
   transmit() {
     while (this.isUp && !this.outOfOrder && this.sent < Math.min(this.waiting.length, this.window)) {
-      const { frame, header } = this.waiting[this.sent];
+      const next = this.waiting[this.sent];
+      const { frame, header } = next;
+      if (!ArrayBuffer.isView(frame)) return this.read(next);
       const number = this.live ? undefined : this.session.frame + 1 + this.sent;
       this.sent += 1;
       this.socket?.send(JSON.stringify({ frame: number, ...header }));
       this.socket?.send(frame);
     }
+  }
+
+  /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
+   * @param {Waiting} next */
+  async read(next) {
+    if (this.reading === next) return;
+    this.reading = next;
+    try {
+      next.frame = await bytesOf(next.frame);
+    } catch (problem) {
+      this.waiting = this.waiting.filter((other) => other !== next);
+      next.reject(problem);
+    }
+    this.reading = undefined;
+    this.transmit();
   }
 
   /** @param {any} message */
@@ -120,7 +149,7 @@ export class FrameStream {
     this.session.box = message.box;
     this.session.isDraining ||= message.draining === true;
     const answered = this.acknowledge();
-    if (answered) this.session.kept.put({ number: message.frame, frame: answered.frame, box: answered.header.box });
+    if (answered) this.session.kept.put({ number: message.frame, frame: sentFrame(answered), box: answered.header.box });
     this.checkpoint(message.checkpoint);
     answered?.resolve(message);
     this.transmit();
@@ -341,7 +370,7 @@ export class FrameStream {
     // The service may have these: they count, so a post or the next stream sends them again before its own.
     const { kept, frame: last } = this.session;
     const sent = this.outOfOrder ? [] : left.slice(0, this.sent);
-    sent.forEach(({ frame, header }, index) => kept.put({ number: last + 1 + index, frame, box: header.box }));
+    sent.forEach((it, index) => kept.put({ number: last + 1 + index, frame: sentFrame(it), box: it.header.box }));
     left.forEach(({ reject }) => reject(problem ?? new Error("The stream has ended.")));
     this.resolveEnded(problem);
   }

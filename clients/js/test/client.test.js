@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, openAsBlob, rmSync, writeFileSync } from "node:fs";
 import { createServer, request as forward } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -186,6 +186,41 @@ test("a full service is asked again, when it says so", async () => {
   }
 });
 
+// It was tried for 20 seconds as a service that cannot be reached, and again before each frame after it. A stream with it
+// ended the process.
+test("a file may be removed once it was sent; one that was removed before is told at once", async () => {
+  const folder = mkdtempSync(join(tmpdir(), "bagtrack-files-"));
+  const fileOf = async (/** @type {number} */ frame) => {
+    const path = join(folder, `${frame}.jpg`);
+    writeFileSync(path, clip.frames[frame]);
+    return { file: await openAsBlob(path), remove: () => rmSync(path) };
+  };
+  try {
+    const client = new Client(service.url);
+    const first = await fileOf(0);
+    const session = await client.open(first.file, clip.box, options);
+    const lost = await fileOf(1);
+    lost.remove();
+    const calls = [session.track(lost.file), session.trackAll([clip.frames[1], lost.file]), session.correct(lost.file, clip.box)];
+    for (const call of calls) await assert.rejects(call, problem("unsupported-image"));
+    const sent = await fileOf(1);
+    sameAsTheLibrary([await session.track(sent.file)]);
+    for (const { remove } of [first, sent]) remove();
+    // The session is opened again, with the frames that were sent.
+    await (await client.attach(session.id)).end();
+    sameAsTheLibrary([await session.track((await fileOf(2)).file)], 2);
+    const stream = session.stream();
+    const files = await Promise.all([3, 4, 5].map(fileOf));
+    files[1].remove();
+    const [third, fourth, fifth] = files.map(({ file }) => stream.track(file));
+    await assert.rejects(fourth, problem("unsupported-image"));
+    assert.deepEqual([(await third)?.frame, (await fifth)?.frame], [3, 4]);
+    stream.close();
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
+
 test("a signal ends the waiting", async () => {
   const line = await openLine(service.port);
   line.shut(true);
@@ -322,6 +357,7 @@ test("a large frame has longer to go over a slow line", async (context) => {
   try {
     const opening = client.open(new Uint8Array(6e6), clip.box).catch(() => undefined);
     const small = client.open(clip.frames[0], clip.box).catch(() => undefined);
+    while (signals.length < 2) await Promise.resolve();
     context.mock.timers.tick(100_000);
     assert.deepEqual(signals.map(({ aborted }) => aborted), [false, true]);
     context.mock.timers.tick(100_000);

@@ -128,6 +128,27 @@ test("live frames are answered or skipped, each once and in order", async () => 
   line.close();
 });
 
+test("of live frames one that takes long to be read is not skipped for ever", async () => {
+  /** @type {(() => void)[]} */
+  const reads = [];
+  class SlowFile extends Blob {
+    async arrayBuffer() {
+      await new Promise((resolve) => reads.push(() => resolve(undefined)));
+      return super.arrayBuffer();
+    }
+  }
+  const session = await open();
+  const stream = session.stream({ live: true });
+  await stream.track(clip.frames[1]);
+  const slow = clip.frames.slice(2, 5).map((frame) => stream.track(new SlowFile([frame])));
+  assert.equal(await slow[1], undefined);
+  for (const which of [0, 2]) {
+    reads.shift()?.();
+    assert.equal((await slow[which])?.frame, which === 0 ? 2 : 3);
+  }
+  stream.close();
+});
+
 test("the end of the session ends the stream", async () => {
   const client = new Client(service.url, { snapshotEvery: 0 });
   const session = await client.open(clip.frames[0], clip.box, { seed: SEED });

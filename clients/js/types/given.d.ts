@@ -9,6 +9,10 @@ export declare function checkImage(image: unknown): void;
  * @param {import("./client.js").Frame} frame
  * @returns {Blob | Uint8Array<ArrayBuffer>} */
 export declare function frameOf(frame: import("./client.js").Frame): Blob | Uint8Array<ArrayBuffer>;
+/** The bytes of a frame. A file is read, since it may be changed or removed before it is sent, or sent again.
+ * @param {Blob | Uint8Array<ArrayBuffer>} frame
+ * @returns {Promise<Uint8Array<ArrayBuffer>>} */
+export declare function bytesOf(frame: Blob | Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>>;
 /** @param {number} window Frames on their way at a time. */
 export declare function checkWindow(window: number): number;
 /** The box itself, which its owner may change afterwards; or a refusal.

@@ -4,7 +4,7 @@ export type Origin = {
 };
 export type KeptFrame = {
     number: number;
-    frame: Blob | Uint8Array<ArrayBuffer>;
+    frame: Uint8Array<ArrayBuffer>;
     /**
      * Where the user corrected it.
      */
@@ -17,16 +17,16 @@ export type KeptFrame = {
  *
  * @typedef {object} KeptFrame A frame that was sent or is to be sent.
  * @property {number} number
- * @property {Blob | Uint8Array<ArrayBuffer>} frame
+ * @property {Uint8Array<ArrayBuffer>} frame
  * @property {import("./session.js").Box} [box] Where the user corrected it.
  */
 /** Most frames that are kept. */
 export declare const MOST_KEPT = 256;
 export declare const SNAPSHOT = "application/vnd.bagtrack.snapshot";
 /** The request that goes on where a snapshot was taken.
- * @param {Blob | ArrayBuffer | Uint8Array<ArrayBuffer>} snapshot
+ * @param {Uint8Array<ArrayBuffer>} snapshot
  * @returns {import("./transport.js").Request} */
-export declare function restoring(snapshot: Blob | ArrayBuffer | Uint8Array<ArrayBuffer>): import("./transport.js").Request;
+export declare function restoring(snapshot: Uint8Array<ArrayBuffer>): import("./transport.js").Request;
 export declare class Kept {
     /** While there is one, all frames after it are kept. */
     origin: Origin | undefined;

@@ -37,7 +37,7 @@ export type Sent = {
      * Where the user corrects it.
      */
     box?: Box;
-    make: (number: number) => Promise<Response>;
+    make: (number: number, frames: Uint8Array<ArrayBuffer>[]) => Promise<Response>;
     signal?: AbortSignal;
 };
 export declare class Session {
@@ -133,18 +133,18 @@ export declare class Session {
     post(method: string, path: string, query: Record<string, string | number>, body: BodyInit, signal?: AbortSignal): Promise<Response>;
     /**
      * @param {number} number
-     * @param {Blob | Uint8Array<ArrayBuffer>} frame
+     * @param {Uint8Array<ArrayBuffer>} frame
      * @param {Box} box
      * @param {AbortSignal} [signal]
      */
-    put(number: number, frame: Blob | Uint8Array<ArrayBuffer>, box: Box, signal?: AbortSignal): Promise<Response>;
+    put(number: number, frame: Uint8Array<ArrayBuffer>, box: Box, signal?: AbortSignal): Promise<Response>;
     /**
      * Makes a request with the next frames after those before.
      * @param {Sent} sent
      */
     next(sent: Sent): Promise<any>;
     /** @param {Sent} sent */
-    send({ frames, box, make, signal }: Sent): Promise<any>;
+    send({ frames: given, box, make, signal }: Sent): Promise<any>;
     /** Makes sure, after an answer, that the session can go on elsewhere.
      * @param {string | null} stored The last frame that a store has. */
     checkpoint(stored: string | null): Promise<void>;

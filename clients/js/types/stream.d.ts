@@ -47,6 +47,8 @@ export declare class FrameStream {
     waiting: Waiting[];
     /** How many of those that wait are on their way. */
     sent: number;
+    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
+    reading: Waiting | undefined;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
     outOfOrder: number;
     /** @type {WebSocket | undefined} */
@@ -87,9 +89,14 @@ export declare class FrameStream {
         box?: import("./session.js").Box;
         see?: boolean;
     }): Promise<StreamAnswer | undefined>;
+    /** Of live frames that cannot be sent yet, the newest is kept. */
+    skip(): void;
     /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
-    transmit(): void;
+    transmit(): Promise<void> | undefined;
+    /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
+     * @param {Waiting} next */
+    read(next: Waiting): Promise<void>;
     /** @param {any} message */
     receive(message: any): void | Promise<void>;
     /** Makes sure, after an answer, that the session can be opened again.
