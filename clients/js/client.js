@@ -1,6 +1,6 @@
 // A service: it opens sessions.
 
-import { boxText, bytesOf, frameOf } from "./given.js";
+import { boxText, bytesOf, checkNumber, frameOf } from "./given.js";
 import { MOST_KEPT, restoring } from "./kept.js";
 import { Session } from "./session.js";
 import { Transport, documentOf } from "./transport.js";
@@ -35,8 +35,9 @@ export class Client {
    * @param {typeof WebSocket} [options.WebSocket] For streams, where the platform has none: Node before 22.
    */
   constructor(url, options = {}) {
-    this.transport = new Transport(url, options.key ?? "", options.patience ?? 20_000);
-    this.snapshotEvery = Math.min(options.snapshotEvery ?? 30, MOST_KEPT / 2);
+    const patience = checkNumber("patience", options.patience ?? 20_000);
+    this.transport = new Transport(url, options.key ?? "", patience);
+    this.snapshotEvery = Math.min(checkNumber("snapshotEvery", options.snapshotEvery ?? 30), MOST_KEPT / 2);
     this.WebSocket = options.WebSocket ?? globalThis.WebSocket;
   }
 
@@ -68,7 +69,12 @@ export class Client {
    * @returns {Promise<Session>}
    */
   async restore(snapshot, signal, patience) {
-    return this.create({ ...restoring(await bytesOf(frameOf(snapshot))), signal, patience });
+    if (patience !== undefined) checkNumber("patience", patience);
+    const session = await this.create({ ...restoring(await bytesOf(frameOf(snapshot))), signal, patience });
+    // What opens a session does not tell the score.
+    const response = await this.transport.call("GET", `sessions/${session.id}`, { signal, patience });
+    session.take((await documentOf(response, "answer")).answer);
+    return session;
   }
 
   /**
@@ -80,7 +86,7 @@ export class Client {
   async attach(id) {
     const response = await this.transport.call("GET", `sessions/${encodeURIComponent(id)}`);
     const view = await documentOf(response, "id", "answer");
-    return new Session(this, view.id, view.answer.frame, view.answer.box, response.headers);
+    return new Session(this, view.id, view.answer, response.headers);
   }
 
   /** @param {import("./transport.js").Request} request */
@@ -89,6 +95,8 @@ export class Client {
     const { id, frame, box } = await documentOf(response, "id", "frame", "box");
     const { query, body, type } = request;
     const origin = this.snapshotEvery > 0 ? { frame, request: { query, body, type } } : undefined;
-    return new Session(this, id, frame, box, response.headers, origin, true);
+    // The box that is given holds.
+    const answer = /** @type {const} */ ({ frame, box, score: 1, status: "tracking" });
+    return new Session(this, id, answer, response.headers, origin, true);
   }
 }

@@ -45,6 +45,14 @@ export function checkWindow(window) {
   throw new RangeError("The window of a stream is a whole number from 1 to 32.");
 }
 
+/** A number of this name; or a refusal: with "20s" or NaN a client would wait for ever, or not at all.
+ * @param {string} name
+ * @param {number} number */
+export function checkNumber(name, number) {
+  if (typeof number === "number" && number >= 0) return number;
+  throw new RangeError(`${name} is a number from 0 on, not ${typeof number === "string" ? `"${number}"` : number}.`);
+}
+
 /** The box itself, which its owner may change afterwards; or a refusal.
  * @param {import("./session.js").Box} box
  * @returns {import("./session.js").Box} */

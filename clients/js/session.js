@@ -46,20 +46,23 @@ export class Session {
   /**
    * @param {import("./client.js").Client} client
    * @param {string} id
-   * @param {number} frame The number of its last frame.
-   * @param {Box} box The box of that frame.
+   * @param {Answer} answer The last one.
    * @param {Headers} headers Of the answer that told so.
    * @param {import("./kept.js").Origin} [origin] What opens it again.
    * @param {boolean} [isOwn] Whether this client has opened it.
    */
-  constructor(client, id, frame, box, headers, origin, isOwn = false) {
+  constructor(client, id, answer, headers, origin, isOwn = false) {
     this.client = client;
     this.id = id;
-    this.frame = frame;
-    this.box = box;
+    /** The number of its last frame. */
+    this.frame = answer.frame;
+    /** The box of that frame. */
+    this.box = answer.box;
+    this.score = answer.score;
+    this.status = answer.status;
     this.isOwn = isOwn;
     /** The last frame that the service has, as far as is known. */
-    this.lastAcknowledged = frame;
+    this.lastAcknowledged = answer.frame;
     /** Whether the service is about to end: the session goes on elsewhere, as soon as another one takes it. */
     this.isDraining = false;
     /** When that was tried last. */
@@ -74,6 +77,11 @@ export class Session {
     /** @type {FrameStream | undefined} */
     this.open = undefined;
     this.isDraining = headers.get("draining") === "true";
+  }
+
+  /** @param {Answer} answer */
+  take({ frame, box, score, status }) {
+    Object.assign(this, { frame, box, score, status });
   }
 
   /**
@@ -239,8 +247,7 @@ export class Session {
     try {
       const response = await this.deliver(number, (at) => make(at, frames), signal);
       const answer = await documentOf(response, ...ANSWER);
-      this.frame = answer.frame;
-      this.box = answer.box;
+      this.take(answer);
       this.lastAcknowledged = Math.max(this.lastAcknowledged, this.frame);
       this.isDraining ||= response.headers.get("draining") === "true";
       await this.checkpoint(response.headers.get("checkpoint"));

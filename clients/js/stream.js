@@ -1,7 +1,7 @@
 // A session's stream. After a broken line it takes up where it was: nothing is lost, nothing tracked twice. A session
 // that the service has lost is opened again.
 
-import { boxOf, bytesOf, checkWindow, frameOf } from "./given.js";
+import { boxOf, bytesOf, checkNumber, checkWindow, frameOf } from "./given.js";
 import { Problem } from "./problem.js";
 import { documentOf, pause } from "./transport.js";
 
@@ -46,7 +46,7 @@ export class FrameStream {
     this.session = session;
     this.live = options.live ?? false;
     this.window = checkWindow(options.window ?? 8);
-    this.patience = options.patience ?? session.client.transport.patience;
+    this.patience = checkNumber("patience", options.patience ?? session.client.transport.patience);
     this.onLine = options.onLine ?? (() => undefined);
     /** @type {Waiting[]} Oldest first. */
     this.waiting = [];
@@ -145,8 +145,7 @@ export class FrameStream {
     if (message.next !== undefined) return this.resume(message.next);
     if (message.type) return this.refused(new Problem(message));
     for (let count = message.skipped ?? 0; count > 0; count -= 1) this.acknowledge()?.resolve(undefined);
-    this.session.frame = message.frame;
-    this.session.box = message.box;
+    this.session.take(message);
     this.session.isDraining ||= message.draining === true;
     const answered = this.acknowledge();
     if (answered) this.session.kept.put({ number: message.frame, frame: sentFrame(answered), box: answered.header.box });

@@ -46,6 +46,22 @@ test("an address or a key that no request takes is told at once, and a key is no
   await (await new Client(service.url, { key: "the-key-of-a-file\n" }).open(frame, clip.box)).end();
 });
 
+test("a patience and other numbers that are none are refused", async () => {
+  const wrong = /** @type {any[]} */ (["20s", "20000", NaN, -1, {}, true]);
+  const client = new Client(service.url, { patience: Infinity, snapshotEvery: 0 });
+  const session = await client.open(clip.frames[0], clip.box);
+  const snapshot = await session.snapshot();
+  for (const patience of wrong) {
+    const told = { name: "RangeError", message: /^patience is a number from 0 on, not / };
+    assert.throws(() => new Client(service.url, { patience }), told);
+    assert.throws(() => session.stream({ patience }), told);
+    await assert.rejects(client.restore(snapshot, undefined, patience), told);
+    const snapshotEvery = patience;
+    assert.throws(() => new Client(service.url, { snapshotEvery }), /^RangeError: snapshotEvery is a number/);
+  }
+  await session.end();
+});
+
 /** @param {any[]} answers
  * @param {number} [first] */
 function sameAsTheLibrary(answers, first = 1) {
@@ -105,9 +121,12 @@ test("a damaged frame is refused, and those after it are tracked", async () => {
 test("a snapshot goes on under another id, a correction moves the box", async () => {
   const client = new Client(service.url);
   const session = await client.open(clip.frames[0], clip.box, options);
+  assert.deepEqual([session.score, session.status], [1, "tracking"]);
   for (const frame of clip.frames.slice(1, 11)) await session.track(frame);
   const restored = await client.restore(await session.snapshot());
   assert.notEqual(restored.id, session.id);
+  // As sessions in the page tell them.
+  for (const same of [session, restored, await client.attach(session.id)]) sameAsTheLibrary([same], 10);
   const answers = [];
   for (const frame of clip.frames.slice(11, 31)) answers.push(await restored.track(frame));
   sameAsTheLibrary(answers, 11);

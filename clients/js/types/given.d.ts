@@ -15,6 +15,10 @@ export declare function frameOf(frame: import("./client.js").Frame): Blob | Uint
 export declare function bytesOf(frame: Blob | Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>>;
 /** @param {number} window Frames on their way at a time. */
 export declare function checkWindow(window: number): number;
+/** A number of this name; or a refusal: with "20s" or NaN a client would wait for ever, or not at all.
+ * @param {string} name
+ * @param {number} number */
+export declare function checkNumber(name: string, number: number): number;
 /** The box itself, which its owner may change afterwards; or a refusal.
  * @param {import("./session.js").Box} box
  * @returns {import("./session.js").Box} */

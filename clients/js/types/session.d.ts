@@ -43,8 +43,12 @@ export type Sent = {
 export declare class Session {
     client: import("./client.js").Client;
     id: string;
+    /** The number of its last frame. */
     frame: number;
+    /** The box of that frame. */
     box: Box;
+    score: number;
+    status: "lost" | "tracking" | "uncertain";
     isOwn: boolean;
     /** The last frame that the service has, as far as is known. */
     lastAcknowledged: number;
@@ -64,13 +68,14 @@ export declare class Session {
     /**
      * @param {import("./client.js").Client} client
      * @param {string} id
-     * @param {number} frame The number of its last frame.
-     * @param {Box} box The box of that frame.
+     * @param {Answer} answer The last one.
      * @param {Headers} headers Of the answer that told so.
      * @param {import("./kept.js").Origin} [origin] What opens it again.
      * @param {boolean} [isOwn] Whether this client has opened it.
      */
-    constructor(client: import("./client.js").Client, id: string, frame: number, box: Box, headers: Headers, origin?: import("./kept.js").Origin, isOwn?: boolean);
+    constructor(client: import("./client.js").Client, id: string, answer: Answer, headers: Headers, origin?: import("./kept.js").Origin, isOwn?: boolean);
+    /** @param {Answer} answer */
+    take({ frame, box, score, status }: Answer): void;
     /**
      * Sends the next frame. Calls are made one after the other, in the order of `track`. A frame that got no answer, or
      * whose call was aborted, is kept: the next call sends it before its own.
