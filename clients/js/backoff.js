@@ -2,6 +2,7 @@
 
 const FIRST = 100;
 const LONGEST = 5000;
+const LONGEST_TIMER = 2 ** 31 - 1;
 
 /** Pauses that grow, until the time is up. */
 export class Backoff {
@@ -19,6 +20,7 @@ export class Backoff {
     // Clients that were cut off together do not come back together.
     const pausing = Math.max(this.own * (0.5 + Math.random() / 2), asked);
     this.own = Math.min(2 * this.own, LONGEST);
-    return Date.now() + pausing > this.late ? undefined : pausing;
+    // A longer one would end at once.
+    return Date.now() + pausing > this.late ? undefined : Math.min(pausing, LONGEST_TIMER);
   }
 }

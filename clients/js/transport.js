@@ -82,6 +82,25 @@ function keyOf(key) {
   throw new TypeError("The key has characters that no header takes: it is one line of printable ASCII.");
 }
 
+/** After how many seconds trying again makes sense, where that is said: as a number, or by proxies as a date.
+ * @param {Headers} headers */
+function retryAfter(headers) {
+  const said = headers.get("retry-after") ?? "";
+  const seconds = said ? Number(said) : NaN;
+  if (Number.isFinite(seconds)) return seconds;
+  // The clock here may be wrong.
+  const now = dateOf(headers.get("date")) ?? Date.now();
+  const until = dateOf(said);
+  return until && Math.max(0, (until - now) / 1000);
+}
+
+/** Milliseconds; nothing where it is no date.
+ * @param {string | null} said */
+function dateOf(said) {
+  // Without its form `parse` takes much for a date.
+  return /^\w{3}, .* GMT$/.test(said ?? "") ? Date.parse(said ?? "") || undefined : undefined;
+}
+
 /** No answer came. Node.js tells why; browsers do not.
  * @param {any} error */
 function unreachable(error) {
@@ -181,8 +200,7 @@ export class Transport {
         return Object.defineProperty(whole, "url", { value: response.url });
       }
       const problem = await response.json().catch(() => ({ title: response.statusText }));
-      const seconds = Number(response.headers.get("retry-after") ?? undefined);
-      throw new Problem({ ...problem, status: response.status }, Number.isFinite(seconds) ? seconds : undefined);
+      throw new Problem({ ...problem, status: response.status }, retryAfter(response.headers));
     } catch (error) {
       signal?.throwIfAborted();
       throw error instanceof Problem ? error : unreachable(error);

@@ -7,7 +7,9 @@ clients. A connection that is lost is thrown into them as `ConnectionLost`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Generator, Generic, Mapping, TypeVar, Union
+from datetime import datetime, timezone
+from email.utils import parsedate_to_datetime
+from typing import Any, Generator, Generic, Mapping, Optional, TypeVar, Union
 
 T = TypeVar("T")
 
@@ -44,10 +46,23 @@ class Reply:
     @property
     def retry_after(self) -> float:
         """After how many seconds trying again makes sense; 0 where that is not said."""
+        said = self.headers.get("retry-after", "")
         try:
-            return float(int(self.headers["retry-after"]))
-        except (KeyError, ValueError):
-            return 0.0
+            return float(int(said))
+        except (OverflowError, ValueError):
+            pass
+        # Proxies tell a date. The clock here may be wrong.
+        until, now = date(said), date(self.headers.get("date", "")) or datetime.now(timezone.utc)
+        return max((until - now).total_seconds(), 0.0) if until else 0.0
+
+
+def date(said: str) -> Optional[datetime]:
+    """A date of HTTP; None where it is none."""
+    try:
+        found = parsedate_to_datetime(said)
+    except (OverflowError, TypeError, ValueError):
+        return None
+    return found if found.tzinfo else found.replace(tzinfo=timezone.utc)
 
 
 @dataclass(frozen=True)

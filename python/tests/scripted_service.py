@@ -116,7 +116,7 @@ class ScriptedService:
 
     @staticmethod
     def _send(handler: BaseHTTPRequestHandler, status: int, headers: dict[str, str], body: bytes) -> None:
-        handler.send_response(status)
+        handler.send_response_only(status)
         for name, value in headers.items():
             handler.send_header(name, value)
         handler.send_header("Connection", "close")

@@ -46,6 +46,7 @@
 
 mod backoff;
 mod client;
+mod date;
 mod error;
 mod kept;
 mod network;

@@ -1,18 +1,21 @@
 //! Requests over HTTP: one that fails for a moment is sent again.
 
 use crate::backoff::Backoff;
+use crate::date;
 use crate::error::ClientError;
 use crate::network::Carrier;
 use bagtrack_api::ProblemDocument as Problem;
 use bagtrack_api::headers::{CHECKPOINT, DRAINING};
 use bagtrack_api::media_types::SNAPSHOT;
 use bytes::Bytes;
-use reqwest::header::{AUTHORIZATION, CONTENT_TYPE, HeaderMap, HeaderValue, RETRY_AFTER};
+use reqwest::header::{
+    AUTHORIZATION, CONTENT_TYPE, DATE, HeaderMap, HeaderName, HeaderValue, RETRY_AFTER,
+};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode, Url};
 use serde::de::Error;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Names and values.
 pub type Query = Vec<(&'static str, String)>;
@@ -97,9 +100,28 @@ impl Reply {
         });
         Problem {
             status: self.status.as_u16(),
-            retry_after: self.number(RETRY_AFTER.as_str()).map(Duration::from_secs),
+            retry_after: self.retry_after(),
             ..problem
         }
+    }
+
+    /// After how long trying again makes sense: in seconds, or, as proxies tell it, from a date on.
+    fn retry_after(&self) -> Option<Duration> {
+        let seconds = self.number(RETRY_AFTER.as_str()).or_else(|| {
+            let until = self.date(RETRY_AFTER)?;
+            // The clock here may be wrong.
+            let now = self.date(DATE).or_else(|| {
+                let since = SystemTime::now().duration_since(UNIX_EPOCH);
+                since.ok().map(|since| since.as_secs())
+            });
+            Some(until.saturating_sub(now?))
+        });
+        seconds.map(Duration::from_secs)
+    }
+
+    /// The date in this header field.
+    fn date(&self, name: HeaderName) -> Option<u64> {
+        date::seconds(self.headers.get(name)?.to_str().ok()?)
     }
 
     /// The number in this header field.
