@@ -7,6 +7,7 @@ frame, which gives `(ok, box)`. Boxes are (x, y, width, height) in pixels of the
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bagtrack import cv
@@ -21,9 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Answer",
-    "AsyncClient",
     "Box",
-    "Client",
     "NanoTrack",
     "ServiceError",
     "ServiceUnavailable",
@@ -34,6 +33,9 @@ __all__ = [
     "cv",
     "propagate",
 ]
+# Without the extra `from bagtrack import *` gives the rest.
+if find_spec("httpx") and find_spec("PIL"):
+    __all__ += ["AsyncClient", "Client"]
 
 
 def __getattr__(name: str) -> Any:

@@ -46,6 +46,9 @@ class BaseClient:
         """
         if snapshot_every < 0:
             raise ValueError("snapshot_every is at least 0")
+        # With another one it would be tried for ever, or told only once the service is away.
+        if isinstance(retry_for, str) or not retry_for >= 0:
+            raise ValueError(f"retry_for is a number of seconds from 0 on, not {retry_for!r}")
         if encoding not in get_args(Encoding):
             raise ValueError(f"encoding is 'jpeg' or 'png', not {encoding!r}")
         self._services = Services(url)

@@ -6,6 +6,7 @@ import json
 import time
 import uuid
 from dataclasses import dataclass
+from operator import index
 from typing import Any, Callable, Optional, TypeVar
 
 import numpy as np
@@ -18,6 +19,8 @@ from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, 
 T = TypeVar("T")
 SNAPSHOT = "application/vnd.bagtrack.snapshot"
 GONE = (404, 410)
+SEED_END = 1 << 53
+"""Seeds of the service are below this, so that JSON numbers hold them exactly in every language."""
 MOST_KEPT = 256
 """Most frames that are kept."""
 MOVE_EVERY = 1.0
@@ -382,7 +385,9 @@ def settings(preset: str, seed: Optional[int], params: dict[str, Any]) -> dict[s
     """The query that opens a session with these parameters."""
     query = {"preset": preset}
     if seed is not None:
-        query["seed"] = str(seed)
+        if not 0 <= index(seed) < SEED_END:
+            raise ValueError(f"the seed is a whole number from 0 to {SEED_END - 1}, not {seed}")
+        query["seed"] = str(index(seed))
     if params:
         query["parameters"] = json.dumps(params, default=plain_number)
     return query

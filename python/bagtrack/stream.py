@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any, Callable, Optional, TypeVar
 
 from bagtrack.answer import Answer
 from bagtrack.errors import ServiceError, ServiceUnavailable
 from bagtrack.session import GONE, Session, Upload
 from bagtrack.steps import ConnectionLost, NextService, Pause, Reply, Steps
 
+T = TypeVar("T")
 MOST_ON_THEIR_WAY = 32
+SWITCHED = 101
+"""The status with which a stream begins."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Stream:
         first = self._answered() + 1
         hello = yield Connect(self._session.path("/stream"), first)
         # The answers to the frames before this one come of themselves.
-        self._sent = hello["next"] - 1
+        self._sent = understood(hello, lambda document: int(document["next"])) - 1
         self._session.last_acknowledged = self._sent
 
     def _exchange(self) -> Steps[None]:
@@ -116,7 +119,7 @@ class Stream:
             if "type" in document:
                 self._refuse(document)
             self._tries = 0
-            answer = session.answer = Answer.parse(document)
+            answer = session.answer = understood(document, Answer.parse)
             session.last_acknowledged = max(session.last_acknowledged, session.answer.frame)
             if session.needs_checkpoint(document):
                 reply = as_reply(document)
@@ -165,6 +168,15 @@ class Stream:
         if self._tries * pause > session.retry_for:
             raise ServiceUnavailable(f"the stream breaks again and again: {broken}") from broken
         yield Pause(pause)
+
+
+def understood(document: dict[str, Any], read: Callable[[dict[str, Any]], T]) -> T:
+    """What a message says. `ServiceError` where it is none of the service's; the frames on their way stay kept."""
+    try:
+        return read(document)
+    except (KeyError, TypeError, ValueError) as error:
+        detail = f"the stream sent what is no answer of bagtrack: {json.dumps(document)[:60]!r}"
+        raise ServiceError(SWITCHED, {"detail": detail}) from error
 
 
 def as_reply(document: dict[str, Any]) -> Reply:

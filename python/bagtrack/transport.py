@@ -15,10 +15,12 @@ class Services:
     """The addresses of a service, one of which is in use."""
 
     def __init__(self, url: Union[str, Sequence[str]]) -> None:
-        urls = [url] if isinstance(url, str) else list(url)
+        urls = [url] if isinstance(url, (str, bytes)) else list(url)
         if not urls:
             raise ValueError("there is no address of a service")
         for address in urls:
+            if not isinstance(address, str):
+                raise TypeError(f"the address of a service is a text, not {type(address).__name__}")
             if not address.startswith(("http://", "https://")):
                 raise ValueError(f"the address {address!r} does not begin with http:// or https://")
             try:
@@ -53,6 +55,8 @@ def authorization(api_key: Union[str, None]) -> dict[str, str]:
     """The headers that say who calls."""
     if api_key is None:
         return {}
+    if not isinstance(api_key, str):
+        raise TypeError(f"the API key is a text, not {type(api_key).__name__}")
     # Files with a key end with a line break.
     key = api_key.strip()
     # The key is not shown: messages go into logs.

@@ -1,7 +1,7 @@
 //! Boxes: four numbers in Python, a rectangle in Rust.
 
 use bagtrack_tracker::Rect;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::*;
 
 /// x, y, width and height in pixels of the frame, as OpenCV has them.
@@ -22,6 +22,19 @@ pub fn rect(object: &Bound<'_, PyAny>) -> PyResult<Rect> {
             "a box is four numbers: x, y, width, height",
         )),
     }
+}
+
+/// The number of a target: one below 0 is a `ValueError`, as other arguments out of their range.
+///
+/// # Errors
+/// It is no whole number, or not in its range.
+pub fn extract_target(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    value.extract().map_err(|error: PyErr| {
+        match error.is_instance_of::<PyOverflowError>(value.py()) {
+            true => PyValueError::new_err(format!("targets are counted from 0, not {value}")),
+            false => error,
+        }
+    })
 }
 
 /// The numbers of a rectangle.

@@ -3,7 +3,7 @@
 use super::frame::frame;
 use super::model::PyNanoTrack;
 use super::params::{by_name, extract_seed, params};
-use super::target::{Numbers, numbers, rect};
+use super::target::{Numbers, extract_target, numbers, rect};
 use bagtrack_tracker::{Estimate, Expert, Params, Search, Status, Tracker, TrackerError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -92,7 +92,11 @@ impl PyTracker {
     }
 
     /// A tracker without a target, for one of several that see the same frames, counted from 0.
-    fn of_target(&self, py: Python<'_>, target: usize) -> Self {
+    fn of_target(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = extract_target)] target: usize,
+    ) -> Self {
         Self {
             params: self.params.of_target(target),
             model: self.model.as_ref().map(|model| model.clone_ref(py)),

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
 import sys
+import threading
 from collections.abc import Callable
 
 import httpx
 import numpy as np
 import pytest
+from websockets.sync.server import ServerConnection, serve
 
 import bagtrack
+from bagtrack.transport import Services
 from conftest import SEED, Clip, Server, clock, to_hundredths
 from lossy_line import LossyLine
 
@@ -149,6 +153,32 @@ def test_an_address_without_its_scheme_is_refused_at_once() -> None:
 def test_an_address_that_names_no_service_is_refused_at_once(make: Callable, address: str) -> None:
     with pytest.raises(ValueError, match=f"the address '{address}' "):
         make(address)
+
+
+@pytest.mark.parametrize("make", [bagtrack.Client, bagtrack.AsyncClient])
+def test_arguments_that_cannot_be_meant_are_told_at_once(make: Callable) -> None:
+    url = "http://localhost:8080"
+    with pytest.raises(TypeError, match="the API key is a text, not bytes"):
+        make(url, b"0123456789abcdef")
+    with pytest.raises(TypeError, match="the address of a service is a text, not bytes"):
+        make(url.encode())
+    for seed in (-1, 2**53, np.int64(-1)):
+        with pytest.raises(ValueError, match=f"the seed is a whole number from 0 to {2**53 - 1}, not {seed}"):
+            make(url, seed=seed)
+    with pytest.raises(TypeError):
+        make(url, seed=1.5)
+    for retry_for in ("20", float("nan"), -1.0):
+        with pytest.raises(ValueError, match="retry_for is a number of seconds from 0 on, not "):
+            make(url, retry_for=retry_for)
+
+
+def test_all_names_can_be_imported_without_the_extra() -> None:
+    """It was an `ImportError` for a name that nobody had asked for."""
+    code = "import sys\nsys.modules.update(httpx=None)\nfrom bagtrack import *\nprint(Tracker, 'Client' in globals())"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "<class 'bagtrack.Tracker'> False\n"
+    exec("from bagtrack import *", names := {})
+    assert names["Client"] is bagtrack.Client
 
 
 @pytest.mark.parametrize("make", [bagtrack.Client, bagtrack.AsyncClient])
@@ -346,6 +376,42 @@ def test_a_client_that_is_used_otherwise_within_a_stream_says_so(start_server: S
         assert answers == [1]
         client.init(bodies[0], clip.box)
         assert [answer.box for answer in client.track(bodies[1:10])] == clip.answered()[1:10]
+
+
+@pytest.mark.parametrize("messages", [['{"ok": true}'], ['{"next": 1}', '{"ok": true}']], ids=["hello", "answer"])
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+def test_what_is_no_answer_in_a_stream_is_told(
+    start_server: StartServer, clip: Clip, messages: list[str], is_async: bool
+) -> None:
+    """It was a bare `KeyError`."""
+
+    def say(line: ServerConnection) -> None:
+        for message in messages:
+            line.send(message)
+        list(line)
+
+    body = clip.files[0].read_bytes()
+    told = r"the stream sent what is no answer of bagtrack: '\{\"ok\": true\}'"
+
+    async def follow() -> None:
+        client = bagtrack.AsyncClient(url)
+        await client.init(body, clip.box)
+        client._services = other
+        async for _ in client.track([body]):
+            pass
+
+    url = start_server().url
+    with serve(say, "127.0.0.1", 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        other = Services(f"http://127.0.0.1:{server.socket.getsockname()[1]}")
+        with pytest.raises(bagtrack.ServiceError, match=told) as refused:
+            if is_async:
+                asyncio.run(follow())
+            client = bagtrack.Client(url)
+            client.init(body, clip.box)
+            client._services = other
+            list(client.track([body]))
+        assert refused.value.status == 101
 
 
 def test_a_stream_without_its_package_names_it(

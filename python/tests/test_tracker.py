@@ -174,6 +174,10 @@ def test_parameters_are_checked_and_told(clip: Clip) -> None:
         with pytest.raises(TypeError):
             make(seed=1.5)
     assert bagtrack.Tracker(seed=2**64 - 1).params["seed"] == 2**64 - 1
+    with pytest.raises(ValueError, match="targets are counted from 0, not -1"):
+        tracker.of_target(-1)
+    with pytest.raises(TypeError):
+        tracker.of_target(1.5)
     with pytest.raises(TypeError, match="no parameter particle; the parameters are particles, patch_width"):
         bagtrack.Tracker(particle=10)
     with pytest.raises(TypeError, match="no parameter search;"):
