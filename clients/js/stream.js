@@ -32,10 +32,25 @@ const OF_STATUS = 4000;
 const UNAUTHORIZED = 401;
 /** As browsers call a line that broke. */
 const ABNORMAL = 1006;
+/** The status with which a stream begins. */
+const SWITCHED = 101;
 
 /** The frame of what was sent, which was read before.
  * @param {Waiting} sent */
 const sentFrame = ({ frame }) => /** @type {Uint8Array<ArrayBuffer>} */ (frame);
+
+/** What the service says; a problem where it is none of its messages.
+ * @param {any} data */
+function messageOf(data) {
+  try {
+    const message = JSON.parse(data);
+    if (message.next !== undefined || message.type || (message.box && message.frame !== undefined)) return message;
+  } catch {
+    // It is told below.
+  }
+  const detail = `The stream sent what is no answer of bagtrack: ${JSON.stringify(String(data).slice(0, 60))}`;
+  return new Problem({ type: "", status: SWITCHED, detail });
+}
 
 export class FrameStream {
   /**
@@ -142,6 +157,7 @@ export class FrameStream {
 
   /** @param {any} message */
   receive(message) {
+    if (message instanceof Problem) return this.end(message);
     if (message.next !== undefined) return this.resume(message.next);
     if (message.type) return this.refused(new Problem(message));
     for (let count = message.skipped ?? 0; count > 0; count -= 1) this.acknowledge()?.resolve(undefined);
@@ -275,7 +291,7 @@ export class FrameStream {
       const socket = new client.WebSocket(url, token ? ["bagtrack", token] : ["bagtrack"]);
       this.socket = socket;
       socket.onmessage = (event) => {
-        if (this.socket === socket) this.receive(JSON.parse(event.data));
+        if (this.socket === socket) this.receive(messageOf(event.data));
       };
       const down = (/** @type {number} */ code) => {
         if (this.socket !== socket) return;

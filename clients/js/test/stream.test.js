@@ -149,6 +149,22 @@ test("of live frames one that takes long to be read is not skipped for ever", as
   stream.close();
 });
 
+test("what is no answer of the service ends the stream, and is told", async () => {
+  for (const message of ["<html>", '{"ok": true}', "null", '{"frame": 1}']) {
+    class Other extends WebSocket {
+      set onmessage(/** @type {(event: MessageEvent) => void} */ hear) {
+        this.addEventListener("message", () => hear(new MessageEvent("message", { data: message })));
+      }
+    }
+    const session = await new Client(service.url, { WebSocket: Other }).open(clip.frames[0], clip.box);
+    const stream = session.stream();
+    const told = { name: "Problem", status: 101, message: /^The stream sent what is no answer of bagtrack: "/ };
+    await assert.rejects(stream.track(clip.frames[1]), told);
+    assert.match(String(await stream.ended), /no answer of bagtrack/);
+    assert.equal(session.frame, 0);
+  }
+});
+
 test("the end of the session ends the stream", async () => {
   const client = new Client(service.url, { snapshotEvery: 0 });
   const session = await client.open(clip.frames[0], clip.box, { seed: SEED });
