@@ -74,6 +74,10 @@ export class FrameStream {
     /** @type {WebSocket | undefined} */
     this.socket = undefined;
     this.isUp = false;
+    /** Whether it was told that the line is broken. */
+    this.isDown = false;
+    /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
+    this.isReadable = false;
     this.isEnded = false;
     this.wait = FIRST_PAUSE;
     /** When the line broke. */
@@ -226,6 +230,8 @@ export class FrameStream {
     this.sent = known;
     this.outOfOrder = 0;
     this.isUp = true;
+    this.isDown = false;
+    this.isReadable = false;
     this.wait = FIRST_PAUSE;
     this.onLine(true);
     this.transmit();
@@ -266,6 +272,9 @@ export class FrameStream {
    * @param {Problem} problem What told that the service has lost it. */
   async reopen(problem) {
     this.lost = undefined;
+    // It may have been lost for long, without a frame to be sent.
+    this.downSince = Date.now();
+    this.isReadable = false;
     try {
       const at = await this.session.reopen(problem);
       if (this.isEnded) return;
@@ -332,6 +341,10 @@ export class FrameStream {
     // A token has ended. The key gives another one, unless it has ended, too: the call below tells.
     const isFinal = code > OF_STATUS && code !== OF_STATUS + UNAUTHORIZED;
     if (isFinal) return this.refusedFor(this.reason(code - OF_STATUS));
+    if (this.isReadable && this.isLate) {
+      const detail = "The service answers, but its stream cannot be opened: a proxy may let no WebSocket through.";
+      return this.end(new Problem({ type: "unreachable", detail }));
+    }
     this.breakLine();
     await pause(this.wait);
     if (this.isEnded) return;
@@ -342,6 +355,7 @@ export class FrameStream {
     const asked = transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames"));
     const seen = await asked.catch((error) => error);
     if (this.isEnded) return;
+    this.isReadable = !(seen instanceof Error);
     if (seen instanceof Error) {
       const isTemporary = seen instanceof Problem && seen.isTemporary;
       return isTemporary && !this.isLate ? this.closed(code) : this.refusedFor(seen);
@@ -351,7 +365,8 @@ export class FrameStream {
   }
 
   breakLine() {
-    if (!this.isUp) return;
+    if (this.isDown) return;
+    this.isDown = true;
     this.isUp = false;
     this.downSince = Date.now();
     this.onLine(false);

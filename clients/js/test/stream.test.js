@@ -207,6 +207,22 @@ test("a service that has gone ends the stream when patience ends", async () => {
   await assert.rejects(stream.track(clip.frames[2]), (error) => error instanceof Problem && error.slug === "unreachable");
 });
 
+// It was opened again and again, without end and without a word.
+test("a stream that a proxy does not let through ends when patience ends, and the session goes on", async () => {
+  class Stopped extends WebSocket {
+    constructor(/** @type {URL} */ url) {
+      super(new URL("/livez", url));
+    }
+  }
+  const session = await new Client(service.url, { WebSocket: Stopped }).open(clip.frames[0], clip.box, { seed: SEED });
+  const lines = /** @type {boolean[]} */ ([]);
+  const stream = session.stream({ patience: 300, onLine: (isUp) => lines.push(isUp) });
+  const told = { slug: "unreachable", message: /^The service answers, but its stream cannot be opened/ };
+  await assert.rejects(stream.track(clip.frames[1]), told);
+  assert.deepEqual(lines, [false]);
+  sameAsTheLibrary([await session.track(clip.frames[1])]);
+});
+
 test("frames without an answer are sent again by the stream or the post that comes next", async () => {
   const session = await open(service.url);
   const stream = session.stream();

@@ -54,6 +54,10 @@ export declare class FrameStream {
     /** @type {WebSocket | undefined} */
     socket: WebSocket | undefined;
     isUp: boolean;
+    /** Whether it was told that the line is broken. */
+    isDown: boolean;
+    /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
+    isReadable: boolean;
     isEnded: boolean;
     wait: number;
     /** When the line broke. */
