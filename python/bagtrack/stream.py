@@ -71,6 +71,8 @@ class Stream:
     def run(self) -> Steps[None]:
         """Sends frames and gives their answers, until there are no more frames."""
         session = self._session
+        # Tells where there is no session.
+        session.next_number()
         while not (self._ended and self._answered() + 1 == session.next_number()):
             try:
                 yield from self._connect()

@@ -218,8 +218,10 @@ def test_an_encoding_that_there_is_not_is_refused(make: Callable, encoding: str)
 def test_refusals_are_told_and_change_nothing(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
-        with pytest.raises(RuntimeError, match=r"call init\(frame, box\) first"):
-            client.update(bodies[0])
+        # A stream asked the service for the session `None`.
+        for call in (lambda: client.update(bodies[0]), lambda: list(client.track(bodies)), client.save):
+            with pytest.raises(RuntimeError, match=r"call init\(frame, box\) first"):
+                call()
         with pytest.raises(bagtrack.ServiceError) as refused:
             client.init(bodies[0], (0, 0, 1, 1))
         assert (refused.value.status, refused.value.kind) == (422, "invalid-box")
