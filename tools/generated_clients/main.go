@@ -4,8 +4,10 @@
 package main
 
 import (
+	"bytes"
 	"context"
 	"fmt"
+	"io"
 	"os"
 	"path/filepath"
 	"strconv"
@@ -57,6 +59,12 @@ func main() {
 	}
 	if problem := refused.Model().(bagtrack.Problem); problem.Type != "/docs/problems#unsupported-image" {
 		panic(problem.Type)
+	}
+	// An answer that is no JSON is refused, but it is there.
+	_, response, err = sessions.PostFrames(ctx, session.Id).Body(must(os.Open(frames[0]))).Draw(true).Execute()
+	picture := must(io.ReadAll(response.Body))
+	if err == nil || response.StatusCode != 200 || !bytes.HasPrefix(picture, []byte("\x89PNG")) {
+		panic(fmt.Sprint("nothing was drawn: ", err))
 	}
 	for _, id := range []string{session.Id, drawn.Id} {
 		if _, err := sessions.DeleteSession(ctx, id).Execute(); err != nil {

@@ -29,6 +29,8 @@ for (const [index, body] of frames.entries()) {
 console.log(`openapi-generator, TypeScript: ${equal} of 100 boxes equal to plain posts, ${each.toFixed(1)} ms a frame`);
 const snapshot = await sessions.getSnapshot({ id: session.id });
 const restored = await sessions.createSession({ body: snapshot });
+const { raw } = await sessions.postFramesRaw({ id: session.id, body: frames[0], draw: true });
+if (raw.headers.get("content-type") !== "image/png" || !(await raw.blob()).size) throw new Error("nothing was drawn");
 if (equal !== 100 || restored.frame !== 100) throw new Error("not as it should be");
 try {
   await sessions.postFrames({ id: session.id, body: new Blob(["no picture"]) });
