@@ -103,12 +103,14 @@ type Key = Result<HeaderValue, ClientError>;
 impl ClientBuilder {
     /// An API key, or a session token, which is sent with every request.
     pub fn api_key(mut self, key: &str) -> Self {
-        let header = HeaderValue::from_str(&format!("Bearer {key}"));
-        let header = header.map_err(|_| ClientError::InvalidKey);
-        self.key = Some(header.map(|mut value| {
+        // Files with a key end with a line break.
+        let key = Some(key.trim()).filter(|key| !key.is_empty());
+        let header = key.and_then(|key| HeaderValue::from_str(&format!("Bearer {key}")).ok());
+        let header = header.map(|mut value| {
             value.set_sensitive(true);
             value
-        }));
+        });
+        self.key = Some(header.ok_or(ClientError::InvalidKey));
         self
     }
 

@@ -2,7 +2,7 @@
 
 use crate::backoff::Backoff;
 use crate::date;
-use crate::error::ClientError;
+use crate::error::{ClientError, causes};
 use crate::network::Carrier;
 use bagtrack_api::ProblemDocument as Problem;
 use bagtrack_api::headers::{CHECKPOINT, DRAINING};
@@ -191,7 +191,7 @@ impl Transport {
                         return Err(ClientError::Unavailable(Box::new(problem)));
                     }
                 }
-                Err(error) if error.is_builder() => return Err(error.into()),
+                Err(error) if is_final(&error) => return Err(error.into()),
                 Err(_) if !has_broken => has_broken = true,
                 Err(error) => {
                     self.next_address();
@@ -233,6 +233,14 @@ impl Transport {
             body: answer.bytes().await?,
         })
     }
+}
+
+/// Whether another try would not mend it: what is no request, a certificate that is refused, and HTTPS without a feature
+/// of reqwest for it. The last two are told in words alone.
+fn is_final(error: &reqwest::Error) -> bool {
+    let is_told =
+        |text: &String| text.contains("certificate") || text.contains("scheme is not http");
+    error.is_builder() || (error.is_connect() && causes(error).iter().any(is_told))
 }
 
 fn form(frames: &[Bytes]) -> Form {

@@ -54,6 +54,51 @@ async fn what_fails_for_a_moment_is_sent_again_with_its_number() {
     }
 }
 
+#[tokio::test]
+async fn why_there_is_no_answer_is_told_without_the_query() {
+    let client = Client::builder("http://127.0.0.1:9").retry_for(Duration::ZERO);
+    let options = OpenOptions::new();
+    let opened = client
+        .build()
+        .unwrap()
+        .open("first", TARGET, &options)
+        .await;
+    let told = opened.unwrap_err().to_string();
+    assert!(told.starts_with("no answer: Connection refused"), "{told}");
+    assert!(told.contains(" (http://127.0.0.1:9/sessions/"), "{told}");
+    assert!(!told.contains("box="), "{told}");
+}
+
+/// It was told once the time for retries was up.
+#[tokio::test]
+async fn https_that_is_not_built_in_is_told_at_once() {
+    let script = Script::start([created(0)]).await;
+    let url = script.url().replace("http:", "https:");
+    let client = Client::builder(url)
+        .retry_for(Duration::from_secs(3600))
+        .build();
+    let opened = client
+        .unwrap()
+        .open("first", TARGET, &OpenOptions::new())
+        .await;
+    let told = opened.unwrap_err().to_string();
+    assert!(told.contains("scheme is not http"), "{told}");
+}
+
+#[tokio::test]
+async fn a_key_may_have_the_line_break_of_its_file() {
+    let script = Script::start([created(0)]).await;
+    open(client(&script).api_key("the-key-of-a-file\n")).await;
+    let [request] = &script.requests()[..] else {
+        panic!("one request")
+    };
+    assert_eq!(request.header("authorization"), "Bearer the-key-of-a-file");
+    for key in ["", " \n", "one\ntwo"] {
+        let refused = client(&script).api_key(key).build();
+        assert!(matches!(refused, Err(ClientError::InvalidKey)), "{key:?}");
+    }
+}
+
 /// A proxy's login page counted as the answer to a frame that was sent again, and was kept as a snapshot.
 #[tokio::test]
 async fn a_page_of_a_proxy_is_no_answer() {
