@@ -3,7 +3,7 @@
 
 import { boxOf, bytesOf, checkNumber, checkWindow, frameOf } from "./given.js";
 import { Problem } from "./problem.js";
-import { documentOf, pause } from "./transport.js";
+import { documentOf, longest, pause } from "./transport.js";
 
 /**
  * @typedef {object} Seen What the tracker saw, where that was asked for.
@@ -73,6 +73,8 @@ export class FrameStream {
     this.outOfOrder = 0;
     /** @type {WebSocket | undefined} */
     this.socket = undefined;
+    /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */
+    this.silence = undefined;
     this.isUp = false;
     /** Whether it was told that the line is broken. */
     this.isDown = false;
@@ -141,7 +143,24 @@ export class FrameStream {
       this.sent += 1;
       this.socket?.send(JSON.stringify({ frame: number, ...header }));
       this.socket?.send(frame);
+      this.listen();
     }
+  }
+
+  /** Takes the line for broken where what is asked for does not come: not every line that breaks tells. */
+  listen() {
+    clearTimeout(this.silence);
+    const { socket } = this;
+    if (!socket || (this.isUp && this.sent === 0)) return;
+    const bytes = this.waiting.slice(0, this.sent).reduce((sum, sent) => sum + sentFrame(sent).length, 0);
+    const end = () => {
+      if (this.socket !== socket) return;
+      this.socket = undefined;
+      socket.close();
+      this.closed(ABNORMAL);
+    };
+    // The service itself lets a frame wait for half of it.
+    this.silence = setTimeout(end, 2 * longest(bytes));
   }
 
   /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
@@ -300,7 +319,9 @@ export class FrameStream {
       const socket = new client.WebSocket(url, token ? ["bagtrack", token] : ["bagtrack"]);
       this.socket = socket;
       socket.onmessage = (event) => {
-        if (this.socket === socket) this.receive(messageOf(event.data));
+        if (this.socket !== socket) return;
+        this.receive(messageOf(event.data));
+        this.listen();
       };
       const down = (/** @type {number} */ code) => {
         if (this.socket !== socket) return;
@@ -310,6 +331,7 @@ export class FrameStream {
       socket.onclose = (event) => down(event.code);
       // Not every platform closes a socket that could not be opened.
       socket.onerror = () => down(ABNORMAL);
+      this.listen();
     } catch (error) {
       const isTemporary = error instanceof Problem && error.isTemporary && !this.isLate;
       if (isTemporary) this.closed(ABNORMAL);
@@ -365,6 +387,7 @@ export class FrameStream {
   }
 
   breakLine() {
+    clearTimeout(this.silence);
     if (this.isDown) return;
     this.isDown = true;
     this.isUp = false;
@@ -389,6 +412,7 @@ export class FrameStream {
   /** @param {Error | undefined} problem */
   end(problem) {
     if (this.isEnded) return;
+    clearTimeout(this.silence);
     this.isEnded = true;
     this.isUp = false;
     const { socket } = this;

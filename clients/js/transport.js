@@ -4,8 +4,11 @@ import { Backoff } from "./backoff.js";
 import { SNAPSHOT } from "./kept.js";
 import { Problem } from "./problem.js";
 
-/** The connection is taken for dead when there is no answer for so many milliseconds, one more for 50 bytes. */
 const ATTEMPT = 30_000;
+
+/** A connection is taken for dead when there is no answer for so many milliseconds, with so many bytes on their way.
+ * @param {number} bytes */
+export const longest = (bytes) => ATTEMPT + bytes / 50;
 
 /** @param {any} body */
 const sizeOf = (body) => body?.byteLength ?? body?.size ?? body?.length ?? 0;
@@ -190,7 +193,7 @@ export class Transport {
     signal?.addEventListener("abort", abort, { once: true });
     const parts = body instanceof FormData ? [...body.values()] : [body];
     const bytes = parts.reduce((sum, part) => sum + sizeOf(part), 0);
-    const timer = setTimeout(() => attempt.abort(), ATTEMPT + bytes / 50);
+    const timer = setTimeout(() => attempt.abort(), longest(bytes));
     try {
       const response = await fetch(url, { method, body, headers, signal: attempt.signal });
       // Read to its end here, where a line that breaks on the way is a failure to be tried again.

@@ -207,6 +207,36 @@ test("a service that has gone ends the stream when patience ends", async () => {
   await assert.rejects(stream.track(clip.frames[2]), (error) => error instanceof Problem && error.slug === "unreachable");
 });
 
+// A line that breaks without a word: it was waited for without end.
+test("a line that is silent is opened again", async (context) => {
+  /** @type {WebSocket[]} */
+  const sockets = [];
+  class Deaf extends WebSocket {
+    constructor(/** @type {URL} */ url, /** @type {string[]} */ protocols) {
+      super(url, protocols);
+      sockets.push(this);
+    }
+    close() {
+      // Nor does it tell its end.
+      this.onclose = null;
+      super.close();
+    }
+  }
+  const session = await new Client(service.url, { WebSocket: Deaf }).open(clip.frames[0], clip.box, { seed: SEED });
+  const stream = session.stream();
+  const answers = [await stream.track(clip.frames[1])];
+  context.mock.timers.enable({ apis: ["setTimeout"] });
+  sockets[0].onmessage = null;
+  const next = stream.track(clip.frames[2]);
+  // First it is found silent, then opened again after a pause.
+  context.mock.timers.tick(70_000);
+  context.mock.timers.tick(1000);
+  answers.push(await next);
+  sameAsTheLibrary(answers);
+  assert.equal(sockets.length, 2);
+  stream.close();
+});
+
 // It was opened again and again, without end and without a word.
 test("a stream that a proxy does not let through ends when patience ends, and the session goes on", async () => {
   class Stopped extends WebSocket {

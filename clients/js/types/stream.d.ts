@@ -53,6 +53,8 @@ export declare class FrameStream {
     outOfOrder: number;
     /** @type {WebSocket | undefined} */
     socket: WebSocket | undefined;
+    /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */
+    silence: ReturnType<typeof setTimeout> | undefined;
     isUp: boolean;
     /** Whether it was told that the line is broken. */
     isDown: boolean;
@@ -98,6 +100,8 @@ export declare class FrameStream {
     /** Ends the stream; the session goes on. Nobody is told the answers to frames on their way, but those frames count. */
     close(): void;
     transmit(): Promise<void> | undefined;
+    /** Takes the line for broken where what is asked for does not come: not every line that breaks tells. */
+    listen(): void;
     /** Reads a frame that may be a file, and goes on. A socket that cannot read it would not tell.
      * @param {Waiting} next */
     read(next: Waiting): Promise<void>;

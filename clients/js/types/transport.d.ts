@@ -1,3 +1,6 @@
+/** A connection is taken for dead when there is no answer for so many milliseconds, with so many bytes on their way.
+ * @param {number} bytes */
+export declare const longest: (bytes: number) => number;
 export type Request = {
     query?: Record<string, string | number | undefined>;
     body?: BodyInit;
