@@ -110,7 +110,7 @@ class AsyncClient(BaseClient):
             return None
         assert isinstance(step, Request)
         try:
-            response = await self._http.request(**request_of(step, self._services))
+            response = await self._http.request(**request_of(step, self._services, self._timeout))
         except httpx.TransportError as error:
             return lost(error)
         return transport.reply(response)

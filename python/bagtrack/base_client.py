@@ -41,8 +41,9 @@ class BaseClient:
         are sent as they are. Every `snapshot_every` frames the client takes a snapshot and keeps the frames after it:
         when the service loses the session, the client opens it again and sends them again, so that the boxes are the
         same as ever. 0: never. A service with a store needs none, and none are taken. `retry_for` is the time in
-        seconds for which a request is sent again after a broken line, 429 or 503; `timeout` is that of one request.
-        `preset`, `seed` and `params` are those of `Tracker`; without a seed the service draws one.
+        seconds for which a request is sent again after a broken line, 429 or 503; `timeout` is that of one request, and
+        a second more for 50,000 bytes of it. `preset`, `seed` and `params` are those of `Tracker`; without a seed the
+        service draws one.
         """
         if snapshot_every < 0:
             raise ValueError("snapshot_every is at least 0")
@@ -104,11 +105,12 @@ class BaseClient:
         return self._session.open(query, self._encode(frame), IMAGE)
 
 
-def request_of(step: Request, services: Services) -> dict[str, Any]:
+def request_of(step: Request, services: Services, timeout: float) -> dict[str, Any]:
     """A request in the words of httpx."""
     options: dict[str, Any] = {"method": step.method, "url": services.address(step.path), "params": dict(step.query)}
     if step.body:
         options.update(content=step.body, headers={"Content-Type": step.media_type})
+        options["timeout"] = transport.longest(timeout, len(step.body))
     return options
 
 

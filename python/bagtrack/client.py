@@ -111,7 +111,7 @@ class Client(BaseClient):
             return None
         assert isinstance(step, Request)
         try:
-            response = self._http.request(**request_of(step, self._services))
+            response = self._http.request(**request_of(step, self._services, self._timeout))
         except httpx.TransportError as error:
             return lost(error)
         return transport.reply(response)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import ssl
+from collections import deque
 from contextlib import ExitStack, suppress
 from typing import Any, Optional, Union
 
@@ -28,6 +29,8 @@ class BaseSocket:
     def __init__(self, services: Services, headers: dict[str, str], timeout: float) -> None:
         self._services = services
         self._timeout = timeout
+        self._on_their_way: deque[int] = deque()
+        """The bytes of the frames without an answer."""
         # JPEGs are compressed already; answers are short.
         self._options: dict[str, Any] = {
             "additional_headers": headers,
@@ -43,6 +46,21 @@ class BaseSocket:
 
     def _address(self, step: Connect) -> str:
         return f"{self._services.socket_address(step.path)}?from={step.first}"
+
+    def _longest(self) -> float:
+        """How long an answer may take."""
+        return transport.longest(self._timeout, sum(self._on_their_way))
+
+    def _note(self, message: Union[str, bytes]) -> None:
+        """Notes what was sent."""
+        if isinstance(message, bytes):
+            self._on_their_way.append(len(message))
+
+    def _answer(self, message: Union[str, bytes]) -> dict[str, Any]:
+        """The answer to the oldest frame."""
+        if self._on_their_way:
+            self._on_their_way.popleft()
+        return self._document(message)
 
     @staticmethod
     def _document(message: Union[str, bytes]) -> dict[str, Any]:
@@ -74,6 +92,7 @@ class Socket(BaseSocket):
         try:
             if isinstance(step, Connect):
                 self._lifetime = ExitStack()
+                self._on_their_way.clear()
                 connection = websockets.sync.client.connect(self._address(step), **self._options)
                 self._socket = self._lifetime.enter_context(connection)
                 return self._document(self._socket.recv(self._timeout))
@@ -83,8 +102,9 @@ class Socket(BaseSocket):
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 self._socket.send(step.message)
+                self._note(step.message)
             else:
-                return self._document(self._socket.recv(self._timeout))
+                return self._answer(self._socket.recv(self._longest()))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:
@@ -108,6 +128,7 @@ class AsyncSocket(BaseSocket):
         """As `Socket.perform`."""
         try:
             if isinstance(step, Connect):
+                self._on_their_way.clear()
                 self._socket = await websockets.asyncio.client.connect(self._address(step), **self._options)
                 return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
             if isinstance(step, Disconnect):
@@ -116,8 +137,9 @@ class AsyncSocket(BaseSocket):
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 await self._socket.send(step.message)
+                self._note(step.message)
             else:
-                return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
+                return self._answer(await asyncio.wait_for(self._socket.recv(), self._longest()))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:

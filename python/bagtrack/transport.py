@@ -11,6 +11,10 @@ import httpx
 from bagtrack.steps import ConnectionLost, Reply
 
 
+SLOWEST = 50_000
+"""Bytes a second for which a request has its time, beside `timeout`."""
+
+
 class Services:
     """The addresses of a service, one of which is in use."""
 
@@ -49,6 +53,11 @@ class Services:
     def previous(self) -> None:
         """Goes back to the address before."""
         self._used = (self._used - 1) % len(self._urls)
+
+
+def longest(timeout: float, size: int) -> float:
+    """How long an answer may take where so many bytes are on their way: a large frame takes long over a slow line."""
+    return timeout and timeout + size / SLOWEST
 
 
 def authorization(api_key: Union[str, None]) -> dict[str, str]:

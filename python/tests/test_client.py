@@ -14,6 +14,8 @@ import pytest
 from websockets.sync.server import ServerConnection, serve
 
 import bagtrack
+from bagtrack.sockets import Socket
+from bagtrack.stream import Receive, Send
 from bagtrack.transport import Services
 from conftest import SEED, Clip, Server, clock, to_hundredths
 from lossy_line import LossyLine
@@ -194,6 +196,39 @@ def test_a_key_may_have_the_line_break_of_its_file(start_server: StartServer, cl
     with bagtrack.Client(url, "0123456789abcdef\n", seed=SEED, retry_for=1.0) as client:
         client.init(clip.files[0].read_bytes(), clip.box)
         assert client.update(clip.files[1].read_bytes())[1] == clip.answered()[1]
+
+
+def test_a_large_frame_has_longer_to_go_over_a_slow_line(clip: Clip) -> None:
+    client = bagtrack.Client("http://localhost:8080", retry_for=0.0, timeout=2.0)
+    given = []
+
+    def take(request: httpx.Request) -> httpx.Response:
+        given.append(request.extensions["timeout"])
+        raise httpx.WriteTimeout("it takes long")
+
+    client._http = httpx.Client(transport=httpx.MockTransport(take))
+    for size in (0, 1_000_000):
+        with pytest.raises(bagtrack.ServiceUnavailable):
+            client.init(bytes(50_000 + size), clip.box)
+    assert given == [dict.fromkeys(("connect", "read", "write", "pool"), 3.0 + more) for more in (0, 20)]
+
+
+def test_a_large_frame_of_a_stream_has_longer_to_go_over_a_slow_line() -> None:
+    given = []
+
+    class Line:
+        def send(self, _: str | bytes) -> None:
+            pass
+
+        def recv(self, timeout: float) -> str:
+            given.append(timeout)
+            return '{"frame": 1}'
+
+    socket = Socket(Services("http://localhost:8080"), {}, 2.0)
+    socket._socket = Line()
+    for step in (Send('{"frame": 1}'), Send(bytes(50_000)), Send(bytes(100_000)), Receive(), Receive(), Receive()):
+        socket.perform(step)
+    assert given == [5.0, 4.0, 2.0]
 
 
 @pytest.mark.parametrize("error", [httpx.LocalProtocolError, httpx.UnsupportedProtocol])

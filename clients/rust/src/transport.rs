@@ -51,6 +51,18 @@ pub enum Body {
     Frames(Vec<Bytes>),
 }
 
+impl Body {
+    /// How long it may take over a slow line.
+    fn time(&self) -> Duration {
+        let bytes: usize = match self {
+            Self::Empty => 0,
+            Self::Bytes(_, bytes) => bytes.len(),
+            Self::Frames(frames) => frames.iter().map(Bytes::len).sum(),
+        };
+        Duration::from_millis(bytes as u64 / 50)
+    }
+}
+
 /// What is said of a session beside an answer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Standing {
@@ -215,7 +227,12 @@ impl Transport {
             url.query_pairs_mut().extend_pairs(&request.query);
         }
         let mut sent = self.carrier.http().request(request.method.clone(), url);
-        sent = sent.timeout(self.timeout);
+        let more = match self.carrier {
+            Carrier::Connections(_) => request.body.time(),
+            // Its lines are not slow.
+            Carrier::Network(..) => Duration::ZERO,
+        };
+        sent = sent.timeout(self.timeout.saturating_add(more));
         if let Some(authorization) = &self.authorization {
             sent = sent.header(AUTHORIZATION, authorization);
         }

@@ -125,6 +125,18 @@ async fn the_service_says_how_long_to_wait() {
 }
 
 #[tokio::test]
+async fn a_large_frame_has_longer_to_go_over_a_slow_line() {
+    // The script holds the line until it is asked again.
+    let script = Script::start([Reply::Silence, created(0)]).await;
+    let client = client(&script).retry_for(Duration::ZERO);
+    let client = client.timeout(Duration::from_millis(1)).build().unwrap();
+    let (begin, options) = (Instant::now(), OpenOptions::new());
+    let opened = client.open(vec![0; 50_000], TARGET, &options).await;
+    assert!(matches!(opened, Err(ClientError::Transport(_))));
+    assert!(begin.elapsed() >= Duration::from_secs(1));
+}
+
+#[tokio::test]
 async fn a_call_that_is_dropped_counts_as_one_without_answer() {
     let replies = [created(0), Reply::Silence, answer(1), answer(2)];
     let mut script = Script::start(replies).await;
