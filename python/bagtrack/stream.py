@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass
 from typing import Any, Callable, Optional, TypeVar
 
@@ -67,6 +68,8 @@ class Stream:
         """The last frame that is on its way or answered."""
         self._ended = False
         self._tries = 0
+        """Connections since the last answer."""
+        self._broken_since = 0.0
 
     def run(self) -> Steps[None]:
         """Sends frames and gives their answers, until there are no more frames."""
@@ -150,26 +153,35 @@ class Stream:
     def _mend(self, broken: ConnectionLost) -> Steps[None]:
         """Makes the session ready for the next connection."""
         session, answered = self._session, self._answered()
+        if self._tries == 0:
+            self._broken_since = time.monotonic()
         self._tries += 1
         problem = ServiceError(broken.status, broken.document)
-        if broken.status in GONE:
-            yield from session.restore(problem)
+        # Of an older frame the service is at its last checkpoint.
+        expected = broken.document.get("expected_frame", answered + 1) if broken.status == 409 else answered + 1
+        if broken.status in GONE or expected <= answered:
+            # Where every replica loses the session again, this ends with the time for retries.
+            if self._tries > 1:
+                yield self._pause(problem)
+            if broken.status in GONE:
+                yield from session.restore(problem)
+            else:
+                session.resend_from(expected, problem)
             if session.last_acknowledged < answered:
                 yield from session.catch_up(answered)
-            return
-        if broken.status == 409 and broken.document.get("expected_frame", answered + 1) <= answered:
-            # The service is at its last checkpoint.
-            session.resend_from(broken.document["expected_frame"], problem)
-            yield from session.catch_up(answered)
             return
         if broken.status and not problem.is_temporary:
             raise problem
         if self._tries > 1:
             yield NextService()
-        pause = min(0.05 * 2.0**self._tries, 2.0)
-        if self._tries * pause > session.retry_for:
-            raise ServiceUnavailable(f"the stream breaks again and again: {broken}") from broken
-        yield Pause(pause)
+        yield self._pause(ServiceUnavailable(f"the stream breaks again and again: {broken}"), broken)
+
+    def _pause(self, late: Exception, cause: Optional[Exception] = None) -> Pause:
+        """The pause before the next connection; raises this where the time for retries would be up then."""
+        pause = min(0.05 * 2.0 ** min(self._tries, 10), 2.0)
+        if time.monotonic() + pause - self._broken_since > self._session.retry_for:
+            raise late from cause
+        return Pause(pause)
 
 
 def understood(document: dict[str, Any], read: Callable[[dict[str, Any]], T]) -> T:

@@ -14,8 +14,10 @@ import pytest
 from websockets.sync.server import ServerConnection, serve
 
 import bagtrack
+from bagtrack.session import Session
 from bagtrack.sockets import Socket
-from bagtrack.stream import Receive, Send
+from bagtrack.steps import ConnectionLost, Pause, Reply, Request, Run
+from bagtrack.stream import Connect, Receive, Send, Stream
 from bagtrack.transport import Services
 from conftest import SEED, Clip, Server, clock, to_hundredths
 from lossy_line import LossyLine
@@ -398,6 +400,41 @@ def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServ
             next(client.track([body], window))
     with pytest.raises(ValueError, match=f"window is from 1 to 32, not {window}"):
         asyncio.run(follow())
+
+
+def test_a_stream_ends_with_the_time_for_retries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A silent service was tried for minutes, and one that loses the session each time without end and without pause."""
+    now = 0.0
+    monkeypatch.setattr("time.monotonic", lambda: now)
+    opened = {"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
+    gone = {"type": "/docs/problems#session-not-found"}
+
+    def follow(lost: ConnectionLost, takes: float, retry_for: float) -> list[str]:
+        """The steps of a session whose streams are lost after so many seconds."""
+        nonlocal now
+        session, steps = Session(30, retry_for), []
+        run = Run(session.open({}, b"a frame", "image/jpeg"))
+        run.next()
+        run.next(Reply(201, {}, b"", opened))
+        run = Run(Stream(session, 8).run())
+        step = run.next()
+        with pytest.raises(bagtrack.ServiceError if lost.status else bagtrack.ServiceUnavailable):
+            while step is not None:
+                steps.append(type(step).__name__)
+                result = Reply(201, {}, b"", opened) if isinstance(step, Request) else None
+                if isinstance(step, Connect):
+                    now += takes
+                    result = lost
+                if isinstance(step, Pause):
+                    now += step.seconds
+                step = run.next(result)
+        return steps
+
+    assert follow(ConnectionLost("timed out"), 15.0, 60.0).count("Connect") == 5
+    once = ["Connect", "Disconnect", "Request", "Connect", "Disconnect"]
+    assert follow(ConnectionLost("gone", 404, gone), 0.0, 0.0) == once
+    again = follow(ConnectionLost("gone", 404, gone), 0.0, 1.0)
+    assert again[:6] == [*once, "Pause"] and again.count("Request") == 3
 
 
 def test_a_client_that_is_used_otherwise_within_a_stream_says_so(start_server: StartServer, clip: Clip) -> None:
