@@ -80,6 +80,8 @@ export class FrameStream {
     this.isDown = false;
     /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
     this.isReadable = false;
+    /** Whether the session was opened again since the line broke. */
+    this.hasReopened = false;
     this.isEnded = false;
     this.wait = FIRST_PAUSE;
     /** When the line broke. */
@@ -117,8 +119,11 @@ export class FrameStream {
       const header = { box: box == null ? undefined : boxOf(box), see };
       if (this.live) this.skip();
       this.waiting.push({ frame: own, header, resolve, reject });
-      if (this.lost) this.reopen(this.lost);
-      else this.transmit();
+      if (this.lost) {
+        // It was lost while there was nothing to send.
+        this.downSince = Date.now();
+        this.reopen(this.lost);
+      } else this.transmit();
     });
   }
 
@@ -251,6 +256,7 @@ export class FrameStream {
     this.isUp = true;
     this.isDown = false;
     this.isReadable = false;
+    this.hasReopened = false;
     this.wait = FIRST_PAUSE;
     this.onLine(true);
     this.transmit();
@@ -291,9 +297,14 @@ export class FrameStream {
    * @param {Problem} problem What told that the service has lost it. */
   async reopen(problem) {
     this.lost = undefined;
-    // It may have been lost for long, without a frame to be sent.
-    this.downSince = Date.now();
     this.isReadable = false;
+    // The first time at once. Where every instance loses the session again, this ends with the patience.
+    if (this.hasReopened) {
+      if (this.isLate) return this.end(problem);
+      await this.rest();
+      if (this.isEnded) return;
+    }
+    this.hasReopened = true;
     try {
       const at = await this.session.reopen(problem);
       if (this.isEnded) return;
@@ -368,9 +379,8 @@ export class FrameStream {
       return this.end(new Problem({ type: "unreachable", detail }));
     }
     this.breakLine();
-    await pause(this.wait);
+    await this.rest();
     if (this.isEnded) return;
-    this.wait = Math.min(2 * this.wait, LONGEST_PAUSE);
     // A page is not told why a stream cannot be opened; this call tells.
     const { transport } = this.session.client;
     const url = transport.at(`sessions/${this.session.id}`);
@@ -384,6 +394,13 @@ export class FrameStream {
     }
     this.resendFrom(seen.frames);
     await this.connect();
+  }
+
+  /** Waits before another try, longer each time. */
+  async rest() {
+    const { wait } = this;
+    this.wait = Math.min(2 * wait, LONGEST_PAUSE);
+    await pause(wait);
   }
 
   breakLine() {

@@ -1,6 +1,7 @@
 // Streams against the program.
 
 import assert from "node:assert/strict";
+import { createServer, request as forward } from "node:http";
 import { after, before, test } from "node:test";
 import { Client, Problem } from "../bagtrack.js";
 import { SEED, openLine, rounded, sampleClip, startService } from "./service.js";
@@ -251,6 +252,33 @@ test("a stream that a proxy does not let through ends when patience ends, and th
   await assert.rejects(stream.track(clip.frames[1]), told);
   assert.deepEqual(lines, [false]);
   sameAsTheLibrary([await session.track(clip.frames[1])]);
+});
+
+test("a stream ends where each instance loses its session again, and opens not many", async () => {
+  const other = await startService();
+  let opened = 0;
+  const balancer = createServer((request, response) => {
+    const opens = request.method === "PUT";
+    opened += Number(opens);
+    const { method, url: path, headers } = request;
+    const passed = forward({ host: "127.0.0.1", port: opens ? service.port : other.port, method, path, headers }, (answer) => {
+      response.writeHead(answer.statusCode ?? 502, answer.headers);
+      answer.pipe(response);
+    });
+    request.pipe(passed);
+  });
+  await new Promise((resolve) => balancer.listen(0, "127.0.0.1", () => resolve(undefined)));
+  try {
+    const url = `http://127.0.0.1:${/** @type {any} */ (balancer.address()).port}`;
+    const stream = (await open(url)).stream({ patience: 500 });
+    const lost = (/** @type {unknown} */ error) => error instanceof Problem && error.slug === "session-not-found";
+    await assert.rejects(stream.track(clip.frames[1]), lost);
+    assert.ok(opened > 1 && opened < 5, `${opened} sessions`);
+  } finally {
+    balancer.close();
+    balancer.closeAllConnections();
+    await other.stop();
+  }
 });
 
 test("frames without an answer are sent again by the stream or the post that comes next", async () => {

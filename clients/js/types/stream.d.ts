@@ -60,6 +60,8 @@ export declare class FrameStream {
     isDown: boolean;
     /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
     isReadable: boolean;
+    /** Whether the session was opened again since the line broke. */
+    hasReopened: boolean;
     isEnded: boolean;
     wait: number;
     /** When the line broke. */
@@ -136,6 +138,8 @@ export declare class FrameStream {
      * @returns {Promise<void>}
      */
     closed(code: number): Promise<void>;
+    /** Waits before another try, longer each time. */
+    rest(): Promise<void>;
     breakLine(): void;
     /** The service does not take this stream.
      * @param {Error} problem */
