@@ -46,7 +46,6 @@
 
 mod backoff;
 mod client;
-mod date;
 mod error;
 mod kept;
 mod network;

@@ -1,7 +1,6 @@
 //! Requests over HTTP: one that fails for a moment is sent again.
 
 use crate::backoff::Backoff;
-use crate::date;
 use crate::error::{ClientError, causes};
 use crate::network::Carrier;
 use bagtrack_api::ProblemDocument as Problem;
@@ -15,7 +14,7 @@ use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode, Url};
 use serde::de::Error;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime};
 
 /// Names and values.
 pub type Query = Vec<(&'static str, String)>;
@@ -119,21 +118,18 @@ impl Reply {
 
     /// After how long trying again makes sense: in seconds, or, as proxies tell it, from a date on.
     fn retry_after(&self) -> Option<Duration> {
-        let seconds = self.number(RETRY_AFTER.as_str()).or_else(|| {
+        let seconds = self.number(RETRY_AFTER.as_str());
+        seconds.map(Duration::from_secs).or_else(|| {
             let until = self.date(RETRY_AFTER)?;
             // The clock here may be wrong.
-            let now = self.date(DATE).or_else(|| {
-                let since = SystemTime::now().duration_since(UNIX_EPOCH);
-                since.ok().map(|since| since.as_secs())
-            });
-            Some(until.saturating_sub(now?))
-        });
-        seconds.map(Duration::from_secs)
+            let now = self.date(DATE).unwrap_or_else(SystemTime::now);
+            Some(until.duration_since(now).unwrap_or_default())
+        })
     }
 
     /// The date in this header field.
-    fn date(&self, name: HeaderName) -> Option<u64> {
-        date::seconds(self.headers.get(name)?.to_str().ok()?)
+    fn date(&self, name: HeaderName) -> Option<SystemTime> {
+        httpdate::parse_http_date(self.headers.get(name)?.to_str().ok()?).ok()
     }
 
     /// The number in this header field.
