@@ -56,6 +56,11 @@ async fn serve(mut config: Config, log: &Log) -> Result<(), Box<dyn Error>> {
     confine_decoders(&mut config);
     signals::outlive_file_limit()?;
     let bound = MemoryBound::of(&config);
+    if config.store.lacks_store() {
+        tracing::warn!(
+            "there are settings of a store, and no --store: sessions end with this process"
+        );
+    }
     let (no_auth, listen) = (config.access.no_auth, config.listen);
     let (base_path, ffmpeg) = (config.base_path.clone(), config.limits.ffmpeg.clone());
     // The start may wait for a store, and whoever sends the signal does not know of that.

@@ -35,6 +35,14 @@ impl StoreConfig {
         matches!(self.address(), Some(StoreAddress::File(_)))
     }
 
+    /// Whether there are settings of a store, and no store.
+    pub fn lacks_store(&self) -> bool {
+        let usual = Self::default();
+        let own = (self.durability, self.store_every, &self.store_prefix);
+        let usual = (usual.durability, usual.store_every, &usual.store_prefix);
+        self.store.is_none() && own != usual
+    }
+
     /// Checks the address.
     pub(super) fn check_address(&self) -> Result<(), ConfigError> {
         let held = in_range(

@@ -107,6 +107,20 @@ fn a_variable_that_is_no_setting_is_told_at_the_start() {
     assert_eq!(of("BAGTRACK_MAX_SESSION is no setting"), 1, "{told:?}");
     assert_eq!(of("BAGTRACK_MAX_SESSIONS"), 0, "{told:?}");
     assert_eq!(of("BAGTRACK_SERVICE") + of("BAGTRACK_PORT"), 0, "{told:?}");
+    assert_eq!(of("no --store"), 0, "{told:?}");
+}
+
+#[test]
+fn what_is_set_and_has_no_effect_is_told_at_the_start() {
+    let flags = ["--durability", "each", "--ffmpeg", "true"];
+    let mut service = Program::start(&flags, &[]);
+    let told = service
+        .said()
+        .iter()
+        .any(|line| line.contains("no --store"));
+    assert!(told, "{:?}", service.said());
+    // After it listens, since the program may take its time.
+    service.logs("true (--ffmpeg) is no ffmpeg");
 }
 
 /// It logged hundreds of lines a second, of each attempt to reach it.
