@@ -24,6 +24,8 @@ import { close } from "./frames.js";
  * @returns {Promise<boolean>} Whether it goes on from what was learned before; else from the box alone.
  */
 export async function trackOn(run, known, frame, box, { tell, signal }) {
+  // A box that the run stopped before is older.
+  run.drawn = undefined;
   const object = known ?? run.newObject();
   const draft = object.draft(run.follower());
   await run.alone(async () => {
@@ -152,7 +154,7 @@ export async function goOn(run, source) {
     run.source = run.frames.source = source;
   }
   await run.alone(async () => {
-    run.isResting = false;
+    [run.isResting, run.hasAll, run.failure] = [false, false, undefined];
     for (const object of run.objects) {
       object.follower.end();
       object.follower = run.follower();

@@ -139,7 +139,7 @@ export class Editing {
       this.page.say(done);
       this.page.changed();
     } catch (error) {
-      if (run === this.page.run) this.page.say(words(error, this.page.hasKey), true);
+      if (run === this.page.run) this.page.fail(error, () => this.tracksAgain(run, object, track));
     } finally {
       get("cancel").hidden = true;
       if (run === this.page.run) this.page.repaint();
@@ -161,7 +161,7 @@ export class Editing {
       this.page.repaint();
       this.page.changed();
     } catch (error) {
-      if (run === this.page.run) this.page.fail(error);
+      if (run === this.page.run) this.page.fail(error, () => this.undo());
     }
   }
 

@@ -287,7 +287,6 @@ export class Keeping {
     const canGoOn = run.wake && source.goTo;
     if (run !== this.page.run) return true;
     this.page.enter(canGoOn ? "paused" : "ended");
-    this.page.again = undefined;
     this.page.seen.figures(run);
     this.page.repaint();
     const wanted = source.isLive ? " Pictures of the camera are not kept." : ` Choose ${source.name} to see its pictures.`;

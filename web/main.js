@@ -15,6 +15,7 @@ const keeping = new Keeping(page);
 page.changed = () => keeping.changed();
 page.mayLeave = () => keeping.leave();
 page.arrived = () => keeping.arrived();
+page.letGoOn = () => keeping.letGoOn();
 keeping.begin();
 offerSources(
   (open) => page.choose(open),

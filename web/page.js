@@ -55,7 +55,7 @@ export class Page {
     /** Counts the choices: one that is overtaken by another is dropped. */
     this.choice = 0;
     this.opening = new AbortController();
-    /** @type {(() => void) | undefined} What failed for want of a key. */
+    /** @type {(() => void) | undefined} Makes anew what failed for want of a key. */
     this.again = undefined;
     /** Is told when rows or objects have changed. */
     this.changed = () => {};
@@ -63,6 +63,8 @@ export class Page {
     this.mayLeave = async () => true;
     /** Is told that another source is here, and says what is to be said of the one before it. */
     this.arrived = () => "";
+    /** Lets a run that has stopped go on later. */
+    this.letGoOn = () => {};
     /** @type {State} */
     this.state = "start";
     this.enter("start");
@@ -116,17 +118,29 @@ export class Page {
     this.message.say(text, isBad);
   }
 
-  /** @param {unknown} error */
-  fail(error) {
+  /** @param {unknown} error
+   * @param {() => void} [again] Makes it anew, with a key. */
+  fail(error, again) {
+    this.again = again;
     if (error instanceof Problem && error.slug === "unauthorized") {
       get("key-form").hidden = false;
       get("key").focus();
     }
     this.say(words(error, this.hasKey), true);
-    const hasEnded = this.run?.isOver || (this.run?.isResting && !this.run.wake);
+    const hasEnded = this.run?.isResting && !this.run.wake;
     if (!hasEnded || !this.hasRows) return;
     this.enter("ended");
     this.changed();
+  }
+
+  /** What tracks has failed: one can go on where that stood.
+   * @param {unknown} error */
+  rest(error) {
+    this.letGoOn();
+    this.enter("ended");
+    this.repaint();
+    this.changed();
+    this.fail(error, () => this.player.goOn());
   }
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.
@@ -170,8 +184,7 @@ export class Page {
     } catch (error) {
       if (own !== this.choice) return;
       if (!this.run) this.enter("start");
-      this.fail(error);
-      this.again = () => this.choose(open, resume);
+      this.fail(error, () => this.choose(open, resume));
       if (error instanceof UnplayableError) offerDecoding(this, error.file, resume);
     }
   }
@@ -179,6 +192,7 @@ export class Page {
   reset() {
     this.run?.stop();
     this.run = undefined;
+    this.again = undefined;
     this.frozen = undefined;
     this.isUnsaved = false;
     this.editing.reset();
@@ -192,6 +206,7 @@ export class Page {
     return {
       answer: (picture, answer) => this.answered(picture, answer),
       fail: (error) => this.fail(error),
+      rest: (error) => this.rest(error),
       refuse: (error) => this.editing.refuse(error),
       line: (isUp) => this.message.line(isUp),
       anew: () => this.say("The service had lost the session. It goes on from the last box: draw again if it is off."),
@@ -210,7 +225,6 @@ export class Page {
    */
   async follow(own, box) {
     this.message.follow();
-    this.again = () => this.follow(own, box);
     const { picture } = own;
     await this.beginning.going;
     if (own !== this.run) return;
@@ -224,7 +238,7 @@ export class Page {
     } catch (error) {
       if (own !== this.run) return;
       this.enter("first");
-      this.fail(error);
+      this.fail(error, () => this.follow(own, box));
     }
   }
 

@@ -44,7 +44,7 @@ export class Player {
     } catch (error) {
       if (run !== page.run) return;
       page.enter(state);
-      page.fail(error);
+      page.fail(error, () => this.goOn());
     }
   }
 

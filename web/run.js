@@ -16,7 +16,8 @@ import { FollowedObject } from "./objects.js";
  * @typedef {object} Told
  * @property {(picture: Picture, answer: Answer | undefined) => void} answer A frame is answered: what was answered for the
  *   chosen object.
- * @property {(error: unknown) => void} fail
+ * @property {(error: unknown) => void} fail The source fails: it has no more frames that can be had.
+ * @property {(error: unknown) => void} rest What tracks fails. One can go on where that stood.
  * @property {(error: unknown) => void} refuse A box that was drawn cannot be followed. Nothing has changed.
  * @property {(isUp: boolean) => void} line
  * @property {() => void} anew The service had lost a session: another one goes on from the last box.
@@ -83,12 +84,13 @@ export class Run {
    * @param {Box} box */
   async begin(box) {
     await this.add(box);
-    if (!this.isOver) this.play();
+    if (!this.isResting) this.play();
   }
 
   /** Takes the frames after the last one. */
   play() {
     this.isResting = false;
+    this.sendDrawn();
     const end = () => {
       this.hasAll = true;
       this.checkEnd();
@@ -160,6 +162,7 @@ export class Run {
       if (objects.length > 0 && answers.every((answer) => !answer)) this.skip(picture);
       else this.answered(objects, answers, sent);
     } catch (error) {
+      this.underWay = this.underWay.filter((other) => other !== sent);
       this.fail(error);
     }
   }
@@ -239,7 +242,7 @@ export class Run {
       // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
       const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
       if (isRefused && !this.isOver) this.told.refuse(error);
-      else this.fail(error);
+      else this.fail(error, drawn);
     }
     this.underWay = this.underWay.filter((other) => other !== sent);
     this.throttle();
@@ -276,11 +279,13 @@ export class Run {
     this.told.fail(failure);
   }
 
-  /** @param {unknown} error */
-  fail(error) {
-    if (this.isOver) return;
-    this.stop();
-    this.told.fail(error);
+  /** @param {unknown} error
+   * @param {Run["drawn"]} [drawn] A box that comes again where one goes on. */
+  fail(error, drawn = this.drawn) {
+    if (this.isOver || this.isResting) return;
+    this.drawn = drawn;
+    this.rest();
+    this.told.rest(error);
   }
 
   stop() {

@@ -69,7 +69,6 @@ async function saveVideo(page) {
 async function giveAway(page) {
   const { run } = page;
   if (!run) return;
-  page.again = () => giveAway(page);
   button("hand-over").disabled = true;
   try {
     const handed = await (await modules())[2].handOver(run, await page.service());
@@ -91,7 +90,7 @@ async function giveAway(page) {
             "frame and its boxes instead.",
     );
   } catch (error) {
-    if (run === page.run) page.fail(error);
+    if (run === page.run) page.fail(error, () => giveAway(page));
   }
   if (run === page.run) button("hand-over").disabled = false;
 }

@@ -58,6 +58,36 @@ def service_with_other_keys(checks):
     service.stop()
 
 
+def asked_for_a_key_later(checks):
+    """A service that is started again with keys: once the page has one, what that had stopped goes on where it stood."""
+    service = Service(checks.program)
+    page = checks.page(url=service.url, allowed=("401", "422", "404", "WebSocket", "ERR_CONNECTION", "Failed to load"))
+    truth = checks.clips["card"]["truth"]
+    choose(page, "card")
+    drag(page, truth[0])
+    frames(page, 20)
+    page.locator("#pause").click()
+    before = kept_rows(page)
+    for key, asks in (("0123456789abcdef", "asks for an API key"), ("fedcba9876543210", "does not know this key")):
+        service.stop()
+        service = Service(checks.program, port=service.port, BAGTRACK_API_KEYS=f"page:{key}")
+        if len(before) == len(truth):
+            to_frame(page, 20)
+            drag(page, OFF)
+        said(page, asks)
+        page.locator("#key").fill(key)
+        page.keyboard.press("Enter")
+        if len(before) < len(truth):
+            to_the_end(page)
+            table = rows(page)
+            assert values(table[: len(before)]) == values(before) and len(table) == len(truth), len(table)
+            before = table
+    said(page, "Followed anew from frame 20")
+    assert abs(numbers(rows(page)[20])[0] - OFF[0]) <= 1
+    page.context.close()
+    service.stop()
+
+
 def gone_on_after_a_stop(checks):
     """A stopped run goes on where it was, of a file and of a clip, also after the page was loaded anew."""
     for where, name in (("there", "file"), ("here", "card"), ("here", "again")):
@@ -183,6 +213,7 @@ def played_again(checks):
 ALL = [
     stopped_with_the_service,
     service_with_other_keys,
+    asked_for_a_key_later,
     gone_on_after_a_stop,
     stopped_after_a_reload,
     failed_after_it_was_left,
