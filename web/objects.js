@@ -18,6 +18,8 @@ import { Problem } from "./js/problem.js";
 export const MOST_OBJECTS = 16;
 /** Frames after which the state is saved, so that one can go on from there. */
 export const SAVE_EVERY = 30;
+/** Most states of an object, of 70 kB each. */
+const MOST_SAVES = 128;
 /** Told apart on any picture, together with the dark line around them. */
 const COLORS = [
   ...["#3ddc97", "#ffb000", "#5aa9ff", "#ff6b9d", "#c9a0ff", "#f4f165", "#ff8a5c", "#45e0e0"],
@@ -29,6 +31,19 @@ const COLORS = [
  * @returns {undefined} */
 function refusedState(error) {
   if (!(error instanceof Problem && error.slug === "invalid-snapshot")) throw error;
+}
+
+/** Gives up states where there are too many. What is left lies closer the nearer the last frame is: from there on frames
+ * are tracked again after a correction, and those after a state before it come on top.
+ * @param {import("./kept.js").State[]} saves */
+function thin(saves) {
+  const at = (/** @type {number} */ index) => saves[index].after ?? 0;
+  while (saves.length > MOST_SAVES) {
+    const cost = (/** @type {number} */ index) => (at(index + 1) - at(index - 1)) / (at(saves.length - 1) - at(index));
+    let least = 1;
+    for (let index = 2; index < saves.length - 1; index += 1) if (cost(index) < cost(least)) least = index;
+    saves.splice(least, 1);
+  }
 }
 
 export class FollowedObject {
@@ -79,6 +94,7 @@ export class FollowedObject {
       .catch(() => undefined);
     // Meanwhile it may have gone back to an earlier frame.
     if (bytes && frames === this.frames) this.saves.push({ bytes, frames, after });
+    thin(this.saves);
   }
 
   /** The same object in another session: what is tracked with it counts when it is adopted.
@@ -97,7 +113,7 @@ export class FollowedObject {
     this.sort();
     if (until < Infinity) {
       this.saves = [...draft.saves, ...this.saves.filter(({ after = -1 }) => after >= until)];
-      return;
+      return thin(this.saves);
     }
     this.follower.end();
     [this.follower, this.frames, this.saves] = [draft.follower, draft.frames, draft.saves];

@@ -204,6 +204,31 @@ def undone_without_the_service(checks):
     service.stop()
 
 
+LONG = """async (length) => {
+    const { FollowedObject } = await import("/page/objects.js");
+    const object = new FollowedObject(0, { save: async () => new Uint8Array(1) });
+    for (let frame = 0; frame < length; frame += 1) {
+        object.note({ frame });
+        await 0;
+    }
+    await new Promise((resolve) => setTimeout(resolve));
+    return object.saves.map(({ after }) => after);
+}"""
+
+
+def states_of_a_long_video(checks):
+    """Of the states of a long video so many are kept as memory allows, and one before each frame that may be corrected:
+    what is tracked again to come to it is little beside what is tracked again after it."""
+    page = checks.page()
+    length = 20_000
+    states = page.evaluate(LONG, length)
+    assert len(states) <= 200, len(states)
+    assert states[0] < 30 and states[-1] >= length - 30
+    for state, following in zip(states, states[1:]):
+        assert following - state <= max(30, (length - state) / 10), (state, following)
+    page.context.close()
+
+
 def box_at_the_edge(checks):
     """Arrows move a box to the edge of the picture and no further, and a paused run goes on after it."""
     page = checks.page(where="here")
@@ -260,6 +285,7 @@ ALL = [
     undone_after_more_frames,
     deletion_undone,
     undone_without_the_service,
+    states_of_a_long_video,
     box_at_the_edge,
     refused_box,
 ]
