@@ -234,7 +234,7 @@ export class Page {
       if (picture !== own.picture) own.picture = (await own.source.goTo?.(picture.time, picture.frame)) ?? picture;
       if (this.frozen) own.picture = await this.frozen;
       await own.begin(box);
-      if (own === this.run) this.say(FOLLOWING);
+      if (own === this.run && this.state === "following") this.say(FOLLOWING);
     } catch (error) {
       if (own !== this.run) return;
       this.enter("first");
