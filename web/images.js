@@ -1,5 +1,6 @@
 // Images as the frames of a video, in the order of their names.
 
+import { UnplayableError } from "./problems.js";
 import { LONGEST_SIDE, drawScaled, encoded } from "./source.js";
 import { Stills } from "./stills.js";
 
@@ -35,6 +36,53 @@ async function timesIn(images) {
     times.push(time);
   }
   return times;
+}
+
+/** Formats with animations, by the endings of names. */
+const ANIMATED = /(gif|webp|png|avif)$/i;
+/** Two of these begin frames of a GIF. */
+const GIF_FRAMES = /\x00!\xf9\x04.{4}\x00[,!].*\x00!\xf9\x04.{4}\x00[,!]/s;
+/** How long a frame is shown, in microseconds: as browsers do where it has no time, or up to 10 ms.
+ * @param {VideoFrame | undefined} frame */
+const shownFor = (frame) => (Number(frame?.duration) > 1e4 ? Number(frame?.duration) : 1e5);
+
+/** An animation, whose frames have times of their own; nothing where a file is a still image.
+ * @param {File} file
+ * @returns {Promise<import("./source.js").Source | undefined>} */
+export async function openAnimated(file) {
+  const format = ANIMATED.exec(file.type || file.name)?.[0].toLowerCase();
+  if (!format) return undefined;
+  const data = await file.arrayBuffer();
+  // Pages that came over plain http are not given it.
+  if (typeof ImageDecoder === "undefined") {
+    if (GIF_FRAMES.test(new TextDecoder("latin1").decode(data))) throw new UnplayableError(file);
+    return undefined;
+  }
+  const decoder = new ImageDecoder({ data, type: `image/${format}` });
+  await Promise.all([decoder.tracks.ready, decoder.completed]).catch(() => undefined);
+  const count = decoder.tracks.selectedTrack?.frameCount ?? 0;
+  /** @type {Blob[]} Of damaged frames there is none. Some browsers give a frame only once: asked again, it is closed. */
+  const blobs = [];
+  const source = new Stills(file.name, FRAMES_A_SECOND, async (index) => blobs[index]);
+  source.times = [];
+  for (let index = 0, time = 0; count > 1 && index < count; index += 1) {
+    const decoded = await decoder.decode({ frameIndex: index }).catch(() => undefined);
+    const frame = decoded?.image;
+    source.times.push(time / 1e6);
+    time += shownFor(frame);
+    if (!frame) continue;
+    if (!source.size.width) source.size = { width: frame.displayWidth, height: frame.displayHeight };
+    blobs[index] = await encoded(drawScaled(frame, source.size));
+    frame.close();
+  }
+  decoder.close();
+  if (count < 2) return undefined;
+  const picture = source.picture.bind(source);
+  source.picture = async (index) => (blobs[index] ? picture(index) : undefined);
+  source.count = count;
+  source.rate = (count - 1) / source.duration;
+  source.files = [file];
+  return source;
 }
 
 /** @param {File[]} files Images, all of one size.

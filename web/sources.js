@@ -14,9 +14,12 @@ const modules = () =>
  * @param {string[]} [names] Of images that have been opened before.
  * @returns {Promise<Source>} */
 export async function openFiles(files, names) {
-  const [{ openVideo }, { isImage, openImages }] = await modules();
+  const [{ openVideo }, { isImage, openAnimated, openImages }] = await modules();
   const video = files.find((file) => file.type.startsWith("video/"));
-  if (!video && files.some(isImage)) return openImages(files, names);
+  if (!video && files.some(isImage)) {
+    const animated = files.length === 1 && !names ? await openAnimated(files[0]) : undefined;
+    return animated ?? openImages(files, names);
+  }
   const file = video ?? files[0];
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
   return openVideo(file, get("stage")).catch((error) => {

@@ -199,6 +199,27 @@ def decoded_by_the_service(checks):
         page.context.close()
 
 
+def frames_of_a_gif(checks):
+    """An animation is tracked frame by frame, each at its own time: three of seven are missing after a while."""
+    selected = "(gt(mod(n,7),2)+lt(n,20))*lt(n,34)"
+    numbers = [n for n in range(34) if n % 7 > 2 or n < 20]
+    path = checks.files.file("clip.gif", 25, (), selected, "scale=528:396")
+    page = checks.page(where="here")
+    choose_file(page, path)
+    half = lambda box: [value / 2 for value in box]
+    drag(page, half(checks.files.truth[0]))
+    to_the_end(page)
+    table = rows(page)
+    told = [float(row["time"]) for row in table]
+    assert len(told) == len(numbers) and max(map(abs, map(float.__sub__, told, times_of(path)))) < 0.0015, told
+    check_distance(path, table, [half(checks.files.truth[number]) for number in numbers])
+    page.locator("#kept-text").filter(has_text=f"{len(numbers)} rows").wait_for()
+    page.reload()
+    said(page, "clip.gif is here again")
+    assert rows(page) == table
+    page.context.close()
+
+
 def no_video_at_all(checks):
     """What neither the browser nor the service can read is refused with a reason, and the page goes on."""
     page = checks.page(where="here", allowed=("Failed to load",))
@@ -322,5 +343,6 @@ ALL = [
     recorded_in_a_browser,
     begun_in_the_middle,
     decoded_by_the_service,
+    frames_of_a_gif,
     no_video_at_all,
 ]
