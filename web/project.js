@@ -124,7 +124,8 @@ export async function projectIn(files) {
  * @param {Project} project */
 export function unlike({ name, size, count = Infinity }, { video, objects }) {
   const pixels = `${name} has ${size.width} × ${size.height} pixels`;
-  const last = Math.max(...objects.flatMap(({ rows }) => rows.map(([frame]) => frame)));
+  // More rows than a call takes arguments.
+  const last = objects.flatMap(({ rows }) => rows).reduce((last, [frame]) => Math.max(last, frame), 0);
   if (size.width !== video.width || size.height !== video.height) {
     return `${pixels}, the video of this project (${video.name}) ${video.width} × ${video.height}: it is another one.`;
   }

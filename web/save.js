@@ -77,7 +77,7 @@ function inside({ source: { size } }, { x, y, width, height, status }) {
   return { left, top, width: right - left, height: bottom - top };
 }
 
-/** The numbers of the frames that were tracked.
+/** The numbers of the frames that were tracked, ascending.
  * @param {Run} run */
 const tracked = (run) => [...new Set(flat(run).map(({ frame }) => frame))];
 
@@ -156,8 +156,7 @@ function keyFrame({ box }, frame, isOutside) {
  * @param {Run} run */
 function cvat(run) {
   const { video, video_width: width, video_height: height } = about(run);
-  const rows = flat(run);
-  const size = Math.max(...rows.map(({ frame }) => frame)) + 1;
+  const size = Number(tracked(run).pop()) + 1;
   const labels = classesOf(run).map((name) => `<label><name>${escaped(name)}</name><attributes></attributes></label>`);
   const tracks = run.objects.map((object) => {
     const { number, rows: own } = object;
@@ -203,7 +202,7 @@ function sequenceOf(run, rows) {
 /** Label Studio: a task with a video, and a region of it for each object. Frames count from 1, boxes are in percent.
  * @param {Run} run */
 function labelStudio(run) {
-  const last = Math.max(...tracked(run));
+  const last = Number(tracked(run).pop());
   const rate = run.source.rate ?? 25;
   const result = run.objects.map((object) => ({
     id: `object-${object.number + 1}`,

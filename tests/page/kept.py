@@ -293,6 +293,27 @@ def half_tracked_project(checks):
     page.context.close()
 
 
+MANY = 10_000
+"""Frames, each with a row of 16 objects: more rows than arguments that a browser takes."""
+
+
+def project_of_many_rows(checks):
+    """A project of a long video with many objects is opened, saved, and compared with its video."""
+    row = lambda frame: [frame, frame / 30, 10, 10, 20, 20, 0.9, "tracking", int(frame == 0)]
+    made = lambda number: {"number": number, "name": "", "color": "#ffb000", "shown": True, "rows": list(map(row, range(MANY)))}
+    video = {"name": "clip.mp4", "width": 1056, "height": 792, "rate": 30}
+    project = {"bagtrack_project": 1, "video": video, "ended": True, "skipped": 0, "objects": list(map(made, range(16)))}
+    path = checks.files.folder / "many.bagtrack.json"
+    path.write_text(json.dumps(project))
+    page = checks.page(where="here")
+    page.locator("#file").set_input_files(path)
+    said(page, f"with {MANY} frames")
+    assert f"<size>{MANY}</size>".encode() in saved(page, "#save-cvat")
+    page.locator("#file").set_input_files([path, checks.files.file("clip.mp4", 30, H264)])
+    said(page, f"clip.mp4 has {FRAMES} frames, and this project (clip.mp4) a box in frame {MANY - 1}")
+    page.context.close()
+
+
 def last_object_deleted(checks):
     """Nothing is told and kept of an object that was deleted."""
     page = checks.page(where="here")
@@ -360,6 +381,7 @@ def project_without_its_video(checks):
 
 ALL = [
     half_tracked_project,
+    project_of_many_rows,
     last_object_deleted,
     video_made_of_another_run,
     reloaded_in_the_middle,
