@@ -13,8 +13,9 @@ import { openFiles } from "./sources.js";
  * @typedef {import("./source.js").Source} Source
  */
 
-/** Milliseconds after a change until it is kept. */
+/** Milliseconds after a change until it is kept, and one more for so many rows: all of them are written each time. */
 const AFTER = 1000;
+const ROWS = 10;
 const CLIPS = ["card", "leaves"];
 /** @type {Promise<typeof import("./project.js")> | undefined} */
 let loaded;
@@ -53,7 +54,8 @@ export class Keeping {
   /** Keeps what is here, in a moment. */
   changed() {
     this.isSafe = false;
-    this.timer ??= setTimeout(() => this.keep(), AFTER);
+    const rows = this.page.run?.objects.reduce((sum, object) => sum + object.rows.size, 0) ?? 0;
+    this.timer ??= setTimeout(() => this.keep(), AFTER + rows / ROWS);
   }
 
   /** @returns {Promise<boolean>} Whether all of what was here is kept. */
