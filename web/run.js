@@ -230,7 +230,7 @@ export class Run {
     const { box, object } = drawn;
     const sent = { picture, at: performance.now() };
     this.underWay.push(sent);
-    this.drawn = undefined;
+    let isLeft = false;
     try {
       if (!object) await this.add(box);
       const answer = await object?.follower.track(picture, { box });
@@ -238,14 +238,19 @@ export class Run {
         this.note(object, answer, picture, true);
         this.told.answer(picture, answer);
       }
+      isLeft = this.isResting && object !== undefined && !answer;
     } catch (error) {
       // An object that cannot be added, or a box that cannot be followed, is no end of what is followed.
       const isRefused = !object || (error instanceof Problem && error.slug === "invalid-box");
       if (isRefused && !this.isOver) this.told.refuse(error);
-      else this.fail(error, drawn);
+      else this.fail(error);
+      isLeft = !isRefused;
     }
     this.underWay = this.underWay.filter((other) => other !== sent);
-    this.throttle();
+    // Until here no frame is sent: a new object would not know it. What is left comes again where one goes on.
+    if (this.drawn === drawn && !isLeft) this.drawn = undefined;
+    if (isLeft) this.throttle();
+    else this.sendDrawn();
     this.checkEnd();
   }
 
@@ -279,11 +284,9 @@ export class Run {
     this.told.fail(failure);
   }
 
-  /** @param {unknown} error
-   * @param {Run["drawn"]} [drawn] A box that comes again where one goes on. */
-  fail(error, drawn = this.drawn) {
+  /** @param {unknown} error */
+  fail(error) {
     if (this.isOver || this.isResting) return;
-    this.drawn = drawn;
     this.rest();
     this.told.rest(error);
   }

@@ -55,6 +55,7 @@ export class Undoing {
  * @param {Step} step
  */
 async function bringBack(run, object, { rows = new Map(), saves, last, follower, deleted }) {
+  run.drawn = undefined;
   await run.alone(async () => {
     const isSame = object.follower === follower;
     // A run that goes on later catches up then, unless rows follow from what is undone.

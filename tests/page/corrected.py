@@ -229,6 +229,25 @@ def states_of_a_long_video(checks):
     page.context.close()
 
 
+def added_over_a_slow_line(checks):
+    """While the session of an object that is added is opened, no frame goes past it: it has a row of each from its box on."""
+    page = checks.page()
+    last = len(paused_clip(page, checks.clips["card"]["truth"])) - 1
+    held = []
+    opening = "**/sessions/*?*box=*"
+    page.route(opening, lambda route: held.append(route))
+    page.locator("#add").click()
+    with page.expect_request(opening):
+        drag(page, OFF)
+    page.locator("#pause").click()
+    # Time in which frames would go past it.
+    page.wait_for_timeout(1000)
+    held[0].continue_()
+    to_the_end(page)
+    assert [int(row["frame"]) for row in of_target(rows(page), 1)] == list(range(last, 150))
+    page.context.close()
+
+
 def box_at_the_edge(checks):
     """Arrows move a box to the edge of the picture and no further, and a paused run goes on after it."""
     page = checks.page(where="here")
@@ -286,6 +305,7 @@ ALL = [
     deletion_undone,
     undone_without_the_service,
     states_of_a_long_video,
+    added_over_a_slow_line,
     box_at_the_edge,
     refused_box,
 ]
