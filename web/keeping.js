@@ -3,7 +3,7 @@
 
 import { get, input } from "./dom.js";
 import { again } from "./editing.js";
-import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepWork, keptFiles, keptWork } from "./kept.js";
+import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
 import { openFiles } from "./sources.js";
 
 /**
@@ -26,8 +26,6 @@ const projects = () =>
     throw error;
   }));
 const openClip = async (/** @type {string} */ name) => (await import("./clip.js")).openClip(name);
-/** What the tab has open, also after it was loaded anew. */
-const OWN = "work";
 
 export class Keeping {
   /** @param {import("./page.js").Page} page */
@@ -152,7 +150,7 @@ export class Keeping {
     else giveUp(this.id);
     this.id = id;
     claim(id);
-    sessionStorage.setItem(OWN, id);
+    setOwnWork(id);
     this.tell("");
     this.offer();
     return this.left && ` ${this.left} is kept: below you can go on with it.`;
@@ -160,13 +158,13 @@ export class Keeping {
 
   /** Brings back what this tab had; offers what others left. */
   async begin() {
-    const own = sessionStorage.getItem(OWN);
+    const own = ownWork();
     // A tab that was duplicated has it open.
     const kept = own && (await claim(own)) ? await keptWork(own).catch(() => undefined) : undefined;
     if (kept && this.page.state === "start") return this.bringBack(kept, true);
     if (own && own !== this.id) {
       giveUp(own);
-      if (sessionStorage.getItem(OWN) === own) sessionStorage.removeItem(OWN);
+      if (ownWork() === own) setOwnWork("");
     }
     await this.offer();
   }

@@ -20,6 +20,8 @@
  */
 
 const NAME = "bagtrack";
+/** What the tab has open, also after it was loaded anew. */
+const OWN = "work";
 const STORE = "kept";
 /** Larger files are not copied. */
 export const MOST_BYTES = 512 << 20;
@@ -109,6 +111,25 @@ export async function freeWorks() {
   const isLeft = (/** @type {Kept} */ { at }, /** @type {number} */ index) => index < MOST && Date.now() - at < OLDEST;
   await Promise.all(free.filter((work, index) => !isLeft(work, index)).map(({ id }) => forget(id)));
   return free.filter(isLeft);
+}
+
+/** The entry that this tab has open; empty where there is none, or where the browser keeps nothing for pages. */
+export function ownWork() {
+  try {
+    return sessionStorage.getItem(OWN) ?? "";
+  } catch {
+    return "";
+  }
+}
+
+/** @param {string} id Empty where there is none any more. */
+export function setOwnWork(id) {
+  try {
+    if (id) sessionStorage.setItem(OWN, id);
+    else sessionStorage.removeItem(OWN);
+  } catch {
+    // It is not found again after the page is loaded anew.
+  }
 }
 
 /** Earlier versions of the page had one entry for all tabs. */

@@ -314,6 +314,25 @@ def project_of_many_rows(checks):
     page.context.close()
 
 
+REFUSED = """for (const name of ["sessionStorage", "localStorage", "indexedDB"]) {
+    Object.defineProperty(window, name, { get() { throw new DOMException("", "SecurityError"); } });
+}"""
+
+
+def nothing_may_be_kept(checks):
+    """A browser whose user lets pages keep nothing tracks all the same, and the page says that nothing is kept."""
+    page = checks.page(where="here")
+    page.context.add_init_script(REFUSED)
+    page.reload()
+    page.locator("#here").evaluate("button => button.click()")
+    choose(page, "card")
+    drag(page, checks.clips["card"]["truth"][0])
+    to_the_end(page)
+    kept_says(page, "The browser keeps nothing of this")
+    assert len(rows(page)) == 150
+    page.context.close()
+
+
 def last_object_deleted(checks):
     """Nothing is told and kept of an object that was deleted."""
     page = checks.page(where="here")
@@ -382,6 +401,7 @@ def project_without_its_video(checks):
 ALL = [
     half_tracked_project,
     project_of_many_rows,
+    nothing_may_be_kept,
     last_object_deleted,
     video_made_of_another_run,
     reloaded_in_the_middle,
