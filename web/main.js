@@ -74,7 +74,7 @@ get("key-form").addEventListener("submit", async (event) => {
   (await page.service()).key = input("key").value;
   page.hasKey = true;
   get("key-form").hidden = true;
-  page.say("");
+  page.say(page.again ? "" : "Choose the video or the camera again.");
   page.again?.();
 });
 addEventListener("beforeunload", (event) => {

@@ -140,7 +140,7 @@ export class Page {
     this.enter("ended");
     this.repaint();
     this.changed();
-    this.fail(error, () => this.player.goOn());
+    this.fail(error, this.canGoOn ? () => this.player.goOn() : undefined);
   }
 
   /** Shows the first frame of a source and asks for a box. What was there before stays until then.
