@@ -61,7 +61,7 @@ export async function openAnimated(file) {
   const decoder = new ImageDecoder({ data, type: `image/${format}` });
   await Promise.all([decoder.tracks.ready, decoder.completed]).catch(() => undefined);
   const count = decoder.tracks.selectedTrack?.frameCount ?? 0;
-  /** @type {Blob[]} Of damaged frames there is none. Some browsers give a frame only once: asked again, it is closed. */
+  /** @type {Blob[]} Of damaged frames there is none. Some browsers give a frame only once: then it is closed. */
   const blobs = [];
   const source = new Stills(file.name, FRAMES_A_SECOND, async (index) => blobs[index]);
   source.times = [];

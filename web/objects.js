@@ -33,8 +33,8 @@ function refusedState(error) {
   if (!(error instanceof Problem && error.slug === "invalid-snapshot")) throw error;
 }
 
-/** Gives up states where there are too many. What is left lies closer the nearer the last frame is: from there on frames
- * are tracked again after a correction, and those after a state before it come on top.
+/** Gives up states where there are too many. What is left lies closer the nearer the last frame is: the frames after a
+ * correction are tracked again, and those from a state to it come on top.
  * @param {import("./kept.js").State[]} saves */
 function thin(saves) {
   const at = (/** @type {number} */ index) => saves[index].after ?? 0;

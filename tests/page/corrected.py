@@ -230,7 +230,7 @@ def states_of_a_long_video(checks):
 
 
 def added_over_a_slow_line(checks):
-    """While the session of an object that is added is opened, no frame goes past it: it has a row of each from its box on."""
+    """No frame goes past an object while its session is opened: it has a row of each frame from its box on."""
     page = checks.page()
     last = len(paused_clip(page, checks.clips["card"]["truth"])) - 1
     held = []

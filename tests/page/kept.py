@@ -300,9 +300,10 @@ MANY = 10_000
 def project_of_many_rows(checks):
     """A project of a long video with many objects is opened, saved, and compared with its video."""
     row = lambda frame: [frame, frame / 30, 10, 10, 20, 20, 0.9, "tracking", int(frame == 0)]
-    made = lambda number: {"number": number, "name": "", "color": "#ffb000", "shown": True, "rows": list(map(row, range(MANY)))}
+    table = [row(frame) for frame in range(MANY)]
+    objects = [{"number": at, "name": "", "color": "#ffb000", "shown": True, "rows": table} for at in range(16)]
     video = {"name": "clip.mp4", "width": 1056, "height": 792, "rate": 30}
-    project = {"bagtrack_project": 1, "video": video, "ended": True, "skipped": 0, "objects": list(map(made, range(16)))}
+    project = {"bagtrack_project": 1, "video": video, "ended": True, "skipped": 0, "objects": objects}
     path = checks.files.folder / "many.bagtrack.json"
     path.write_text(json.dumps(project))
     page = checks.page(where="here")

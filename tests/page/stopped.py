@@ -59,7 +59,7 @@ def service_with_other_keys(checks):
 
 
 def asked_for_a_key_later(checks):
-    """A service that is started again with keys: once the page has one, what that had stopped goes on where it stood."""
+    """A service is started again with keys: once the page has one, what that had stopped goes on where it stood."""
     service = Service(checks.program)
     page = checks.page(url=service.url, allowed=("401", "422", "404", "WebSocket", "ERR_CONNECTION", "Failed to load"))
     truth = checks.clips["card"]["truth"]
