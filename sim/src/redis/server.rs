@@ -9,6 +9,9 @@ use redis::{ErrorKind, RedisError, RedisResult, Value};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+/// What the heads of records begin with (docs/RELIABILITY.md): replicas of other versions go by it.
+const HEAD_FORMAT: u8 = 2;
+
 /// The server. Clones are the same.
 #[derive(Debug, Clone)]
 pub struct Server {
@@ -63,6 +66,11 @@ impl Server {
             };
             if let (Some(frame), Some(checkpoint)) = (field("frame"), field("checkpoint")) {
                 self.journal.stored(id, frame, checkpoint);
+            }
+            let head = shared.keyspace.field(keys[0].as_bytes(), "head");
+            if head.is_some_and(|head| head.first() != Some(&HEAD_FORMAT)) {
+                let fault = format!("the record of {id} does not begin with its format");
+                self.journal.fault(fault);
             }
         }
         answer.map_err(refusal)
