@@ -3,8 +3,8 @@
 
 import { get, input } from "./dom.js";
 import { again } from "./editing.js";
-import { MOST_BYTES, claim, forget, freeWorks, giveUp, keepWork, keptFiles, keptWork } from "./kept.js";
-import { ownWork, setOwnWork } from "./kept.js";
+import { MOST_BYTES, claim, forget, freeWorks, giveUp } from "./kept.js";
+import { keepWork, keptFiles, keptWork, ownWork, setOwnWork } from "./kept.js";
 import { openFiles } from "./sources.js";
 
 /**
