@@ -329,8 +329,8 @@ async function wake(run, open) {
     if (run.wake || run.isOver) return source === run.source ? undefined : source.stop();
     await (await again()).goOn(run, source);
   } catch (error) {
-    // It can be tried again.
-    run.wake = own;
+    // It can be tried again; where the run has failed meanwhile, with the source opened anew.
+    run.wake ??= own;
     run.isResting = true;
     throw error;
   }

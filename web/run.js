@@ -131,6 +131,7 @@ export class Run {
     object.follower.end();
     this.objects = this.objects.filter((other) => other !== object);
     if (this.chosen === object) this.chosen = this.objects[0];
+    if (this.drawn?.object === object) this.drawn = undefined;
   }
 
   follower() {

@@ -67,10 +67,10 @@ export class FrameStream {
     this.waiting = [];
     /** How many of those that wait are on their way. */
     this.sent = 0;
-    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
-    this.reading = undefined;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
     this.outOfOrder = 0;
+    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
+    this.reading = undefined;
     /** @type {WebSocket | undefined} */
     this.socket = undefined;
     /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */

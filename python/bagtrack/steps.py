@@ -67,9 +67,12 @@ def date(said: str) -> Optional[datetime]:
 
 @dataclass(frozen=True)
 class Pause:
-    """Wait for so many seconds."""
+    """Wait for so many seconds, eleven days at most: timers take no years."""
 
     seconds: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seconds", min(self.seconds, 1e6))
 
 
 @dataclass(frozen=True)

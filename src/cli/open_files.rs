@@ -1,9 +1,10 @@
 //! The system's limit of open files against what the settings need.
 
 use bagtrack::http::Config;
+use bagtrack_config::PROBE_CONNECTIONS;
 
-/// Files that are open beside connections: the log, the listener, the runtime's own, connections for probes alone.
-const OTHERS: usize = 96;
+/// Files that are open beside connections: the log, the listener, the runtime's own.
+const OTHERS: usize = 64 + PROBE_CONNECTIONS;
 
 /// Raises the soft limit of open files as far as `config` needs and the hard limit allows. Where that is not enough,
 /// lowers the number of connections, and says so: without it, new connections would wait unanswered.

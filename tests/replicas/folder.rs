@@ -110,7 +110,7 @@ impl Limited {
     fn start(store: &str) -> Self {
         let mut command = serve(&program("bagtrack"));
         command.args(["--workers", "2", "--store", store]);
-        Self(Program::spawn(command.args(SECRET)).expect("there is a shell"))
+        Self(Program::spawn(command.args(SECRET)).expect("it listens"))
     }
 
     /// None is no limit.

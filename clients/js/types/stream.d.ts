@@ -47,10 +47,10 @@ export declare class FrameStream {
     waiting: Waiting[];
     /** How many of those that wait are on their way. */
     sent: number;
-    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
-    reading: Waiting | undefined;
     /** How many of those have a number that is not theirs any more, since a frame before them was refused. */
     outOfOrder: number;
+    /** @type {Waiting | undefined} Whose frame is being read: the next one to be sent. */
+    reading: Waiting | undefined;
     /** @type {WebSocket | undefined} */
     socket: WebSocket | undefined;
     /** @type {ReturnType<typeof setTimeout> | undefined} Ends a line that is silent. */

@@ -26,7 +26,7 @@ pub use flag_values::{parse_duration, parse_listen};
 #[cfg(feature = "jwt")]
 pub use jwt::JwtConfig;
 pub use limits::{LimitsConfig, OFF};
-pub use memory_bound::{MAX_BUFFER_BYTES, MemoryBound};
+pub use memory_bound::{MAX_BUFFER_BYTES, MemoryBound, PROBE_CONNECTIONS};
 pub use service::Config;
 pub use settings::{ConfigError, Secret};
 pub use store::StoreConfig;

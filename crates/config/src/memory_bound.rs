@@ -10,6 +10,9 @@ use bagtrack_tracker::MAX_WORKING_SIDE;
 
 /// Most bytes that a connection keeps of what it read, and of what it is to write. A stream's buffers take their place.
 pub const MAX_BUFFER_BYTES: usize = 64 << 10;
+/// Connections beside `max_connections` on which addresses that have no more of those are asked for their health, and
+/// refused the rest.
+pub const PROBE_CONNECTIONS: usize = 32;
 /// The program, its tables, the log's queue, and what the allocator keeps for itself.
 const PROGRAM: u64 = 96 << 20;
 /// What a worker keeps from frame to frame: buffers of the decoder and the tracker's workspace.
@@ -60,7 +63,8 @@ impl MemoryBound {
             work: (workers.saturating_mul(2).saturating_mul(frame))
                 .saturating_add(threads.saturating_mul(thread)),
             sessions: count(config.session_bytes()),
-            connections: count(config.max_connections).saturating_mul(connection(config)),
+            connections: count(config.max_connections.saturating_add(PROBE_CONNECTIONS))
+                .saturating_mul(connection(config)),
             store: if config.store.is_in_folder() {
                 FILE_STORE
             } else {

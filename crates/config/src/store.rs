@@ -38,9 +38,11 @@ impl StoreConfig {
     /// Whether there are settings of a store, and no store.
     pub fn lacks_store(&self) -> bool {
         let usual = Self::default();
-        let own = (self.durability, self.store_every, &self.store_prefix);
-        let usual = (usual.durability, usual.store_every, &usual.store_prefix);
-        self.store.is_none() && own != usual
+        let of = |it: &Self| {
+            let prefix = it.store_prefix.clone();
+            (it.durability, it.store_every, it.store_timeout, prefix)
+        };
+        self.store.is_none() && of(self) != of(&usual)
     }
 
     /// Checks the address.

@@ -15,9 +15,9 @@ use axum::Router;
 use bagtrack_access::JwtError;
 use bagtrack_access::{Access, AccessError, ApiKeys};
 use bagtrack_cli::ModelFiles;
-use bagtrack_config::Config;
 #[cfg(feature = "tls")]
 use bagtrack_config::TlsConfig;
+use bagtrack_config::{Config, PROBE_CONNECTIONS};
 #[cfg(feature = "tls")]
 use bagtrack_net::{Certificate, CertificateError};
 use bagtrack_net::{ConnectionHold, Connections, NoRoom, Security, is_trusted};
@@ -38,10 +38,7 @@ use tokio::sync::watch;
 const MAX_UNSENT: u32 = 64 << 10;
 /// How long to wait before looking for room again.
 const RETRY: Duration = Duration::from_millis(100);
-/// Connections beside the others on which addresses that have no more of those are asked for their health, and refused the
-/// rest.
-const PROBE_CONNECTIONS: usize = 32;
-/// Most of these of one address.
+/// Most connections for probes alone of one address.
 const PROBE_CONNECTIONS_OF_ADDRESS: usize = 8;
 
 /// How a service ends.

@@ -24,7 +24,7 @@ use tokio::net::TcpStream;
 use tokio::task::yield_now;
 
 /// How long a connection that is for probes alone may take to begin: others wait for its place.
-const PROBE_TIMEOUT: Duration = Duration::from_secs(1);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How all connections of a service are served.
 #[derive(Debug)]

@@ -1,4 +1,5 @@
-//! The answer to a connection over its address's share, which is written before any request is read.
+//! The answer to a connection over its address's share where none is left for probes either: it is written before any
+//! request is read.
 
 use crate::http::metrics::registry::Metrics;
 use crate::http::middleware::security_headers::{HEADERS, STRICT};

@@ -15,13 +15,22 @@ pub fn correction(header: &FrameHeader) -> Option<GivenBox> {
 }
 
 /// What `later` says of a frame, and what `earlier` said beside it.
-pub fn merged(earlier: FrameHeader, later: FrameHeader) -> FrameHeader {
-    FrameHeader {
+///
+/// # Errors
+/// They are about two targets.
+pub fn merged(earlier: FrameHeader, later: FrameHeader) -> Result<FrameHeader, Problem> {
+    let is_of_target = |header: &FrameHeader| header.rect.is_some() || header.see;
+    let target = |header: &FrameHeader| header.target.unwrap_or(0);
+    if is_of_target(&earlier) && is_of_target(&later) && target(&earlier) != target(&later) {
+        let detail = "The texts before this frame name two targets; a frame takes one.";
+        return Err(Problem::malformed(detail));
+    }
+    Ok(FrameHeader {
         frame: later.frame.or(earlier.frame),
         rect: later.rect.or(earlier.rect),
         target: later.target.or(earlier.target),
         see: later.see || earlier.see,
-    }
+    })
 }
 
 /// Reads a text message.

@@ -186,7 +186,7 @@ impl SessionStream {
             Some(Ok(Message::Text(text))) => {
                 drop(socket.get_mut().take_charge());
                 let earlier = std::mem::replace(header, Ok(FrameHeader::default()));
-                let merged = |earlier| Ok(message::merged(earlier, message::parse(&text)?));
+                let merged = |earlier| message::merged(earlier, message::parse(&text)?);
                 *header = earlier.and_then(merged);
             }
             Some(Ok(Message::Binary(file))) => {

@@ -54,11 +54,13 @@ async fn a_box_before_a_frame_corrects_the_target() {
         (Some(1), Some(1.0))
     );
     assert_eq!(stream.message().await["frame"], 2);
-    // What cannot be read is told, whatever comes after it.
-    stream.say(r#"{"box": 1}"#).await;
-    stream.say(r#"{"see": true}"#).await;
-    stream.send(pictures::png(3)).await;
-    assert_eq!(problem_slug(&stream.message().await), "malformed-request");
+    // What cannot be read is told, whatever comes after it, and so are two targets of one frame.
+    for earlier in [r#"{"box": 1}"#, r#"{"see": true, "target": 1}"#] {
+        stream.say(earlier).await;
+        stream.say(r#"{"box": [22, 16, 16, 12]}"#).await;
+        stream.send(pictures::png(3)).await;
+        assert_eq!(problem_slug(&stream.message().await), "malformed-request");
+    }
 }
 
 #[tokio::test]
