@@ -601,7 +601,10 @@ fn the_decoder_of_the_program_may_read_no_other_file_and_open_no_socket() {
 async fn a_program_whose_file_was_removed_decodes_videos() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("bagtrack");
-    std::fs::copy(bagtrack_testing::command::program("bagtrack"), &own).unwrap();
+    // A process of its own: where this one wrote the file, one that another test begins meanwhile would hold it open.
+    let program = bagtrack_testing::command::program("bagtrack");
+    let copied = Command::new("cp").arg(program).arg(&own).status();
+    assert!(copied.unwrap().success());
     let (service, client) = (Program::spawn(&mut serve(&own)).unwrap(), Client::new());
     std::fs::remove_file(&own).unwrap();
     let url = service.url(&format!("/track?box={BOX}"));
