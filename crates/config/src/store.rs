@@ -37,12 +37,11 @@ impl StoreConfig {
 
     /// Whether there are settings of a store, and no store.
     pub fn lacks_store(&self) -> bool {
-        let usual = Self::default();
-        let of = |it: &Self| {
-            let prefix = it.store_prefix.clone();
+        fn of(it: &StoreConfig) -> (Durability, u64, Duration, &str) {
+            let prefix = &it.store_prefix;
             (it.durability, it.store_every, it.store_timeout, prefix)
-        };
-        self.store.is_none() && of(self) != of(&usual)
+        }
+        self.store.is_none() && of(self) != of(&Self::default())
     }
 
     /// Checks the address.
