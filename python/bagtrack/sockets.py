@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import ssl
-from collections import deque
 from contextlib import ExitStack, suppress
 from typing import Any, Optional, Union
 
@@ -29,8 +28,6 @@ class BaseSocket:
     def __init__(self, services: Services, headers: dict[str, str], timeout: float) -> None:
         self._services = services
         self._timeout = timeout
-        self._on_their_way: deque[int] = deque()
-        """The bytes of the frames without an answer."""
         # JPEGs are compressed already; answers are short.
         self._options: dict[str, Any] = {
             "additional_headers": headers,
@@ -47,20 +44,9 @@ class BaseSocket:
     def _address(self, step: Connect) -> str:
         return f"{self._services.socket_address(step.path)}?from={step.first}"
 
-    def _longest(self) -> float:
-        """How long an answer may take."""
-        return transport.longest(self._timeout, sum(self._on_their_way))
-
-    def _note(self, message: Union[str, bytes]) -> None:
-        """Notes what was sent."""
-        if isinstance(message, bytes):
-            self._on_their_way.append(len(message))
-
-    def _answer(self, message: Union[str, bytes]) -> dict[str, Any]:
-        """The answer to the oldest frame."""
-        if self._on_their_way:
-            self._on_their_way.popleft()
-        return self._document(message)
+    def _longest(self, step: Receive) -> float:
+        """How long the message may take."""
+        return transport.longest(self._timeout, step.on_their_way)
 
     @staticmethod
     def _document(message: Union[str, bytes]) -> dict[str, Any]:
@@ -92,7 +78,6 @@ class Socket(BaseSocket):
         try:
             if isinstance(step, Connect):
                 self._lifetime = ExitStack()
-                self._on_their_way.clear()
                 connection = websockets.sync.client.connect(self._address(step), **self._options)
                 self._socket = self._lifetime.enter_context(connection)
                 return self._document(self._socket.recv(self._timeout))
@@ -102,9 +87,8 @@ class Socket(BaseSocket):
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 self._socket.send(step.message)
-                self._note(step.message)
             else:
-                return self._answer(self._socket.recv(self._longest()))
+                return self._document(self._socket.recv(self._longest(step)))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:
@@ -128,7 +112,6 @@ class AsyncSocket(BaseSocket):
         """As `Socket.perform`."""
         try:
             if isinstance(step, Connect):
-                self._on_their_way.clear()
                 self._socket = await websockets.asyncio.client.connect(self._address(step), **self._options)
                 return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
             if isinstance(step, Disconnect):
@@ -137,9 +120,8 @@ class AsyncSocket(BaseSocket):
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 await self._socket.send(step.message)
-                self._note(step.message)
             else:
-                return self._answer(await asyncio.wait_for(self._socket.recv(), self._longest()))
+                return self._document(await asyncio.wait_for(self._socket.recv(), self._longest(step)))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:

@@ -43,6 +43,9 @@ class Send:
 class Receive:
     """Wait for a message, which is a JSON document."""
 
+    on_their_way: int
+    """The bytes of the frames that the service may not have yet."""
+
 
 @dataclass(frozen=True)
 class NextFrame:
@@ -120,7 +123,7 @@ class Stream:
                 if session.id != before:
                     return
                 continue
-            document = yield Receive()
+            document = yield Receive(self._on_their_way())
             if "type" in document:
                 self._refuse(document)
             self._tries = 0
@@ -132,6 +135,10 @@ class Stream:
             if session.answer is not answer:
                 # The frames on their way have other numbers now.
                 raise RuntimeError("the client was used otherwise while `track` went on: leave its loop first")
+
+    def _on_their_way(self) -> int:
+        uploads = map(self._session.kept, range(self._session.last_acknowledged + 1, self._sent + 1))
+        return sum(len(upload.body) for upload in uploads if upload)
 
     def _next_upload(self) -> Steps[Optional[Upload]]:
         number = self._sent + 1

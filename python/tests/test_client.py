@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import httpx
 import numpy as np
@@ -15,9 +16,8 @@ from websockets.sync.server import ServerConnection, serve
 
 import bagtrack
 from bagtrack.session import Session
-from bagtrack.sockets import Socket
 from bagtrack.steps import ConnectionLost, Pause, Reply, Request, Run
-from bagtrack.stream import Connect, Receive, Send, Stream
+from bagtrack.stream import Connect, Stream
 from bagtrack.transport import Services
 from conftest import SEED, Clip, Server, clock, to_hundredths
 from lossy_line import LossyLine
@@ -38,6 +38,12 @@ def follow(client: bagtrack.Client, clip: Clip, before: dict[int, Callable[[], o
             assert (ok, box, client.frame) == (client.status != "lost", client.box, number)
             boxes.append(box)
     return boxes
+
+
+def answer_to(frame: int) -> str:
+    """An answer of a stream."""
+    box = {"x": 1, "y": 2, "width": 30, "height": 40}
+    return json.dumps({"frame": frame, "box": box, "score": 1.0, "status": "tracking"})
 
 
 def test_a_hundred_frames_get_the_librarys_answers(start_server: StartServer, clip: Clip) -> None:
@@ -215,22 +221,82 @@ def test_a_large_frame_has_longer_to_go_over_a_slow_line(clip: Clip) -> None:
     assert given == [dict.fromkeys(("connect", "read", "write", "pool"), 3.0 + more) for more in (0, 20)]
 
 
-def test_a_large_frame_of_a_stream_has_longer_to_go_over_a_slow_line() -> None:
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+def test_large_frames_of_a_stream_have_longer_to_go_over_a_slow_line(
+    monkeypatch: pytest.MonkeyPatch, is_async: bool
+) -> None:
+    """After a broken line the stored answers counted as those to the frames that were sent behind them."""
+    opened = {"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
+    lines = [
+        ['{"next": 1}', answer_to(1), EOFError("the line breaks")],
+        # The service has frames 2 and 3, whose answers were lost.
+        ['{"next": 4}', *map(answer_to, range(2, 6))],
+    ]
     given = []
 
     class Line:
+        def __init__(self) -> None:
+            self.messages = iter(lines.pop(0))
+
+        def __enter__(self) -> Line:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
         def send(self, _: str | bytes) -> None:
             pass
 
         def recv(self, timeout: float) -> str:
             given.append(timeout)
-            return '{"frame": 1}'
+            message = next(self.messages)
+            if isinstance(message, Exception):
+                raise message
+            return message
 
-    socket = Socket(Services("http://localhost:8080"), {}, 2.0)
-    socket._socket = Line()
-    for step in (Send('{"frame": 1}'), Send(bytes(50_000)), Send(bytes(100_000)), Receive(), Receive(), Receive()):
-        socket.perform(step)
-    assert given == [5.0, 4.0, 2.0]
+    def open_session(_: httpx.Request) -> httpx.Response:
+        return httpx.Response(201, json=opened)
+
+    transport = httpx.MockTransport(open_session)
+    frames = [bytes(50_000 * number) for number in range(1, 6)]
+
+    async def follow() -> list[int]:
+        client = bagtrack.AsyncClient("http://localhost:8080", timeout=2.0)
+        client._http = httpx.AsyncClient(transport=transport)
+        await client.init(b"a frame", (1, 2, 30, 40))
+        return [answer.frame async for answer in client.track(frames, window=3)]
+
+    if is_async:
+        class AsyncLine(Line):
+            async def send(self, _: str | bytes) -> None:
+                pass
+
+            async def recv(self) -> str:
+                return Line.recv(self, 0.0)
+
+            async def close(self) -> None:
+                pass
+
+        async def connect(*_: object, **__: object) -> AsyncLine:
+            return AsyncLine()
+
+        async def wait_for(message: Awaitable[str], timeout: float) -> str:
+            try:
+                return await message
+            finally:
+                given[-1] = timeout
+
+        monkeypatch.setattr("websockets.asyncio.client.connect", connect)
+        monkeypatch.setattr("asyncio.wait_for", wait_for)
+        answered = asyncio.run(follow())
+    else:
+        monkeypatch.setattr("websockets.sync.client.connect", lambda *_, **__: Line())
+        client = bagtrack.Client("http://localhost:8080", timeout=2.0)
+        client._http = httpx.Client(transport=transport)
+        client.init(b"a frame", (1, 2, 30, 40))
+        answered = [answer.frame for answer in client.track(frames, window=3)]
+    assert answered == [1, 2, 3, 4, 5]
+    assert given == [2.0, 2.0 + 1 + 2 + 3, 2.0 + 2 + 3 + 4, 2.0, 2.0 + 4, 2.0 + 4 + 5, 2.0 + 4 + 5, 2.0 + 5]
 
 
 @pytest.mark.parametrize("error", [httpx.LocalProtocolError, httpx.UnsupportedProtocol])
