@@ -9,7 +9,7 @@ import httpx
 
 from bagtrack import transport
 from bagtrack.answer import Answer, Box, BoxLike
-from bagtrack.base_client import BaseClient, lost, request_of
+from bagtrack.base_client import BaseClient, End, lost, request_of
 from bagtrack.encoding import Frame
 from bagtrack.session import SNAPSHOT, four_numbers
 from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Run, Steps
@@ -66,8 +66,7 @@ class AsyncClient(BaseClient):
                 if isinstance(step, Yield):
                     yield step.answer
                 elif isinstance(step, NextFrame):
-                    frame = await anext(source, None)
-                    result = None if frame is None else self._encode(frame)
+                    result = self._next_body(await anext(source, End()), step.number)
                 elif AsyncSocket.performs(step):
                     result = await socket.perform(step)
                 else:

@@ -17,6 +17,10 @@ from bagtrack.transport import Services
 IMAGE = "application/octet-stream"
 
 
+class End:
+    """In the place of a frame after the last one."""
+
+
 class BaseClient:
     """What a client knows of its session."""
 
@@ -99,6 +103,15 @@ class BaseClient:
 
     def _encode(self, frame: Frame) -> bytes:
         return encode(frame, self._encoding, self._quality)
+
+    def _next_body(self, frame: Union[Frame, End], number: int) -> Optional[bytes]:
+        """A frame that `track` was given, as bytes; None after the last one."""
+        if isinstance(frame, End):
+            return None
+        try:
+            return self._encode(frame)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"frame {number} cannot be sent: {error}") from error
 
     def _opening(self, frame: Frame, box: BoxLike) -> Steps[None]:
         query = {**self._settings, "box": query_box(four_numbers(box))}

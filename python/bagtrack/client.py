@@ -9,7 +9,7 @@ import httpx
 
 from bagtrack import transport
 from bagtrack.answer import Answer, Box, BoxLike
-from bagtrack.base_client import BaseClient, lost, request_of
+from bagtrack.base_client import BaseClient, End, lost, request_of
 from bagtrack.encoding import Frame
 from bagtrack.session import SNAPSHOT, four_numbers
 from bagtrack.steps import ConnectionLost, NextService, Pause, PreviousService, Reply, Request, Run, Steps
@@ -67,8 +67,7 @@ class Client(BaseClient):
                 if isinstance(step, Yield):
                     yield step.answer
                 elif isinstance(step, NextFrame):
-                    frame = next(source, None)
-                    result = None if frame is None else self._encode(frame)
+                    result = self._next_body(next(source, End()), step.number)
                 elif Socket.performs(step):
                     result = socket.perform(step)
                 else:

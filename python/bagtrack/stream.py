@@ -51,6 +51,8 @@ class Receive:
 class NextFrame:
     """The caller's next frame, as bytes; None after the last one."""
 
+    number: int
+
 
 @dataclass(frozen=True)
 class Yield:
@@ -144,7 +146,7 @@ class Stream:
         number = self._sent + 1
         upload = self._session.kept(number)
         if upload is None and not self._ended:
-            body = yield NextFrame()
+            body = yield NextFrame(number)
             self._ended = body is None
             if body is not None:
                 upload = Upload(body)

@@ -448,6 +448,31 @@ def test_a_stream_tells_of_a_bad_frame_and_the_session_goes_on(start_server: Sta
         assert [answer.box for answer in client.track(bodies[10:20])] == clip.answered()[10:20]
 
 
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+def test_a_stream_names_the_frame_that_is_none(start_server: StartServer, clip: Clip, is_async: bool) -> None:
+    """With None, as `cv2.imread` gives for a file that it cannot read, a stream ended as after its last frame."""
+    bodies = [file.read_bytes() for file in clip.files]
+    url = start_server().url
+    answers = []
+
+    async def follow() -> None:
+        client = bagtrack.AsyncClient(url)
+        await client.init(bodies[0], clip.box)
+        async for answer in client.track([*bodies[1:20], None, *bodies[20:]]):
+            answers.append(answer.frame)
+
+    with bagtrack.Client(url, seed=SEED) as client:
+        with pytest.raises(TypeError, match="frame 20 cannot be sent: a frame is a NumPy array.*, not NoneType"):
+            if is_async:
+                asyncio.run(follow())
+            client.init(bodies[0], clip.box)
+            answers += [answer.frame for answer in client.track([*bodies[1:20], None, *bodies[20:]])]
+        if not is_async:
+            # Nothing was lost.
+            assert client.update(bodies[20])[1] == clip.answered()[20]
+            assert client.frame == 20
+
+
 @pytest.mark.parametrize("window", [0, -1, 33])
 def test_a_window_that_a_stream_does_not_have_is_refused(start_server: StartServer, clip: Clip, window: int) -> None:
     body = clip.files[0].read_bytes()
