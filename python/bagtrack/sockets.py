@@ -16,7 +16,7 @@ except ModuleNotFoundError as missing:
 
 from bagtrack import transport
 from bagtrack.steps import ConnectionLost
-from bagtrack.stream import Connect, Disconnect, Receive, Send
+from bagtrack.stream import Connect, Disconnect, Poll, Receive, Send
 from bagtrack.transport import Services
 
 FAILURES = (WebSocketException, OSError, TimeoutError, EOFError)
@@ -39,7 +39,7 @@ class BaseSocket:
     @staticmethod
     def performs(step: object) -> bool:
         """Whether it is a step of the socket."""
-        return isinstance(step, (Connect, Disconnect, Send, Receive))
+        return isinstance(step, (Connect, Disconnect, Send, Receive, Poll))
 
     def _address(self, step: Connect) -> str:
         return f"{self._services.socket_address(step.path)}?from={step.first}"
@@ -87,8 +87,11 @@ class Socket(BaseSocket):
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 self._socket.send(step.message)
-            else:
+            elif isinstance(step, Receive):
                 return self._document(self._socket.recv(self._longest(step)))
+            else:
+                with suppress(TimeoutError):
+                    return self._document(self._socket.recv(0))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:
@@ -107,21 +110,36 @@ class AsyncSocket(BaseSocket):
     """`Socket` for asyncio."""
 
     _socket: Optional[websockets.asyncio.client.ClientConnection] = None
+    _receiving: Optional[asyncio.Task[Union[str, bytes]]] = None
+    """Waits for the next message."""
+
+    async def _receive(
+        self, socket: websockets.asyncio.client.ClientConnection, timeout: float
+    ) -> Union[str, bytes]:
+        task = self._receiving = self._receiving or asyncio.ensure_future(socket.recv())
+        await asyncio.wait({task}, timeout=timeout)
+        if not task.done():
+            raise TimeoutError("no message came")
+        self._receiving = None
+        return task.result()
 
     async def perform(self, step: Any) -> Union[dict[str, Any], ConnectionLost, None]:
         """As `Socket.perform`."""
         try:
             if isinstance(step, Connect):
                 self._socket = await websockets.asyncio.client.connect(self._address(step), **self._options)
-                return self._document(await asyncio.wait_for(self._socket.recv(), self._timeout))
+                return self._document(await self._receive(self._socket, self._timeout))
             if isinstance(step, Disconnect):
                 await self.close()
             elif self._socket is None:
                 raise ConnectionLost("the stream is not open")
             elif isinstance(step, Send):
                 await self._socket.send(step.message)
+            elif isinstance(step, Receive):
+                return self._document(await self._receive(self._socket, self._longest(step)))
             else:
-                return self._document(await asyncio.wait_for(self._socket.recv(), self._longest(step)))
+                with suppress(TimeoutError):
+                    return self._document(await self._receive(self._socket, 0.0))
         except ConnectionLost as lost:
             return lost
         except FAILURES as error:
@@ -131,6 +149,11 @@ class AsyncSocket(BaseSocket):
     async def close(self) -> None:
         """Closes the line, if there is one."""
         socket, self._socket = self._socket, None
+        receiving, self._receiving = self._receiving, None
+        if receiving is not None:
+            receiving.cancel()
+            # Nobody asks for what it gave.
+            await asyncio.gather(receiving, return_exceptions=True)
         if socket is not None:
             with suppress(*FAILURES):
                 await socket.close()

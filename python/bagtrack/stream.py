@@ -48,6 +48,11 @@ class Receive:
 
 
 @dataclass(frozen=True)
+class Poll:
+    """A message that has come, as `Receive` gives it; None where there is none."""
+
+
+@dataclass(frozen=True)
 class NextFrame:
     """The caller's next frame, as bytes; None after the last one."""
 
@@ -105,8 +110,11 @@ class Stream:
         session = self._session
         reply: Optional[Reply] = None
         while True:
+            document = None
             if reply is None and self._sent - self._answered() < self._window:
-                upload = yield from self._next_upload()
+                # Answers do not wait for the next frame of a camera.
+                document = yield Poll()
+                upload = None if document else (yield from self._next_upload())
                 if upload is not None:
                     self._sent += 1
                     header: dict[str, Any] = {"frame": self._sent}
@@ -115,7 +123,7 @@ class Stream:
                     yield Send(json.dumps(header))
                     yield Send(upload.body)
                     continue
-            if self._sent == self._answered():
+            if document is None and self._sent == self._answered():
                 if reply is None:
                     return
                 # Nothing is on its way, so the snapshot is of the last answer.
@@ -125,7 +133,7 @@ class Stream:
                 if session.id != before:
                     return
                 continue
-            document = yield Receive(self._on_their_way())
+            document = document or (yield Receive(self._on_their_way()))
             if "type" in document:
                 self._refuse(document)
             self._tries = 0

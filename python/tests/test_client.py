@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Iterator
 
 import httpx
 import numpy as np
@@ -226,77 +226,86 @@ def test_large_frames_of_a_stream_have_longer_to_go_over_a_slow_line(
     monkeypatch: pytest.MonkeyPatch, is_async: bool
 ) -> None:
     """After a broken line the stored answers counted as those to the frames that were sent behind them."""
-    opened = {"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
-    lines = [
-        ['{"next": 1}', answer_to(1), EOFError("the line breaks")],
-        # The service has frames 2 and 3, whose answers were lost.
-        ['{"next": 4}', *map(answer_to, range(2, 6))],
+    # What the service says, and the frames that it waits for. Once the line breaks it has frames 2 and 3.
+    scripts = [
+        ['{"next": 1}', 1, 2, 3, answer_to(1), 4],
+        ['{"next": 4}', 4, answer_to(2), 5, answer_to(3), answer_to(4), answer_to(5)],
     ]
-    given = []
+    unit = 1000
 
-    class Line:
-        def __init__(self) -> None:
-            self.messages = iter(lines.pop(0))
+    def say(line: ServerConnection) -> None:
+        for step in scripts.pop(0):
+            if isinstance(step, str):
+                line.send(step)
+                continue
+            while not isinstance(body := line.recv(), bytes):
+                pass
+            assert len(body) == unit * step
+        if not scripts:
+            list(line)
 
-        def __enter__(self) -> Line:
-            return self
+    opened = {"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
+    transport = httpx.MockTransport(lambda _: httpx.Response(201, json=opened))
+    frames = [bytes(unit * number) for number in range(1, 6)]
+    sizes = []
 
-        def __exit__(self, *_: object) -> None:
-            pass
+    def longest(timeout: float, size: int) -> float:
+        sizes.append(size // unit)
+        return timeout
 
-        def send(self, _: str | bytes) -> None:
-            pass
-
-        def recv(self, timeout: float) -> str:
-            given.append(timeout)
-            message = next(self.messages)
-            if isinstance(message, Exception):
-                raise message
-            return message
-
-    def open_session(_: httpx.Request) -> httpx.Response:
-        return httpx.Response(201, json=opened)
-
-    transport = httpx.MockTransport(open_session)
-    frames = [bytes(50_000 * number) for number in range(1, 6)]
-
-    async def follow() -> list[int]:
-        client = bagtrack.AsyncClient("http://localhost:8080", timeout=2.0)
+    async def follow(url: str) -> list[int]:
+        client = bagtrack.AsyncClient(url)
         client._http = httpx.AsyncClient(transport=transport)
         await client.init(b"a frame", (1, 2, 30, 40))
+        monkeypatch.setattr("bagtrack.transport.longest", longest)
         return [answer.frame async for answer in client.track(frames, window=3)]
 
-    if is_async:
-        class AsyncLine(Line):
-            async def send(self, _: str | bytes) -> None:
-                pass
-
-            async def recv(self) -> str:
-                return Line.recv(self, 0.0)
-
-            async def close(self) -> None:
-                pass
-
-        async def connect(*_: object, **__: object) -> AsyncLine:
-            return AsyncLine()
-
-        async def wait_for(message: Awaitable[str], timeout: float) -> str:
-            try:
-                return await message
-            finally:
-                given[-1] = timeout
-
-        monkeypatch.setattr("websockets.asyncio.client.connect", connect)
-        monkeypatch.setattr("asyncio.wait_for", wait_for)
-        answered = asyncio.run(follow())
-    else:
-        monkeypatch.setattr("websockets.sync.client.connect", lambda *_, **__: Line())
-        client = bagtrack.Client("http://localhost:8080", timeout=2.0)
-        client._http = httpx.Client(transport=transport)
-        client.init(b"a frame", (1, 2, 30, 40))
-        answered = [answer.frame for answer in client.track(frames, window=3)]
+    with serve(say, "127.0.0.1", 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{server.socket.getsockname()[1]}"
+        if is_async:
+            answered = asyncio.run(follow(url))
+        else:
+            client = bagtrack.Client(url)
+            client._http = httpx.Client(transport=transport)
+            client.init(b"a frame", (1, 2, 30, 40))
+            monkeypatch.setattr("bagtrack.transport.longest", longest)
+            answered = [answer.frame for answer in client.track(frames, window=3)]
     assert answered == [1, 2, 3, 4, 5]
-    assert given == [2.0, 2.0 + 1 + 2 + 3, 2.0 + 2 + 3 + 4, 2.0, 2.0 + 4, 2.0 + 4 + 5, 2.0 + 4 + 5, 2.0 + 5]
+    assert sizes[:4] == [1 + 2 + 3, 2 + 3 + 4, 4, 4 + 5]
+
+
+@pytest.mark.parametrize("is_async", [False, True], ids=["blocking", "asyncio"])
+def test_answers_do_not_wait_for_the_next_frames_of_a_camera(
+    start_server: StartServer, clip: Clip, is_async: bool
+) -> None:
+    """They came `window` frames late, though the service had given them long before."""
+    url = start_server().url
+    bodies = [file.read_bytes() for file in clip.files[:30]]
+    answers, before_the_last = [], []
+
+    def camera(session: str) -> Iterator[bytes]:
+        for number, body in enumerate(bodies[1:], 1):
+            yield body
+            # The next picture comes once the service has tracked this one.
+            while httpx.get(f"{url}/sessions/{session}").json()["frames"] <= number:
+                pass
+        before_the_last.extend(answers)
+
+    async def follow() -> None:
+        async with bagtrack.AsyncClient(url, seed=SEED) as client:
+            await client.init(bodies[0], clip.box)
+            async for answer in client.track(camera(client.id), window=32):
+                answers.append(answer.box)
+
+    if is_async:
+        asyncio.run(follow())
+    else:
+        with bagtrack.Client(url, seed=SEED) as client:
+            client.init(bodies[0], clip.box)
+            answers.extend(answer.box for answer in client.track(camera(client.id), window=32))
+    assert answers == clip.answered()[1:30]
+    assert before_the_last
 
 
 @pytest.mark.parametrize("error", [httpx.LocalProtocolError, httpx.UnsupportedProtocol])
