@@ -53,8 +53,8 @@ class Client(BaseClient):
     def track(self, frames: Iterable[Frame], window: int = 8) -> Iterator[Answer]:
         """The answers to many frames, over a WebSocket, with at most `window` frames on their way (1 to 32).
 
-        As fast as the service also over a slow line. Answers that have come are given before the next frame is asked for.
-        Needs bagtrack[stream].
+        As fast as the service also over a slow line. An answer that has come is given before the next frame is asked
+        for. Needs bagtrack[stream].
         """
         from bagtrack.sockets import Socket
 

@@ -602,6 +602,22 @@ def test_a_stream_without_its_package_names_it(
         assert client.frame == 0
 
 
+def test_a_stream_goes_on_after_many_calls_without_an_answer(start_server: StartServer, clip: Clip) -> None:
+    """The service no longer had the answer to the first of them, and the stream ended with 409."""
+    bodies = [file.read_bytes() for file in clip.files]
+    # Each call sends the frame before its own again first, whose answer comes.
+    with LossyLine(start_server().port, loses=set(range(2, 81, 2))) as line:
+        client = bagtrack.Client(line.url, seed=SEED, retry_for=0.0)
+        client.init(bodies[0], clip.box)
+        for body in bodies[1:41]:
+            with pytest.raises(bagtrack.ServiceUnavailable):
+                client.update(body)
+        assert (line.lost, client.frame) == (40, 0)
+        answers = list(client.track(bodies[41:60]))
+        assert answers[-1].frame == 59
+        assert [answer.box for answer in answers] == [clip.answered()[answer.frame] for answer in answers]
+
+
 def test_frames_on_their_way_count_when_a_stream_is_left(start_server: StartServer, clip: Clip) -> None:
     bodies = [file.read_bytes() for file in clip.files]
     with bagtrack.Client(start_server().url, seed=SEED) as client:
