@@ -119,7 +119,7 @@ class AsyncSocket(BaseSocket):
         task = self._receiving = self._receiving or asyncio.ensure_future(socket.recv())
         await asyncio.wait({task}, timeout=timeout)
         if not task.done():
-            raise TimeoutError("no message came")
+            raise TimeoutError(f"no message came within {timeout:g} s")
         self._receiving = None
         return task.result()
 
