@@ -162,8 +162,8 @@ class Stream:
         return upload
 
     def _refuse(self, problem: dict[str, Any]) -> None:
-        if problem.get("status") in (429, 503):
-            raise ConnectionLost(problem.get("detail", ""), problem["status"])
+        if problem.get("status") in (429, 503, *GONE):
+            raise ConnectionLost(problem.get("detail", ""), problem["status"], problem)
         self._session.drop_refused()
         raise ServiceError(problem.get("status", 0), problem)
 

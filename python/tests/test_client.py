@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import httpx
 import numpy as np
@@ -44,6 +45,42 @@ def answer_to(frame: int) -> str:
     """An answer of a stream."""
     box = {"x": 1, "y": 2, "width": 30, "height": 40}
     return json.dumps({"frame": frame, "box": box, "score": 1.0, "status": "tracking"})
+
+
+UNIT = 1000
+"""Bytes of the first frame of `frames_of`."""
+OPENED = httpx.MockTransport(
+    lambda _: httpx.Response(
+        201, json={"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
+    )
+)
+"""A service that opens each session."""
+
+
+def frames_of(count: int) -> list[bytes]:
+    """Frames that `scripted` tells by their lengths."""
+    return [bytes(UNIT * number) for number in range(1, count + 1)]
+
+
+@contextmanager
+def scripted(scripts: list[list[str | int]]) -> Iterator[str]:
+    """A service whose streams say these texts, and wait for the frames of these numbers between. All but the last one
+    break then."""
+
+    def say(line: ServerConnection) -> None:
+        for step in scripts.pop(0):
+            if isinstance(step, str):
+                line.send(step)
+                continue
+            while not isinstance(body := line.recv(), bytes):
+                pass
+            assert len(body) == UNIT * step
+        if not scripts:
+            list(line)
+
+    with serve(say, "127.0.0.1", 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.socket.getsockname()[1]}"
 
 
 def test_a_hundred_frames_get_the_librarys_answers(start_server: StartServer, clip: Clip) -> None:
@@ -231,46 +268,28 @@ def test_large_frames_of_a_stream_have_longer_to_go_over_a_slow_line(
         ['{"next": 1}', 1, 2, 3, answer_to(1), 4],
         ['{"next": 4}', 4, answer_to(2), 5, answer_to(3), answer_to(4), answer_to(5)],
     ]
-    unit = 1000
-
-    def say(line: ServerConnection) -> None:
-        for step in scripts.pop(0):
-            if isinstance(step, str):
-                line.send(step)
-                continue
-            while not isinstance(body := line.recv(), bytes):
-                pass
-            assert len(body) == unit * step
-        if not scripts:
-            list(line)
-
-    opened = {"id": "x", "frame": 0, "box": dict(x=1, y=2, width=30, height=40), "parameters": {"seed": 7}}
-    transport = httpx.MockTransport(lambda _: httpx.Response(201, json=opened))
-    frames = [bytes(unit * number) for number in range(1, 6)]
     sizes = []
 
     def longest(timeout: float, size: int) -> float:
-        sizes.append(size // unit)
+        sizes.append(size // UNIT)
         return timeout
 
     async def follow(url: str) -> list[int]:
         client = bagtrack.AsyncClient(url)
-        client._http = httpx.AsyncClient(transport=transport)
+        client._http = httpx.AsyncClient(transport=OPENED)
         await client.init(b"a frame", (1, 2, 30, 40))
         monkeypatch.setattr("bagtrack.transport.longest", longest)
-        return [answer.frame async for answer in client.track(frames, window=3)]
+        return [answer.frame async for answer in client.track(frames_of(5), window=3)]
 
-    with serve(say, "127.0.0.1", 0) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        url = f"http://127.0.0.1:{server.socket.getsockname()[1]}"
+    with scripted(scripts) as url:
         if is_async:
             answered = asyncio.run(follow(url))
         else:
             client = bagtrack.Client(url)
-            client._http = httpx.Client(transport=transport)
+            client._http = httpx.Client(transport=OPENED)
             client.init(b"a frame", (1, 2, 30, 40))
             monkeypatch.setattr("bagtrack.transport.longest", longest)
-            answered = [answer.frame for answer in client.track(frames, window=3)]
+            answered = [answer.frame for answer in client.track(frames_of(5), window=3)]
     assert answered == [1, 2, 3, 4, 5]
     assert sizes[:4] == [1 + 2 + 3, 2 + 3 + 4, 4, 4 + 5]
 
@@ -412,6 +431,16 @@ def test_a_stream_survives_a_killed_server(start_server: StartServer, clip: Clip
                 server.kill()
                 server.start_again()
     assert boxes == clip.answered()[1:]
+
+
+def test_a_stream_opens_a_session_again_that_ends_meanwhile() -> None:
+    """The problem that answers the next frame ended it, where a post opens the session again."""
+    gone = {"type": "/docs/problems#session-not-found", "status": 404, "detail": "There is no such session."}
+    with scripted([['{"next": 1}', 1, json.dumps(gone)], ['{"next": 1}', 1, answer_to(1), 2, answer_to(2)]]) as url:
+        client = bagtrack.Client(url)
+        client._http = httpx.Client(transport=OPENED)
+        client.init(b"a frame", (1, 2, 30, 40))
+        assert [answer.frame for answer in client.track(frames_of(2), window=1)] == [1, 2]
 
 
 def test_a_stream_goes_on_after_a_broken_line_and_tracks_no_frame_twice(
