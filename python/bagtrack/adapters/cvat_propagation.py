@@ -22,15 +22,19 @@ from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
-from cvat_sdk import make_client, models
-from cvat_sdk.core.proxies.annotations import AnnotationUpdateAction
-from cvat_sdk.exceptions import ApiException, CvatSdkException, OpenApiException
-from PIL import Image
-from urllib3.exceptions import HTTPError, MaxRetryError
 
 from bagtrack._native import KeyFrames, Tracker
-from bagtrack.adapters import pictures
+from bagtrack.adapters.extras import needs
 from bagtrack.answer import Box
+
+with needs("cvat"):
+    from cvat_sdk import make_client, models
+    from cvat_sdk.core.proxies.annotations import AnnotationUpdateAction
+    from cvat_sdk.exceptions import ApiException, CvatSdkException, OpenApiException
+    from PIL import Image
+    from urllib3.exceptions import HTTPError, MaxRetryError
+
+    from bagtrack.adapters import pictures
 
 _AHEAD = 4
 """So many frames are on their way from CVAT while one is tracked."""

@@ -24,11 +24,15 @@ from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageOps
 
 from bagtrack._native import Tracker
-from bagtrack.adapters import pictures
+from bagtrack.adapters.extras import needs
 from bagtrack.answer import Box
+
+with needs("labelme"):
+    from PIL import Image, ImageOps
+
+    from bagtrack.adapters import pictures
 
 Document = dict[str, Any]
 

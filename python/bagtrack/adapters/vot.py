@@ -14,10 +14,13 @@ import argparse
 from typing import Any, Optional, Sequence
 from urllib.parse import unquote, urlparse
 
-import trax
-
 import bagtrack
-from bagtrack.adapters import pictures
+from bagtrack.adapters.extras import needs
+
+with needs("vot"):
+    import trax
+
+    from bagtrack.adapters import pictures
 
 
 class Targets:
