@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import Any, Iterable, Iterator, Optional, Sequence, TypeVar, Union
 
@@ -23,9 +24,13 @@ class Client(BaseClient):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._http = httpx.Client(headers=self._headers, timeout=self._timeout)
+        self._connect()
 
     __init__.__doc__ = BaseClient.__init__.__doc__
+
+    def _connect(self) -> None:
+        self._http = httpx.Client(headers=self._headers, timeout=self._timeout)
+        self._process = os.getpid()
 
     @classmethod
     def load(
@@ -110,6 +115,9 @@ class Client(BaseClient):
             self._services.previous()
             return None
         assert isinstance(step, Request)
+        if self._process != os.getpid():
+            # After a fork two processes would read each other's answers.
+            self._connect()
         try:
             response = self._http.request(**request_of(step, self._services, self._timeout))
         except httpx.TransportError as error:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import multiprocessing
+import os
 import subprocess
 import sys
 import threading
@@ -509,6 +511,30 @@ def test_a_stream_names_the_frame_that_is_none(start_server: StartServer, clip: 
             # Nothing was lost.
             assert client.update(bodies[20])[1] == clip.answered()[20]
             assert client.frame == 20
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_forked_processes_do_not_share_a_connection(start_server: StartServer, clip: Clip) -> None:
+    """They read each other's answers."""
+    bodies = [file.read_bytes() for file in clip.files[:40]]
+    client = bagtrack.Client(start_server().url, seed=SEED, retry_for=10.0)
+    client.init(bodies[0], clip.box)
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+
+    def follow() -> None:
+        try:
+            client.init(bodies[0], clip.box)
+            answers.put([client.update(body)[1] for body in bodies[1:]])
+        except Exception as error:
+            answers.put(repr(error))
+
+    processes = [context.Process(target=follow) for _ in range(4)]
+    for process in processes:
+        process.start()
+    assert [answers.get() for _ in processes] == [clip.answered()[1:40]] * 4
+    for process in processes:
+        process.join()
 
 
 @pytest.mark.parametrize("window", [0, -1, 33])
