@@ -52,7 +52,9 @@ pub fn inspect<'file>(
 }
 
 fn unread(bytes: &[u8]) -> IngestError {
-    sniff::unread_type(bytes).map_or(IngestError::UnknownFormat, IngestError::UnreadFormat)
+    sniff::unread_type(bytes)
+        .or_else(|| sniff::is_text(bytes).then_some("text"))
+        .map_or(IngestError::UnknownFormat, IngestError::UnreadFormat)
 }
 
 impl Inspected<'_> {

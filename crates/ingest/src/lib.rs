@@ -24,8 +24,8 @@
 //!
 //! ```
 //! use bagtrack_ingest::{decode, IngestError, Limits};
-//! let error = decode(b"GIF89a", &Limits::default()).unwrap_err();
-//! assert_eq!(error, IngestError::UnknownFormat);
+//! let error = decode(b"a letter", &Limits::default()).unwrap_err();
+//! assert_eq!(error, IngestError::UnreadFormat("text"));
 //! ```
 
 mod catch_decoder_panic;
@@ -52,4 +52,4 @@ mod webp_chunks;
 pub use decode::{Inspected, decode, decode_to, inspect, recycle};
 pub use error::IngestError;
 pub use limits::Limits;
-pub use sniff::{type_name, unread_type};
+pub use sniff::{is_text, type_name, unread_type};

@@ -89,6 +89,15 @@ pub fn unread_type(bytes: &[u8]) -> Option<&'static str> {
     found.or_else(|| of_parts.iter().find(|(is, _)| *is).map(|(_, name)| *name))
 }
 
+/// Whether all is text in UTF-8, which may be cut off: images and videos have control characters from their first bytes
+/// on.
+pub fn is_text(bytes: &[u8]) -> bool {
+    let is_utf8 =
+        std::str::from_utf8(bytes).map_or_else(|error| error.error_len().is_none(), |_| true);
+    let is_letter = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
+    is_utf8 && !bytes.is_empty() && bytes.iter().all(is_letter)
+}
+
 /// Which still image a file of boxes is; none where it is a video.
 fn still_image(bytes: &[u8]) -> Option<&'static str> {
     let length = bytes

@@ -1,8 +1,8 @@
 //! Files in JSON: base64, possibly as a data URL, possibly broken into lines.
 
 use crate::http::problems::problem::Problem;
-use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine};
 use bytes::Bytes;
 
 /// Standard base64, with or without padding.
@@ -37,6 +37,11 @@ pub fn decode(text: &str) -> Result<Bytes, Problem> {
         BASE64.decode(encoded)
     };
     decoded.map(Bytes::from).map_err(|error| {
+        if let DecodeError::InvalidByte(_, b'-' | b'_') = error {
+            let detail =
+                "A file is base64 for URLs; send it in the standard alphabet, with `+` and `/`.";
+            return Problem::malformed(detail);
+        }
         let error = error.to_string();
         let reason = error.trim_end_matches('.');
         Problem::malformed(format!("A file is not base64: {reason}."))

@@ -58,6 +58,9 @@ fn unread(name: &str) -> String {
         | "raw H.264" | "raw H.265" => {
             "Of videos send MP4, WebM or GIF: `ffmpeg -i VIDEO clip.mp4` makes one."
         }
+        "text" => {
+            "With curl the name of a file has an `@` before it: `--data-binary @file`, `-F frame=@file`."
+        }
         "gzip" | "ZIP" => "Send the file itself, not packed.",
         _ => "Convert it, or let the camera or the browser make JPEGs.",
     };

@@ -3,7 +3,7 @@
 use crate::application::{BOX, TestApplication, expect, expect_detail, expect_problem};
 use crate::pictures;
 use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use base64::prelude::{BASE64_STANDARD, BASE64_URL_SAFE};
 use image::ImageFormat;
 use reqwest::multipart::{Form, Part};
 use reqwest::{Method, Response, StatusCode};
@@ -187,6 +187,15 @@ async fn base64_may_be_a_data_url_broken_into_lines_or_unpadded() {
 }
 
 #[tokio::test]
+async fn base64_for_urls_is_named() {
+    let app = TestApplication::start().await;
+    let frame = BASE64_URL_SAFE.encode([0xFF, 0xD8, 0xFF, 0xE0]);
+    let body = json!({"frame": frame, "box": BOX});
+    let refused = post_json(&app, Method::POST, "/sessions", &body).await;
+    expect_detail(refused, "malformed-request", &["for URLs", "`+`"]).await;
+}
+
+#[tokio::test]
 async fn unknown_and_doubled_names_are_refused_and_the_known_ones_named() {
     let app = TestApplication::start().await;
     let png = pictures::png(0);
@@ -334,6 +343,9 @@ async fn a_file_that_curl_sent_as_text_is_recognised() {
         request.body(body).send().await.unwrap()
     };
     expect_detail(send(stripped).await, "frame-damaged", &["--data-binary"]).await;
+    // The `@` was left out.
+    let name = send(b"clip/img/0001.jpg".to_vec()).await;
+    expect_detail(name, "unsupported-image", &["text", "`-F frame=@file`"]).await;
     // This is how curl labels a whole file.
     expect(send(frame).await, StatusCode::OK).await;
 }

@@ -117,14 +117,15 @@ fn bytes_after_the_end_are_ignored() {
 fn other_types_and_no_bytes_are_an_unknown_format() {
     for bytes in [
         b"".as_slice(),
-        b"GIF89a",
-        b"<svg/>",
-        b"BM",
+        b"GIF89a\0",
+        b"BM\0",
         b"RIFF\0\0\0\0WAVE",
         &[0xFF, 0xD8],
     ] {
         assert_eq!(decode(bytes, &SMALL), Err(IngestError::UnknownFormat));
     }
+    let text = decode(b"@frame.jpg", &SMALL);
+    assert_eq!(text, Err(IngestError::UnreadFormat("text")));
 }
 
 #[test]
