@@ -120,6 +120,15 @@ fn a_name_with_a_slash_at_its_end_is_a_folder_whatever_its_ending() {
     assert_eq!(fs::read_dir(&out).expect("a folder").count(), 12);
 }
 
+/// There was "No such file or directory".
+#[test]
+fn standard_input_and_addresses_are_told_as_no_files() {
+    for source in ["-", "http://127.0.0.1/clip.mp4"] {
+        let line = fails(&["track", source, "--box=10,20,30,40"]);
+        assert!(line.contains("save the video to a file first"), "{line}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 #[ignore = "needs ffmpeg"]

@@ -5,7 +5,7 @@ use super::start::Start;
 use super::video_info::{FFMPEG, Rate, VideoInfo};
 use bagtrack_cli::frames;
 use bagtrack_ingest::video::{VideoDecoder, VideoLimits};
-use bagtrack_ingest::{Limits, unread_type};
+use bagtrack_ingest::{Limits, is_text, unread_type};
 use std::error::Error;
 use std::fs;
 use std::io::Read;
@@ -61,15 +61,16 @@ enum Pictures {
 impl Frames {
     /// The frames of a folder or a video, from `start` on.
     pub fn open(path: &Path, start: Start, direction: Direction) -> Result<Self, Box<dyn Error>> {
-        let file = path.metadata();
-        let file = file.map_err(|error| format!("{}: {error}", path.display()))?;
+        let file = match path.metadata() {
+            Err(_) if is_no_path(path) => return Err(no_file(path)),
+            file => file.map_err(|error| format!("{}: {error}", path.display()))?,
+        };
         if file.is_dir() {
             Self::of_folder(path, start, direction)
         } else if file.is_file() {
             Self::of_video(path, start, direction)
         } else {
-            let text = "it is a pipe or a device: save the video to a file first";
-            Err(format!("{}: {text}", path.display()).into())
+            Err(no_file(path))
         }
     }
 
@@ -260,6 +261,16 @@ fn too_short(shown: &str, count: u64) -> String {
     format!("{shown}: --start is after its last frame: it has {count} frames, counted from 0")
 }
 
+/// Standard input, or an address, as ffmpeg takes them.
+fn is_no_path(path: &Path) -> bool {
+    path == Path::new("-") || path.to_string_lossy().contains("://")
+}
+
+fn no_file(path: &Path) -> Box<dyn Error> {
+    let text = "it is no file and no folder: save the video to a file first";
+    format!("{}: {text}", path.display()).into()
+}
+
 fn read(index: u64, path: &Path) -> Result<FrameFile, String> {
     let shown = path.display().to_string();
     let bytes = fs::read(path).map_err(|error| format!("{shown}: {error}"))?;
@@ -287,10 +298,4 @@ fn check_is_video(path: &Path) -> Result<(), Box<dyn Error>> {
         _ => return Ok(()),
     };
     Err(format!("{} {told}", path.display()).into())
-}
-
-/// Whether a file that begins like this is a text: videos have control characters from their first bytes on.
-fn is_text(start: &[u8]) -> bool {
-    let is_letter = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
-    start.iter().all(is_letter)
 }
