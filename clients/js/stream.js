@@ -15,7 +15,8 @@ import { documentOf, longest, pause } from "./transport.js";
  * @typedef {object} StreamOptions
  * @property {boolean} [live] Whether the newest frame wins: one that waits is skipped when a newer one comes.
  * @property {number} [window] Frames on their way at a time, 1 to 32 (8).
- * @property {number} [patience] Milliseconds in which a broken line is opened again; as the client's when left out.
+ * @property {number} [patience] Milliseconds in which a broken line is opened again; as the client's when left out. It
+ *   ends before that where the service answers eight times, and gives no stream.
  * @property {(isUp: boolean) => void} [onLine] Is told when the line breaks and when it is up again.
  *
  * @typedef {object} Waiting A frame without an answer.
@@ -27,6 +28,8 @@ import { documentOf, longest, pause } from "./transport.js";
 
 const FIRST_PAUSE = 200;
 const LONGEST_PAUSE = 5000;
+/** A service that answers, but gives no stream so many times in a row, gives none. */
+const MOST_TRIES = 8;
 /** Close codes from here on are this and an HTTP status: the service closed the stream for good. */
 const OF_STATUS = 4000;
 const UNAUTHORIZED = 401;
@@ -34,6 +37,12 @@ const UNAUTHORIZED = 401;
 const ABNORMAL = 1006;
 /** The status with which a stream begins. */
 const SWITCHED = 101;
+
+const NO_SOCKET = "its stream cannot be opened: a proxy may let no WebSocket through.";
+const LOSES = "it loses each session at once: a balancer may send requests to several instances without a common store.";
+
+/** @param {string} why */
+const noStream = (why) => new Problem({ type: "no-stream", detail: `The service answers, but ${why}` });
 
 /** The frame of what was sent, which was read before.
  * @param {Waiting} sent */
@@ -78,10 +87,10 @@ export class FrameStream {
     this.isUp = false;
     /** Whether it was told that the line is broken. */
     this.isDown = false;
-    /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
-    this.isReadable = false;
-    /** Whether the session was opened again since the line broke. */
-    this.hasReopened = false;
+    /** How often the session could be read since the line broke, so that only the stream cannot be opened. */
+    this.readings = 0;
+    /** How often the session was opened again since the last answer. */
+    this.reopened = 0;
     this.isEnded = false;
     this.wait = FIRST_PAUSE;
     /** When the line broke. */
@@ -189,6 +198,7 @@ export class FrameStream {
     if (message.next !== undefined) return this.resume(message.next);
     if (message.type) return this.refused(new Problem(message));
     for (let count = message.skipped ?? 0; count > 0; count -= 1) this.acknowledge()?.resolve(undefined);
+    this.reopened = 0;
     this.session.take(message);
     this.session.isDraining ||= message.draining === true;
     const answered = this.acknowledge();
@@ -255,8 +265,7 @@ export class FrameStream {
     this.outOfOrder = 0;
     this.isUp = true;
     this.isDown = false;
-    this.isReadable = false;
-    this.hasReopened = false;
+    this.readings = 0;
     this.wait = FIRST_PAUSE;
     this.onLine(true);
     this.transmit();
@@ -297,14 +306,15 @@ export class FrameStream {
    * @param {Problem} problem What told that the service has lost it. */
   async reopen(problem) {
     this.lost = undefined;
-    this.isReadable = false;
-    // The first time at once. Where every instance loses the session again, this ends with the patience.
-    if (this.hasReopened) {
+    this.readings = 0;
+    // The first time at once.
+    if (this.reopened > 0) {
       if (this.isLate) return this.end(problem);
+      if (this.reopened >= MOST_TRIES) return this.end(noStream(LOSES));
       await this.rest();
       if (this.isEnded) return;
     }
-    this.hasReopened = true;
+    this.reopened += 1;
     try {
       const at = await this.session.reopen(problem);
       if (this.isEnded) return;
@@ -374,10 +384,7 @@ export class FrameStream {
     // A token has ended. The key gives another one, unless it has ended, too: the call below tells.
     const isFinal = code > OF_STATUS && code !== OF_STATUS + UNAUTHORIZED;
     if (isFinal) return this.refusedFor(this.reason(code - OF_STATUS));
-    if (this.isReadable && this.isLate) {
-      const detail = "The service answers, but its stream cannot be opened: a proxy may let no WebSocket through.";
-      return this.end(new Problem({ type: "unreachable", detail }));
-    }
+    if (this.readings > 0 && (this.isLate || this.readings >= MOST_TRIES)) return this.end(noStream(NO_SOCKET));
     this.breakLine();
     await this.rest();
     if (this.isEnded) return;
@@ -387,11 +394,12 @@ export class FrameStream {
     const asked = transport.attempt("GET", url, {}).then((response) => documentOf(response, "frames"));
     const seen = await asked.catch((error) => error);
     if (this.isEnded) return;
-    this.isReadable = !(seen instanceof Error);
     if (seen instanceof Error) {
+      this.readings = 0;
       const isTemporary = seen instanceof Problem && seen.isTemporary;
       return isTemporary && !this.isLate ? this.closed(code) : this.refusedFor(seen);
     }
+    this.readings += 1;
     this.resendFrom(seen.frames);
     await this.connect();
   }

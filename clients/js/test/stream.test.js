@@ -248,18 +248,18 @@ test("a stream that a proxy does not let through ends when patience ends, and th
   const session = await new Client(service.url, { WebSocket: Stopped }).open(clip.frames[0], clip.box, { seed: SEED });
   const lines = /** @type {boolean[]} */ ([]);
   const stream = session.stream({ patience: 300, onLine: (isUp) => lines.push(isUp) });
-  const told = { slug: "unreachable", message: /^The service answers, but its stream cannot be opened/ };
+  const told = { slug: "no-stream", message: /^The service answers, but its stream cannot be opened/ };
   await assert.rejects(stream.track(clip.frames[1]), told);
   assert.deepEqual(lines, [false]);
   sameAsTheLibrary([await session.track(clip.frames[1])]);
 });
 
-test("a stream ends where each instance loses its session again, and opens not many", async () => {
-  const other = await startService();
-  let opened = 0;
+/** Leads what opens a session to one instance, and all else to another, which does not know it.
+ * @param {{port: number}} other */
+async function openBalancer(other) {
   const balancer = createServer((request, response) => {
     const opens = request.method === "PUT";
-    opened += Number(opens);
+    own.opened += Number(opens);
     const { method, url: path, headers } = request;
     const passed = forward({ host: "127.0.0.1", port: opens ? service.port : other.port, method, path, headers }, (answer) => {
       response.writeHead(answer.statusCode ?? 502, answer.headers);
@@ -268,15 +268,62 @@ test("a stream ends where each instance loses its session again, and opens not m
     request.pipe(passed);
   });
   await new Promise((resolve) => balancer.listen(0, "127.0.0.1", () => resolve(undefined)));
+  const own = {
+    url: `http://127.0.0.1:${/** @type {any} */ (balancer.address()).port}`,
+    opened: 0,
+    close() {
+      balancer.close();
+      balancer.closeAllConnections();
+    },
+  };
+  return own;
+}
+
+test("a stream ends where each instance loses its session again, and opens not many", async () => {
+  const other = await startService();
+  const balancer = await openBalancer(other);
   try {
-    const url = `http://127.0.0.1:${/** @type {any} */ (balancer.address()).port}`;
-    const stream = (await open(url)).stream({ patience: 500 });
+    const stream = (await open(balancer.url)).stream({ patience: 500 });
     const lost = (/** @type {unknown} */ error) => error instanceof Problem && error.slug === "session-not-found";
     await assert.rejects(stream.track(clip.frames[1]), lost);
-    assert.ok(opened > 1 && opened < 5, `${opened} sessions`);
+    assert.ok(balancer.opened > 1 && balancer.opened < 5, `${balancer.opened} sessions`);
   } finally {
     balancer.close();
-    balancer.closeAllConnections();
+    await other.stop();
+  }
+});
+
+/** Lets pauses pass a hundred times as fast.
+ * @param {import("node:test").TestContext} context */
+function hurry(context) {
+  const ticking = setInterval(() => context.mock.timers.tick(200), 2);
+  context.mock.timers.enable({ apis: ["setTimeout"] });
+  context.after(() => clearInterval(ticking));
+}
+
+// They went on without end, as those of the page.
+test("streams of endless patience end where none can be had, and say why", async (context) => {
+  class Stopped extends WebSocket {
+    constructor(/** @type {URL} */ url) {
+      super(new URL("/livez", url));
+    }
+  }
+  const other = await startService();
+  const balancer = await openBalancer(other);
+  const patience = Infinity;
+  try {
+    const sessions = [await open(balancer.url), await new Client(service.url, { WebSocket: Stopped }).open(clip.frames[0], clip.box)];
+    hurry(context);
+    const ends = await Promise.all(sessions.map(async (session) => {
+      const stream = session.stream({ patience });
+      stream.track(clip.frames[1]).catch(() => undefined);
+      return stream.ended;
+    }));
+    assert.match(String(ends[0]), /answers, but it loses each session at once: a balancer/);
+    assert.match(String(ends[1]), /answers, but its stream cannot be opened: a proxy/);
+    assert.ok(balancer.opened > 5 && balancer.opened < 12, `${balancer.opened} sessions`);
+  } finally {
+    balancer.close();
     await other.stop();
   }
 });

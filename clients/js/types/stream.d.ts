@@ -20,7 +20,8 @@ export type StreamOptions = {
      */
     window?: number;
     /**
-     * Milliseconds in which a broken line is opened again; as the client's when left out.
+     * Milliseconds in which a broken line is opened again; as the client's when left out. It
+     * ends before that where the service answers eight times, and gives no stream.
      */
     patience?: number;
     /**
@@ -58,10 +59,10 @@ export declare class FrameStream {
     isUp: boolean;
     /** Whether it was told that the line is broken. */
     isDown: boolean;
-    /** Whether the session could be read since the line broke, so that only the stream cannot be opened. */
-    isReadable: boolean;
-    /** Whether the session was opened again since the line broke. */
-    hasReopened: boolean;
+    /** How often the session could be read since the line broke, so that only the stream cannot be opened. */
+    readings: number;
+    /** How often the session was opened again since the last answer. */
+    reopened: number;
     isEnded: boolean;
     wait: number;
     /** When the line broke. */
